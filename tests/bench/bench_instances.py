@@ -18,13 +18,12 @@ from measure import interleaved, median_ratio, report
 
 import viewer
 from viewer.loading import bundled_body
-from viewer.rendering.gpu import instance_buffers
-from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.mesh_pass import set_surface
 from viewer.rendering.passes.runs import draw_runs
 from viewer.rendering.view import View, set_lights, view_of
@@ -139,7 +138,7 @@ def still_draw(
     content: list[Any] = [
         (mesh.positions, "3f4", "in_position"),
         (mesh.normals, "3f4", "in_normal"),
-        (instances._instances, f"4f4 4f4 4f4 3f4 {4 * (instance_buffers._FLOATS - 15)}x/i", *names),
+        (instances._instances, f"4f4 4f4 4f4 3f4 {4 * (instance_pass._FLOATS - 15)}x/i", *names),
     ]
     for values, layout, name in ((mesh.uvs, "2f4", "in_uv"), (mesh.colors, "3f4", "in_color")):
         if name in program and values is not None:

@@ -19,10 +19,13 @@ from viewer.rig.mesh import bounding_box, box_size
 
 if TYPE_CHECKING:
     from viewer.rendering.casters import Casters
-    from viewer.rendering.passes.contact_pass import Contact, ContactPass
-    from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
     from viewer.rendering.passes.occlusion_pass import OcclusionPass
-    from viewer.rendering.passes.shadow_pass import ShadowPass
+    from viewer.rendering.passes.shadow_passes import (
+        Contact,
+        ContactPass,
+        GroundShadowPass,
+        ShadowPass,
+    )
 
 __all__ = ["Lighting"]
 
@@ -53,14 +56,14 @@ class Lighting:
 
     @cached_property
     def _contact_pass(self) -> ContactPass:
-        from viewer.rendering.passes.contact_pass import ContactPass
+        from viewer.rendering.passes.shadow_passes import ContactPass
 
         self._made.append(made := ContactPass(self.context, self.programs))
         return made
 
     @cached_property
     def _ground_pass(self) -> GroundShadowPass:
-        from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
+        from viewer.rendering.passes.shadow_passes import GroundShadowPass
 
         self._made.append(made := GroundShadowPass(self.context, self.programs))
         return made
@@ -133,7 +136,7 @@ class Lighting:
         return replace(view, effects=Effects(shadow, occlusion))
 
     def _shadow_pass(self, size: tuple[int, int]) -> ShadowPass:
-        from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
+        from viewer.rendering.passes.shadow_passes import ShadowPass, map_side
 
         side = map_side(size)
         if self._shadow is None or self._shadow.side != side:

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
-from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.joint_marks import joint_at, marks_of
-from viewer.rendering.passes.instance_pass import draw_instance_shapes
+from viewer.rendering.passes.instance_pass import InstanceBuffers, draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_boxes, draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass

@@ -11,28 +11,25 @@ import moderngl
 from viewer.rendering.camera import Camera
 from viewer.rendering.camera_views import draw_image_behind, draw_image_planes, frusta_of, reach_of
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
-from viewer.rendering.gpu.draw_state import without_depth_writes
+from viewer.rendering.gpu.draw_state import draw_nearest, without_depth_writes
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.outlined import Outlined
-from viewer.rendering.overlays import Overlays, draw_overlays
 from viewer.rendering.passes.background_pass import BackgroundPass, is_light
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.late_passes import LatePasses
-from viewer.rendering.passes.mesh_pass import MeshPass
-from viewer.rendering.passes.see_through import draw_layer
+from viewer.rendering.passes.mesh_pass import MeshPass, draw_layer
 from viewer.rendering.sampling import jittered, n_passes, sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
-from viewer.rendering.translucent import draw_translucent
 from viewer.rendering.view import View, view_of
 from viewer.rendering.visibility import (
     Meshes,
     far_first,
+    has_joint_marks,
     has_markers,
     has_points,
     placement_of,
@@ -50,9 +47,8 @@ if TYPE_CHECKING:
     from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.overlay.marks import Marks
     from viewer.rendering.passes.ghost_pass import Ghost
+    from viewer.rendering.passes.outline_pass import Outlined
     from viewer.rendering.picking import Pick
-
-__all__ = ["Renderer"]
 
 
 class Renderer:
@@ -166,15 +162,10 @@ class Renderer:
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
-        over = Overlays(
-            self.marks,
-            self.ghost,
-            (*frusta_of(scene, camera.fixed, options, box, target.size), *self.annotations),
-        )
-        self.names_left_out = draw_overlays(
-            self.late, over, scene, view, options, target.size, selected
-        )
+        self._draw_overlays(scene, view, options, target.size, box, selected)
         if options.outline:
+            from viewer.rendering.passes.outline_pass import Outlined
+
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size, is_light(options.background))
@@ -208,7 +199,7 @@ class Renderer:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
-        draw_translucent(self.mesh_pass, meshes, view, options)
+        self._draw_translucent(meshes, view, options)
         self._draw_blended(meshes, view, options)
         for actor in scene.actors:
             if not has_points(actor, options):
@@ -223,6 +214,42 @@ class Renderer:
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
+
+    def _draw_overlays(
+        self,
+        scene: Scene,
+        view: View,
+        options: DisplayOptions,
+        size: tuple[int, int],
+        box: Floats,
+        selected: tuple[int, int],
+    ) -> None:
+        """Draw everything that lies over the scene: joint marks, ghost, marks, annotations.
+
+        All labels are drawn last, on top.
+        """
+        marked: list[Annotation] = []
+        if has_joint_marks(options):
+            from viewer.rendering.overlay.joint_annotation import joint_annotation
+
+            joints = joint_annotation(scene.actors, options, size, selected)
+            if joints is not None:
+                self.late.annotation_pass.draw(joints, view, size)
+                marked.append(joints)
+        if self.ghost is not None:
+            self.late.ghost_pass.draw(self.ghost, view, options)
+        over = frusta_of(scene, view.camera.fixed, options, box, size)
+        if self.marks is not None:
+            from viewer.rendering.overlay.marks import mark_annotation
+
+            over.insert(0, mark_annotation(self.marks))
+        over += self.annotations
+        for annotation in over:
+            self.late.annotation_pass.draw(annotation, view, size)
+        self.names_left_out = 0, 0
+        if marked or over:
+            left_out = self.late.annotation_pass.write([*marked, *over], view, size)
+            self.names_left_out = left_out[0] if marked else (0, 0)
 
     def _accumulate(self, target: Target, is_first: bool) -> None:
         """Add the pass in a target, and replace it by the average of all passes so far."""
@@ -331,6 +358,30 @@ class Renderer:
         if any(mesh.is_blended for mesh in drawn):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
+
+    def _draw_translucent(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        """Draw translucent actors over everything opaque, as a single layer.
+
+        Where they overlap, only the nearest surface is visible, so the poses of a motion stay
+        legible.
+        """
+        drawn = [
+            (actor, mesh, opacity)
+            for actor, mesh in meshes.singles
+            if 0.0 < (opacity := options.opacity * actor.opacity) < 1.0
+        ]
+        if not drawn:
+            return
+
+        def draw() -> None:
+            for actor, mesh, opacity in drawn:
+                place = placement_of(actor, options)
+                for blended in (False, True)[: 1 + mesh.mesh.is_blended]:
+                    self.mesh_pass.draw(mesh, place, view, options, actor.color, blended, opacity)
+
+        draw_nearest(self.context, draw)
+        for actor, mesh, opacity in drawn:
+            self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options, opacity)
 
     def _draw_layer(
         self, meshes: Meshes, view: View, options: DisplayOptions, blended: bool

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +11,13 @@ from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.instance_pass import instance_groups
+from viewer.rendering.passes.instance_pass import InstanceBuffers, instance_groups
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped_skeleton
-
-if TYPE_CHECKING:
-    from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 
 
 @dataclass(frozen=True, slots=True)

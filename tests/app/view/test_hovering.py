@@ -8,7 +8,7 @@ import pytest
 from viewer.app.posing.gizmo import joint_places
 from viewer.app.view.hovering import Hovered
 from viewer.app.view.outlines import outlined_parts
-from viewer.rendering.outlined import Outlined
+from viewer.rendering.passes.outline_pass import Outlined
 
 
 @pytest.fixture

@@ -12,15 +12,13 @@ import viewer
 from viewer.errors import RenderError
 from viewer.loading import bundled_body
 from viewer.rendering.camera import Camera
-from viewer.rendering.gpu import instance_buffers
-from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.rest_buffers import WAYS
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rendering.passes.instance_pass import FEWEST, instance_groups
+from viewer.rendering.passes.instance_pass import FEWEST, InstanceBuffers, instance_groups
 from viewer.rendering.view import View
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
@@ -288,7 +286,7 @@ def test_refused_upload_is_tried_again(ctx, monkeypatch):
         raise RenderError("no room")
 
     with monkeypatch.context() as patch, pytest.raises(RenderError):
-        patch.setattr(instance_buffers, "write_stacked", refuse)
+        patch.setattr(instance_pass, "write_stacked", refuse)
         instances.instances.update(poses, Skinning())
     check(instances, actors, Skinning())
     instances.release()

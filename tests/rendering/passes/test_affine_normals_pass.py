@@ -9,11 +9,11 @@ from rendering.drawn_figures import random_pose, skeleton, sphere
 
 import viewer
 from viewer.rendering.camera import Camera
-from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
 from viewer.rendering.view import View
 from viewer.rig.figure import Figure

@@ -11,11 +11,11 @@ from formats.smpl.quaternion_files import star, supr
 import viewer
 from viewer.formats import Source, read
 from viewer.rendering.gpu import rest_buffers
-from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.rest_buffers import WAYS
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import Skinning
@@ -60,7 +60,7 @@ def test_gpu_matches_the_reference(ctx, figures, name, way):
 
 
 def test_weights_of_instances_are_those_of_each_pose(figures):
-    from viewer.rendering.gpu.instance_buffers import _pose_weights
+    from viewer.rendering.passes.instance_pass import _pose_weights
     from viewer.rig.shape import pose_weights
 
     figure = figures["star"]

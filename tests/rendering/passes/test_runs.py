@@ -14,8 +14,8 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.target import Target, picture_rows
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.outlined import Outlined
 from viewer.rendering.passes import instance_pass
+from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.pose import rest_pose

@@ -6,7 +6,7 @@ from viewer.app.core.state import AppState
 from viewer.app.view.hovering import Hovered
 from viewer.app.weights.state import Weights
 from viewer.data_classes import dataclass
-from viewer.rendering.outlined import Outlined
+from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rendering.visibility import shows_skeleton
 from viewer.rig.geometry.transform import apply_transform
 

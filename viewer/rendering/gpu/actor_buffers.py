@@ -12,12 +12,12 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.passes.instance_pass import InstanceBuffers
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
-    from viewer.rendering.gpu.instance_buffers import InstanceBuffers
     from viewer.rendering.passes.keypoint_pass import KeypointBuffers
     from viewer.rendering.passes.motion_path_pass import MotionPathBuffers
     from viewer.rendering.passes.point_pass import PointBuffers
@@ -116,8 +116,6 @@ class ActorBuffers:
 
     def instanced(self, figure: Figure, count: int) -> list[InstanceBuffers]:
         """Return ``count`` instance buffers of a figure, in a stable order."""
-        from viewer.rendering.gpu.instance_buffers import InstanceBuffers
-
         kept = self._instanced.get(figure, _InstancedShapes).items
         while len(kept) > count:
             kept.pop().release()

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import moderngl
 
-__all__ = [
-    "behind",
-    "clipped",
-    "opacities",
-    "sides",
-    "without_colors",
-    "without_depth_test",
-    "without_depth_writes",
-]
+_FARTHER = 2.0, 8.0  # factor of the slope and units of the polygon offset
 
 
 @contextmanager
@@ -29,9 +21,6 @@ def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
     finally:
         target.depth_mask = True
         target.use()
-
-
-_FARTHER = 2.0, 8.0  # factor of the slope and units of the polygon offset
 
 
 @contextmanager
@@ -123,4 +112,13 @@ def opacities(context: moderngl.Context, hidden: float | None) -> Iterator[float
     for order, opacity in (("1", 1.0),) if hidden is None else ((">", hidden), ("<=", 1.0)):
         context.depth_func = order
         yield opacity
+    context.depth_func = "<"
+
+
+def draw_nearest(context: moderngl.Context, draw: Callable[[], object]) -> None:
+    """Draw the nearest layer of a translucent object: first its depth, then its colours."""
+    with without_colors(context):
+        draw()
+    context.depth_func = "<="
+    draw()
     context.depth_func = "<"

@@ -18,7 +18,7 @@ from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers, SkinBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.rest_buffers import RestBuffers
+from viewer.rendering.gpu.rest_buffers import SKINNING_SAMPLERS, RestBuffers
 from viewer.rendering.gpu.surfaces import Surface
 from viewer.rendering.gpu.upload import (
     checked,
@@ -38,7 +38,6 @@ from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
 
 _BYTES_PER_VERTEX = 24  # a position and a normal, of three float32 each
-_PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
 
 
 class PosedMesh:
@@ -170,18 +169,14 @@ class PosedMesh:
             "u_blend_factor": -1.0 if how.blend_factor is None else how.blend_factor,
             "u_n_offsets": self._rest.n_offsets if attached else 0,
             "u_n_sources": len(self.mesh.copies),
-            "u_palette": _PALETTE_UNIT,
-            "u_pairs": _PAIRS_UNIT,
-            "u_rigid": _RIGID_UNIT,
-            "u_offset_list": _LIST_UNIT,
-            "u_offsets": _OFFSETS_UNIT,
+            **SKINNING_SAMPLERS,
         }
         set_uniforms(program, values)
-        self._palette.use(_PALETTE_UNIT)
-        skin.pairs.use(_PAIRS_UNIT)
+        self._palette.use(SKINNING_SAMPLERS["u_palette"])
+        skin.pairs.use(SKINNING_SAMPLERS["u_pairs"])
         if self._rigid is not None:
-            self._rigid.use(_RIGID_UNIT)
-        self._rest.use(_LIST_UNIT, _OFFSETS_UNIT)
+            self._rigid.use(SKINNING_SAMPLERS["u_rigid"])
+        self._rest.use()
         array.transform(self.posed, mode=moderngl.POINTS, vertices=self.mesh.n_vertices)
 
     def is_mirrored_by(self, placement: Floats) -> bool:

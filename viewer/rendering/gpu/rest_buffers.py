@@ -28,6 +28,15 @@ from viewer.rig.pose import Pose
 from viewer.rig.shape import pose_weights
 from viewer.rig.skinning import Skinning
 
+SKINNING_SAMPLERS = {
+    "u_palette": 0,
+    "u_pairs": 1,
+    "u_rigid": 2,
+    "u_offset_list": 3,
+    "u_offsets": 4,
+}
+"""Texture unit of each sampler of ``include/skinning.glsl``."""
+
 WAYS = ("texture", "product")
 """Methods of summing pose correctives."""
 
@@ -144,11 +153,11 @@ class RestBuffers:
         ]
         return [row for row in found if row[2] in program]
 
-    def use(self, list_unit: int, offsets_unit: int) -> None:
+    def use(self) -> None:
         """Bind the textures for summing correctives in the shader, if used."""
         if self.n_offsets and self._list is not None:
-            self._list.use(list_unit)
-            self.mesh.offsets.use(offsets_unit)
+            self._list.use(SKINNING_SAMPLERS["u_offset_list"])
+            self.mesh.offsets.use(SKINNING_SAMPLERS["u_offsets"])
 
     def release(self) -> None:
         """Free the buffers of this actor."""
@@ -245,13 +254,13 @@ class SummedOffsets:
         write_stacked(self._summed, self._sums[:count])
         self.has_sums = True
 
-    def use(self, list_unit: int, offsets_unit: int) -> None:
+    def use(self) -> None:
         """Bind the textures for summing in the shader, if used."""
         if self.n_listed and self._list is not None:
-            self._list.use(list_unit)
-            self.mesh.offsets.use(offsets_unit)
+            self._list.use(SKINNING_SAMPLERS["u_offset_list"])
+            self.mesh.offsets.use(SKINNING_SAMPLERS["u_offsets"])
         if self.has_sums and self._summed is not None:
-            self._summed.use(offsets_unit)
+            self._summed.use(SKINNING_SAMPLERS["u_offsets"])
 
     def release(self) -> None:
         """Free the textures."""

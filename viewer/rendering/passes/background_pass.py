@@ -1,18 +1,23 @@
-"""Background of an image: a colour, or a gradient that is drawn once per image size and copied."""
+"""Background of an image: a colour, a gradient, or the studio out of focus.
+
+The gradient is drawn once per image size and copied.
+"""
 
 from __future__ import annotations
+
+import math
 
 import moderngl
 
 from viewer.errors import ViewerError
-from viewer.rendering.gpu.draw_state import without_colors
+from viewer.rendering.gpu.draw_state import without_colors, without_depth_test
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.studio import STUDIO_SAMPLERS, Studio
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.gpu.upload import checked
-from viewer.rendering.options import BACKGROUNDS
-
-__all__ = ["BackgroundPass", "is_light", "parse_color"]
+from viewer.rendering.options import BACKGROUNDS, Lights
+from viewer.rendering.view import View, set_lights
 
 _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
 _CLEARED = {
@@ -22,39 +27,8 @@ _CLEARED = {
 }
 # Maximum size of a stored gradient; larger ones are drawn each time, to save memory.
 _MOST_PIXELS = 1 << 23
-
-
-def parse_color(text: str) -> tuple[float, float, float]:
-    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
-
-    Raises
-    ------
-    ViewerError
-        If the text does not have this form.
-
-    >>> parse_color("#ff0000")
-    (1.0, 0.0, 0.0)
-    """
-    digits = text.removeprefix("#")
-    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
-        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
-        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
-    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
-    return red, green, blue
-
-
-def is_light(background: str) -> bool:
-    """Return whether dark text is easier to read on a background: white, or a light colour.
-
-    The gradient is dark at the top, where legends are, and what is behind the others is unknown.
-
-    >>> is_light("white"), is_light("#e9ebee"), is_light("#303840"), is_light("gradient")
-    (True, True, False, False)
-    """
-    if background in BACKGROUNDS:
-        return background == "white"
-    red, green, blue = parse_color(background)
-    return 0.299 * red + 0.587 * green + 0.114 * blue > 0.5  # perceived brightness, Rec. 601
+# Field of view for parallel projections, whose rays would all show the same point, degrees.
+_PARALLEL_FOV = 35.0
 
 
 class BackgroundPass:
@@ -154,3 +128,74 @@ class _Picture:
     def release(self) -> None:
         """Free everything."""
         self._owner.release()
+
+
+class BackdropPass:
+    """Pass that draws the studio.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the shader programs.
+    studio : Studio
+        The environment to show.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs, studio: Studio) -> None:
+        self.context, self.studio = context, studio
+        self._program = programs.drawing("backdrop")
+        self._array = context.vertex_array(self._program, [])
+
+    def draw(self, view: View, lights: Lights) -> None:
+        """Fill the image."""
+        self.studio.use()
+        projection = view.projection
+        scale = 1.0 / projection[0, 0], 1.0 / projection[1, 1]
+        shift = projection[0, 2] * scale[0], projection[1, 2] * scale[1]
+        if view.camera.is_parallel:
+            height = math.tan(math.radians(0.5 * _PARALLEL_FOV))
+            scale, shift = (height * scale[0] / scale[1], height), (0.0, 0.0)
+        set_lights(self._program, view, lights)
+        set_uniforms(self._program, {"u_ray_scale": scale, "u_ray_shift": shift})
+        set_uniforms(self._program, STUDIO_SAMPLERS)
+        with without_depth_test(self.context):
+            self._array.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free the vertex array."""
+        self._array.release()
+
+
+def parse_color(text: str) -> tuple[float, float, float]:
+    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
+
+    Raises
+    ------
+    ViewerError
+        If the text does not have this form.
+
+    >>> parse_color("#ff0000")
+    (1.0, 0.0, 0.0)
+    """
+    digits = text.removeprefix("#")
+    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
+        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
+        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
+    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
+    return red, green, blue
+
+
+def is_light(background: str) -> bool:
+    """Return whether dark text is easier to read on a background: white, or a light colour.
+
+    The gradient is dark at the top, where legends are, and what is behind the others is unknown.
+
+    >>> is_light("white"), is_light("#e9ebee"), is_light("#303840"), is_light("gradient")
+    (True, True, False, False)
+    """
+    if background in BACKGROUNDS:
+        return background == "white"
+    red, green, blue = parse_color(background)
+    return 0.299 * red + 0.587 * green + 0.114 * blue > 0.5  # perceived brightness, Rec. 601

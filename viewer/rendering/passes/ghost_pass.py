@@ -13,8 +13,7 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.mesh_pass import MeshPass
-from viewer.rendering.passes.see_through import draw_layer
+from viewer.rendering.passes.mesh_pass import MeshPass, draw_layer
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

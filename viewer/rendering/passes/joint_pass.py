@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.draw_state import draw_nearest
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import Color, DisplayOptions, bone_style, skeleton_opacity
-from viewer.rendering.passes.see_through import draw_nearest
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

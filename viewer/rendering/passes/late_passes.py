@@ -10,8 +10,10 @@ import moderngl
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.studio import Matcaps, Studio
 from viewer.rendering.gpu.target import Accumulation
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.background_pass import BackdropPass
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.mesh_pass import MeshPass, shading_of
 from viewer.rendering.view import View
@@ -19,9 +21,7 @@ from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.mesh_buffers import MeshBuffers
-    from viewer.rendering.gpu.studio import Matcaps, Studio
     from viewer.rendering.passes.annotation_pass import AnnotationPass
-    from viewer.rendering.passes.backdrop_pass import BackdropPass
     from viewer.rendering.passes.camera_image_pass import CameraImagePass
     from viewer.rendering.passes.ghost_pass import GhostPass
     from viewer.rendering.passes.keypoint_pass import KeypointPass
@@ -147,8 +147,6 @@ class LatePasses:
     @cached_property
     def studio(self) -> Studio:
         """Light of metallic-roughness surfaces."""
-        from viewer.rendering.gpu.studio import Studio
-
         studio = Studio(self._context)
         self._made.append(studio)
         return studio
@@ -156,8 +154,6 @@ class LatePasses:
     @cached_property
     def matcaps(self) -> Matcaps:
         """Images of lit spheres."""
-        from viewer.rendering.gpu.studio import Matcaps
-
         matcaps = Matcaps(self._context)
         self._made.append(matcaps)
         return matcaps
@@ -165,8 +161,6 @@ class LatePasses:
     @cached_property
     def backdrop_pass(self) -> BackdropPass:
         """Pass that draws the studio behind the scene."""
-        from viewer.rendering.passes.backdrop_pass import BackdropPass
-
         backdrop = BackdropPass(self._context, self._programs, self.studio)
         self._made.append(backdrop)
         return backdrop

@@ -1,49 +1,41 @@
-"""Pass that draws posed meshes: surface, edges and vertex normals, without skinning them."""
+"""Pass that draws posed meshes: surface, outlines, edges and vertex normals, without skinning."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import moderngl
+import numpy as np
 
 from viewer.rendering.gpu.back_faces import Region
+from viewer.rendering.gpu.draw_state import draw_nearest
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
-from viewer.rendering.gpu.surfaces import SAMPLERS
+from viewer.rendering.gpu.surfaces import SAMPLERS, Surface
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.hull_pass import draw_hulls, outlined_runs
-from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
-from viewer.rendering.passes.see_through import surface_opacity
+from viewer.rendering.passes.runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
+from viewer.rig.material import TEXTURES
+from viewer.rig.materials.toon import Outline
 from viewer.rig.mesh import bounding_box, box_size
-
-if TYPE_CHECKING:
-    from viewer.rendering.passes.blended_order import SortedTriangles
-
-__all__ = [
-    "SKIN_COLOR",
-    "MeshPass",
-    "fragment_macros",
-    "has_tints",
-    "set_surface",
-    "shading_of",
-    "uses_materials",
-]
+from viewer.rig.units import METRES
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""
 
+_XRAY_OPACITY = 0.4
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # length of drawn normals, relative to the figure's size
 _COLORMAP_UNIT = 6
+_WIDTH_SLOT = TEXTURES.index("occlusion_texture")  # texture of an outline's width
 
 
 class MeshPass:
@@ -95,7 +87,7 @@ class MeshPass:
             "mesh",
             "scalar" if look is not None else shading_of(mesh.mesh, options),
             geometry=corners,
-            materials=uses_materials(mesh, options),
+            materials=_uses_materials(mesh, options),
             effects=fragment_macros(mesh.mesh, view, options),
         )
         set_model(program, view, placement, mesh.center)
@@ -131,10 +123,17 @@ class MeshPass:
         blended: bool,
         look: Mapping[str, object],
     ) -> None:
-        """Draw the outlines of toon materials; ``look``: uniforms of the whole mesh."""
+        """Draw the outlines of toon materials: back faces of a surface moved along its normals.
+
+        ``look``: uniforms of the whole mesh.
+        """
         indices = mesh.index_set(options)
-        runs = outlined_runs(indices.runs, blended)
-        is_shown = uses_materials(mesh, options) and shading_of(mesh.mesh, options) == "pbr"
+        runs = [
+            (run, run.surface.outline)
+            for run in indices.runs
+            if run.surface.outline is not None and run.surface.is_blended == blended
+        ]
+        is_shown = _uses_materials(mesh, options) and shading_of(mesh.mesh, options) == "pbr"
         if not runs or not is_shown:
             return
         effects = (*fragment_macros(mesh.mesh, view, options), "HULL")
@@ -145,9 +144,19 @@ class MeshPass:
         set_lights(program, view, options.lights)
         set_surface(program, mesh.mesh, options)
         set_uniforms(program, look)
-        unit, is_mirrored = mesh.mesh.figure.unit, mesh.is_mirrored_by(placement)
-        array = self.array(mesh, program, indices)
-        draw_hulls(array, runs, placement, unit, options, is_mirrored)
+        array, context = self.array(mesh, program, indices), self.context
+        # Camera units per metre.
+        scale = float(np.cbrt(abs(np.linalg.det(placement[:3, :3]))))
+        scale /= METRES.get(mesh.mesh.figure.unit, 1.0)
+        context.enable(moderngl.CULL_FACE)
+        context.cull_face = "front"
+        context.front_face = "cw" if mesh.is_mirrored_by(placement) else "ccw"
+        for run, outline in runs:
+            run.surface.use(program, options.texture)
+            set_uniforms(program, _hull_uniforms(run.surface, outline, scale, options.texture))
+            array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first)
+        context.front_face, context.cull_face = "ccw", "back"
+        context.disable(moderngl.CULL_FACE)
 
     def _back_faces(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
@@ -170,8 +179,6 @@ class MeshPass:
         indices = mesh.index_set(options)
         if not (blended and indices.is_blended):
             return indices
-        from viewer.rendering.passes.blended_order import SortedTriangles
-
         found = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
         found.sort(mesh, indices, (view.matrix @ placement)[2, :3])
         return found
@@ -186,7 +193,7 @@ class MeshPass:
         prepare: Prepare,
     ) -> None:
         """Draw the surface with a fragment shader that shows no colours, see ``draw_shapes``."""
-        materials = uses_materials(mesh, options)
+        materials = _uses_materials(mesh, options)
         program = self.programs.drawing("mesh", fragment=fragment, materials=materials)
         set_model(program, view, placement, mesh.center)
         set_uniforms(program, {"u_has_tint": has_tints(mesh.mesh, options)})
@@ -294,13 +301,41 @@ def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
     return "pbr" if mesh.is_physical else "phong"
 
 
+def surface_opacity(options: DisplayOptions) -> float:
+    """Return the opacity of surfaces, 0 to 1.
+
+    Colours of scalar quantities must match the legend, so these surfaces stay opaque.
+    """
+    return _XRAY_OPACITY if options.xray and options.shading != "scalar" else 1.0
+
+
+def draw_layer(
+    context: moderngl.Context, options: DisplayOptions, draw: Callable[[], object]
+) -> None:
+    """Draw surfaces; only the nearest layer if they are translucent.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    options : DisplayOptions
+        Display options that determine the opacity of surfaces.
+    draw : callable
+        Draws the surfaces; called twice if they are translucent.
+    """
+    if surface_opacity(options) == 1.0:
+        draw()
+    else:
+        draw_nearest(context, draw)
+
+
 def fragment_macros(mesh: MeshBuffers, view: View, options: DisplayOptions) -> tuple[str, ...]:
     """Return the macros of the fragment shader that draws a mesh."""
     is_textured = mesh.has_materials or (options.texture and mesh.is_textured)
     return view.effects.defines if is_textured else (*view.effects.defines, "UNTEXTURED")
 
 
-def uses_materials(mesh: PosedMesh, options: DisplayOptions) -> bool:
+def _uses_materials(mesh: PosedMesh, options: DisplayOptions) -> bool:
     """Return whether a mesh is drawn with its materials, which scalar quantities replace."""
     has_values = options.shading == "scalar" and mesh.scalars.look is not None
     return mesh.mesh.has_materials and not has_values
@@ -329,3 +364,23 @@ def _premultiplied(color: tuple[float, float, float, float], opacity: float) -> 
     alpha = opacity * color[3]
     red, green, blue = (alpha * channel for channel in color[:3])
     return red, green, blue, alpha
+
+
+def _hull_uniforms(
+    surface: Surface, outline: Outline, scale: float, textured: bool
+) -> dict[str, Any]:
+    """Return the uniforms of an outline; ``scale``: camera units per metre."""
+    values, unit = surface.uniforms, SAMPLERS["u_occlusion_map"]
+    has_map = textured and any(used == unit for used, _ in surface.textures)
+    places = np.frombuffer(values["u_places"], "f4").reshape(-1, 9)
+    on_screen = outline.mode == "screen"
+    return {
+        "u_outline_color": outline.color,
+        "u_outline_mix": outline.mix,
+        "u_hull_width": outline.width * (1.0 if on_screen else scale),
+        "u_hull_on_screen": on_screen,
+        "u_has_width_map": has_map,
+        "u_width_map": unit,
+        "u_width_place": places[_WIDTH_SLOT].tobytes(),
+        "u_width_set": int(np.frombuffer(values["u_uv_sets"], "i4")[_WIDTH_SLOT]),
+    }

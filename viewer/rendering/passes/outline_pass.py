@@ -1,8 +1,12 @@
-"""Pass that draws outlines around actors, joints and points: a mask, its distances, a line."""
+"""Outlines around selected and hovered actors, joints and points.
+
+The pass draws a mask of the outlined parts, then the distances from it, then a line.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 from typing import Any
 
 import moderngl
@@ -15,7 +19,6 @@ from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlay.segments import SegmentPass, SegmentStyle, dots
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
@@ -23,17 +26,43 @@ from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.projection import picture_scale
 from viewer.rendering.view import View
 from viewer.rendering.visibility import has_points, placement_of, shows_mesh, shows_skeleton
+from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
-
-__all__ = ["OutlinePass", "OutlineTools"]
 
 _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
 """Outline colours of selected and hovered parts, sRGB."""
+
 _WIDTH = 2.0  # line width, pixels in an image of standard height
 _POINT = 9.0  # diameter of a point, pixels in an image of standard height
 # Side length of the tiles of tile.vert, pixels; mipmap level with texels of that size.
 _TILE, _LEVEL = 16, 4
 _MOST = 12  # maximum search radius around a mask, pixels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlined:
+    """An outlined part of the scene.
+
+    Attributes
+    ----------
+    actor : int
+        Index in the scene.
+    joint : int
+        Joint of the actor, outlined if the skeleton is drawn; -1 for the whole actor.
+    points : (N, 3)
+        Points in scene space, outlined instead of the actor and joint if there are any.
+    is_hovered : bool
+        Whether it lies under the pointer, rather than being selected.
+    """
+
+    actor: int
+    joint: int = -1
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    is_hovered: bool = False
+
+    def key(self) -> tuple[object, ...]:
+        """Return a key that identifies the outline in an unchanged scene."""
+        return self.actor, self.joint, self.points.tobytes(), self.is_hovered
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,367 @@
+"""Shadows: the key light's shadow map, soft contact shadows, and both on the ground.
+
+Contact shadows need no light source: they represent the ambient light that figures block from the
+ground below them, as a blurred field of the heights of figures above the ground.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import moderngl
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.rendering.camera import Camera
+from viewer.rendering.gpu.draw_state import behind, without_depth_writes
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.view import FILTER_RADIUS, SHADOW_UNIT, Shadow, View, set_model
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.geometry.vectors import unit
+
+# The key light's shadow map.
+_SIDES = 256, 2048  # minimum and maximum number of texels on each side of a shadow map
+_MARGIN = FILTER_RADIUS + 2.0  # width of the margin without shadow around all casters, texels
+_STEP = 2.0**0.25  # step factor of the map's extent: its resolution is constant while figures move
+_TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1.0]])
+
+# Contact shadows.
+_FIELD_SIZE = 256  # texels on each side of the field
+_NEAR, _FAR = 0.04, 0.35  # upper ends of contact and ambient shadow, figure sizes
+_BELOW = 0.05  # maximum depth to which feet sink into the ground, figure sizes
+_NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, figure sizes
+
+# On the ground.
+_SHADOW_OPACITY = 0.42  # opacity of the key light's shadow
+_CONTACT_OPACITIES = 0.55, 0.38
+# Sine of the light's elevation at which its shadow appears and has full strength.
+_GRAZING = 0.06, 0.22
+_FIELD_UNIT = 0
+
+
+class ShadowPass:
+    """Pass that draws depths as seen from a light.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    side : int
+        Texels on each side of the map.
+    """
+
+    def __init__(self, context: moderngl.Context, side: int) -> None:
+        self.context, self.side = context, side
+        self._owner = Owner()
+        with self._owner.guard():
+            self._texture = self._owner.keep(context.depth_texture((side, side)))
+            self._texture.compare_func = "<="
+            self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            self._texture.repeat_x = self._texture.repeat_y = False
+            self._framebuffer = self._owner.keep(context.framebuffer((), self._texture))
+
+    def draw(
+        self,
+        draw: Callable[[View, str], object],
+        spheres: Floats,
+        direction: Floats,
+        strength: float,
+    ) -> Shadow:
+        """Draw a shadow map.
+
+        Parameters
+        ----------
+        draw : callable
+            Draws the shadow casters, with a view and a fragment shader.
+        spheres : (N, 4)
+            Bounds of the casters: centres and radii, scene space; at least one.
+        direction : (3,)
+            Unit vector towards the light, scene space.
+        strength : float
+            0 to 1: fraction of the light that a shadow removes.
+        """
+        view, extent = light_view(spheres, direction, self.side)
+        _draw_depths(self._framebuffer, draw, view)
+        matrix = _TO_TEXTURE @ view.projection @ view.matrix
+        return Shadow(self._texture, matrix, 2.0 * extent / self.side, strength)
+
+    def release(self) -> None:
+        """Free the map."""
+        self._owner.release()
+
+
+class ContactPass:
+    """Pass that draws heights as seen from below the ground, and blurs them.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._owner = Owner()
+        keep, size = self._owner.keep, (_FIELD_SIZE, _FIELD_SIZE)
+        with self._owner.guard():
+            self._depth = keep(context.depth_texture(size))
+            self._depth.compare_func = ""
+            self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._framebuffer = keep(context.framebuffer((), self._depth))
+            self._fields = [keep(context.texture(size, 2, dtype="f2")) for _ in range(2)]
+            for field in self._fields:
+                field.repeat_x = field.repeat_y = False
+            self._targets = [keep(context.framebuffer([field])) for field in self._fields]
+            program = programs.drawing("fullscreen", fragment="contact_blur")
+            self._array = keep(context.vertex_array(program, []))
+
+    def draw(
+        self,
+        draw: Callable[[View, str], object],
+        spheres: Floats,
+        size: float,
+        axes: Floats,
+        height: float,
+    ) -> Contact | None:
+        """Draw and return the contact shadows of figures; None if all are far above the ground.
+
+        Parameters
+        ----------
+        draw : callable
+            Draws the figures, with a view and a fragment shader.
+        spheres : (N, 4)
+            Bounds of the figures: centres and radii, scene space.
+        size : float
+            Size of a figure in scene units, which determines the softness.
+        axes : (3, 3)
+            The ground's two axes and the up axis as rows.
+        height : float
+            Height of the ground, scene units.
+        """
+        centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
+        near = (centers - radii)[:, 2] < height + _FAR * size
+        if not near.any():
+            return None
+        margin = 3.0 * _WIDE * size
+        low = (centers - radii)[near, :2].min(axis=0) - margin
+        high = (centers + radii)[near, :2].max(axis=0) + margin
+        # Seen from below, the first axis points right and the second one down.
+        below = np.stack([axes[0], -axes[1], -axes[2]])
+        bottom, top = height - _BELOW * size, height + _FAR * size
+        middle = np.array([0.5 * (low + high)[0], -0.5 * (low + high)[1], -0.5 * (bottom + top)])
+        halves = np.array([*(0.5 * (high - low)), 0.5 * (top - bottom)])
+        _draw_depths(self._framebuffer, draw, _parallel_view(below, middle, halves))
+        self._blur(size / (high - low))
+        return Contact(self._fields[1], low, high)
+
+    def _blur(self, scale: Floats) -> None:
+        """Convert depths to darkness and blur it; ``scale`` is a figure's size in the field."""
+        self.context.enable_only(moderngl.NOTHING)
+        values = {
+            "u_field": 0,
+            "u_bottom": -_BELOW,
+            "u_top": _FAR,
+            "u_near": _NEAR,
+        }
+        set_uniforms(self._array.program, values)
+        sources = self._depth, self._fields[0]
+        for axis, (source, target) in enumerate(zip(sources, self._targets, strict=True)):
+            target.use()
+            source.use(0)
+            step = np.eye(2)[axis] * scale[axis]
+            deviations = {
+                "u_is_depth": axis == 0,
+                "u_narrow": tuple(step * max(_NARROW, 0.7 / (_FIELD_SIZE * scale[axis]))),
+                "u_wide": tuple(step * _WIDE),
+            }
+            set_uniforms(self._array.program, deviations)
+            self._array.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free textures and framebuffers."""
+        self._owner.release()
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A field of contact shadows.
+
+    Attributes
+    ----------
+    texture : moderngl.Texture
+        Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1.
+    low, high : (2,)
+        Opposite corners of the field, along the ground's axes.
+    """
+
+    texture: moderngl.Texture
+    low: Floats
+    high: Floats
+
+
+class GroundShadowPass:
+    """Pass that draws black patches on the ground, whose opacity represents the shadow.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._corners = buffer(context, [[0, 0], [1, 0], [0, 1], [1, 1]], "f4")
+        self._arrays = VertexArrays(context)
+
+    def draw_shadow(self, shadow: Shadow, view: View, up: Floats, height: float) -> None:
+        """Draw the key light's shadow.
+
+        Parameters
+        ----------
+        shadow : Shadow
+            The shadow map.
+        view : View
+            The camera's matrices.
+        up : (3,)
+            The up axis.
+        height : float
+            Height of the ground along that axis.
+        """
+        back = np.linalg.inv(shadow.matrix)
+        away = back[:3, 2]
+        slope = -(up @ away) / np.linalg.norm(away)
+        fade = float(np.clip((slope - _GRAZING[0]) / (_GRAZING[1] - _GRAZING[0]), 0.0, 1.0))
+        if fade == 0.0:
+            return
+        # Rays through the corners of the map meet the ground at these depths.
+        corners = np.array([[0.0, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]]) @ back.T
+        depths = (height - corners[:, :3] @ up) / (up @ away)
+        places = corners[:, :3] + depths[:, None] * away
+        program = self.programs.drawing("patch", fragment="ground_shadow")
+        growth = depths[1:] - depths[0]
+        values = {
+            "u_shadow_map": SHADOW_UNIT,
+            "u_shadow_filter": shadow.filter(is_ground=True),
+            "u_depth": (float(depths[0]), *growth.tolist()),
+            "u_opacity": _SHADOW_OPACITY * fade * shadow.strength,
+        }
+        set_uniforms(program, values)
+        shadow.texture.use(SHADOW_UNIT)
+        self._draw(program, view, places[0], places[1] - places[0], places[2] - places[0])
+
+    def draw_contact(
+        self, contact: Contact, view: View, axes: Floats, height: float, strength: float
+    ) -> None:
+        """Draw contact shadows; the rows of ``axes`` are the ground's two axes and the up axis."""
+        program = self.programs.drawing("patch", fragment="ground_contact")
+        opacities = tuple(strength * opacity for opacity in _CONTACT_OPACITIES)
+        set_uniforms(program, {"u_field": _FIELD_UNIT, "u_opacity": opacities})
+        contact.texture.use(_FIELD_UNIT)
+        # Seen from below, the second axis points down.
+        origin = axes.T @ np.array([contact.low[0], contact.high[1], height])
+        sides = contact.high - contact.low
+        self._draw(program, view, origin, sides[0] * axes[0], -sides[1] * axes[1])
+
+    def _draw(
+        self, program: moderngl.Program, view: View, origin: Floats, first: Floats, second: Floats
+    ) -> None:
+        """Draw the parallelogram given by a corner and two sides, scene space."""
+        placement = np.eye(4)
+        placement[:3, 0], placement[:3, 1] = first, second
+        # Only the direction matters: the product of two sides would exceed the range of float32.
+        placement[:3, 2] = np.cross(unit(first), unit(second))
+        placement[:3, 3] = origin
+        set_model(program, view, placement, np.zeros(3))
+        array = self._arrays.get(program, lambda: [(self._corners, "2f4", "in_corner")])
+        # Patches are translucent and must not hide anything, nor show through a flat mesh on the
+        # ground, which has the same depth.
+        with without_depth_writes(self.context), behind(self.context):
+            array.render(moderngl.TRIANGLE_STRIP)
+
+    def release(self) -> None:
+        """Free vertex arrays and corners."""
+        self._arrays.release()
+        self._corners.release()
+
+
+def _draw_depths(
+    framebuffer: moderngl.Framebuffer, draw: Callable[[View, str], object], view: View
+) -> None:
+    """Draw the depths of the shadow casters into a depth texture."""
+    context = framebuffer.ctx
+    framebuffer.use()
+    context.viewport = (0, 0, *framebuffer.size)
+    context.enable_only(moderngl.DEPTH_TEST)
+    context.depth_func = "<"
+    framebuffer.clear(depth=1.0)
+    draw(view, "depth")
+
+
+def map_side(size: tuple[int, int]) -> int:
+    """Return the side length of an image's shadow map in texels, at least four texels per pixel.
+
+    >>> map_side((1280, 720)), map_side((100, 75))
+    (2048, 512)
+    """
+    wanted = 1 << math.ceil(math.log2(4 * max(size)))
+    return min(max(wanted, _SIDES[0]), _SIDES[1])
+
+
+def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float]:
+    """Return the view of a directional light that contains the spheres, and its half extent.
+
+    Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
+    not crawl while figures move.
+
+    Parameters
+    ----------
+    spheres : (N, 4)
+        Centres and radii, scene space.
+    direction : (3,)
+        Unit vector towards the light.
+    side : int
+        Texels on each side of the map.
+    """
+    aside = np.eye(3)[np.argmin(np.abs(direction))]
+    right = np.cross(aside, direction)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(direction, right), direction])
+    centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
+    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
+    half = 0.5 * max(high[0] - low[0], high[1] - low[1])
+    # This leaves half a texel for snapping, and room for the filter.
+    half /= 1.0 - 2.0 * (_MARGIN + 1.0) / side
+    extent = _STEP ** np.ceil(np.log(max(half, 1e-30)) / np.log(_STEP))
+    texel = 2.0 * extent / side
+    middle = 0.5 * (low + high)
+    middle[:2] = np.round(middle[:2] / texel) * texel
+    deep = 0.5 * (high[2] - low[2]) * 1.01 + 1e-3 * extent
+    return _parallel_view(axes, middle, np.array([extent, extent, deep])), float(extent)
+
+
+def _parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
+    """Return a parallel view of a box.
+
+    Parameters
+    ----------
+    axes : (3, 3)
+        Right, up and backward as rows, scene space.
+    middle : (3,)
+        Centre of the box, along these axes.
+    halves : (3,)
+        Half the side lengths of the box.
+    """
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes
+    # OpenGL's depth grows away from the eye, against the backward axis.
+    projection = np.diag([1.0 / halves[0], 1.0 / halves[1], -1.0 / halves[2], 1.0])
+    return View(translation_matrix(-middle) @ matrix, projection, Camera(orthographic=True))
