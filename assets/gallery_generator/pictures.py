@@ -15,7 +15,7 @@ from viewer.lint import lint_scene, places_of
 from viewer.media.image import decode_picture
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.overlay.marks import Marks
+from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bytes
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points

@@ -12,7 +12,7 @@ from app.driver import make_state
 import viewer
 from viewer.app.picture_key import PictureKeys
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rendering.overlay.marks import Marks
+from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.motion.clip_edit import clip_from_pose
 from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.skinning import Skinning

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 from viewer.app.core.state import AppState
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.annotation import Annotation
-from viewer.rendering.overlay.marks import Marks
+from viewer.rendering.overlay.annotation import Annotation, Marks
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import pose_key

@@ -43,9 +43,8 @@ from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
-    from viewer.rendering.overlay.annotation import Annotation
+    from viewer.rendering.overlay.annotation import Annotation, Marks
     from viewer.rendering.overlay.legend import Legend
-    from viewer.rendering.overlay.marks import Marks
     from viewer.rendering.passes.ghost_pass import Ghost
     from viewer.rendering.passes.outline_pass import Outlined
     from viewer.rendering.picking import Pick
@@ -230,7 +229,7 @@ class Renderer:
         """
         marked: list[Annotation] = []
         if has_joint_marks(options):
-            from viewer.rendering.overlay.joint_annotation import joint_annotation
+            from viewer.rendering.overlay.joint_marks import joint_annotation
 
             joints = joint_annotation(scene.actors, options, size, selected)
             if joints is not None:
@@ -240,7 +239,7 @@ class Renderer:
             self.late.ghost_pass.draw(self.ghost, view, options)
         over = frusta_of(scene, view.camera.fixed, options, box, size)
         if self.marks is not None:
-            from viewer.rendering.overlay.marks import mark_annotation
+            from viewer.rendering.overlay.annotation import mark_annotation
 
             over.insert(0, mark_annotation(self.marks))
         over += self.annotations

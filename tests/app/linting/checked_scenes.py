@@ -9,7 +9,7 @@ from lint.planted import weighted
 from lint.sound import FRAMES, column, scene_of, standing
 
 from viewer.app.linting.state import Linting
-from viewer.rendering.overlay.marks import MARK_COLOR
+from viewer.rendering.overlay.annotation import MARK_COLOR
 from viewer.rig.scene import Scene
 
 PINK = np.array([round(255 * channel) for channel in MARK_COLOR])

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.overlay.annotation import Labels, leader_lines, letters_for, place_labels
-from viewer.rendering.overlay.lettering import Lettering
+from viewer.rendering.overlay.typeface import Lettering
 from viewer.rendering.view import view_of
 
 SIZE = (800, 720)

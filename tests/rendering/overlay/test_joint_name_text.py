@@ -9,9 +9,8 @@ from rendering.drawn_figures import skeleton
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.overlay.annotation import letters_for, place_labels
-from viewer.rendering.overlay.joint_marks import HIGHLIGHT, marks_of
-from viewer.rendering.overlay.joint_names import name_labels
-from viewer.rendering.overlay.lettering import Lettering
+from viewer.rendering.overlay.joint_marks import HIGHLIGHT, marks_of, name_labels
+from viewer.rendering.overlay.typeface import Lettering
 from viewer.rendering.view import view_of
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rendering.overlay.label_candidates import (
+from viewer.rendering.overlay.labels import (
+    Cells,
+    Dots,
     clear_places,
     crowded,
     crowded_lines,
     line_pixels,
     places_of,
 )
-from viewer.rendering.overlay.label_cells import Cells, Dots
 
 PICTURE, GAP = (300, 200), 8.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rendering.overlay.label_cells import Cells, Dots, spread, summed, sums_within
+from viewer.rendering.overlay.labels import Cells, Dots, spread, summed, sums_within
 
 
 def test_cells_are_numbered_from_one_with_a_border_for_outside_points():

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewer.rendering.overlay.label_layout import lay_out
+from viewer.rendering.overlay.labels import lay_out
 
 PICTURE = (100, 60)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.rendering.overlay.legend_columns import LegendColumns, legend_columns
+from viewer.rendering.overlay.legend import LegendColumns, legend_columns
 
 
 def test_empty_list_has_no_column():

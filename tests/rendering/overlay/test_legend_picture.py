@@ -12,8 +12,7 @@ from viewer.rendering.camera import Camera, fit
 from viewer.rendering.colors import colormap
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.legend import Entry, Legend
-from viewer.rendering.overlay.legend_picture import legend_pixels
+from viewer.rendering.overlay.legend import Entry, Legend, legend_pixels
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 
 SIZE = 640, 360

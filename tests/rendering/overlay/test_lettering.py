@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rendering.overlay.lettering import Lettering, shelves
+from viewer.rendering.overlay.typeface import Lettering, shelves
 
 
 def test_text_sizes_match_the_drawn_pixels():

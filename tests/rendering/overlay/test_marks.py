@@ -12,7 +12,7 @@ from rendering.front_view import PIXELS, drawn, front_view, pixel
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.marks import MARK_COLOR, Marks, mark_annotation
+from viewer.rendering.overlay.annotation import MARK_COLOR, Marks, mark_annotation
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 

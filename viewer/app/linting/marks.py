@@ -13,7 +13,7 @@ from viewer.app.linting.state import Linting
 from viewer.errors import ViewerError
 from viewer.lint import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes
-from viewer.rendering.overlay.marks import Marks
+from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import pose_key

@@ -7,7 +7,7 @@ from dataclasses import field
 from viewer.app.core.jobs import CountedJob
 from viewer.data_classes import dataclass
 from viewer.lint import SEVERITIES, Finding, LintOptions
-from viewer.rendering.overlay.marks import Marks
+from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.scene import Scene
 
 __all__ = ["Checked", "Linting", "Running"]

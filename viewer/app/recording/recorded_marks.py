@@ -11,8 +11,7 @@ from viewer.app.linting.state import Linting
 from viewer.app.weights.explanation_lines import vertex_annotation
 from viewer.app.weights.state import Weights
 from viewer.lint import Finding, places_of
-from viewer.rendering.overlay.annotation import Annotation
-from viewer.rendering.overlay.marks import mark_annotation
+from viewer.rendering.overlay.annotation import Annotation, mark_annotation
 from viewer.rig.inspection.explanation import explain
 from viewer.rig.scene import Scene
 

@@ -7,8 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, begin_overlay, overlay_rect
 from viewer.phrases import printable
-from viewer.rendering.overlay.legend import Entry, Legend
-from viewer.rendering.overlay.legend_columns import legend_columns
+from viewer.rendering.overlay.legend import Entry, Legend, legend_columns
 
 __all__ = ["draw_legend"]
 

@@ -1,29 +1,23 @@
-"""Annotations drawn over an image: lines and dots in the scene, labels next to points."""
+"""Annotations drawn over an image: lines and dots in the scene, labels next to points.
+
+Marks are annotations at positions in the scene, of constant size on the screen.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.overlay.label_layout import lay_out
-from viewer.rendering.overlay.lettering import Lettering
+from viewer.rendering.overlay.labels import lay_out
 from viewer.rendering.overlay.segments import Segments, SegmentStyle
+from viewer.rendering.overlay.typeface import Lettering
 from viewer.rendering.projection import picture_scale, project, unproject
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.vectors import unit
-
-__all__ = [
-    "LABEL_COLOR",
-    "Annotation",
-    "Labels",
-    "PlacedLabels",
-    "leader_lines",
-    "letters_for",
-    "place_labels",
-]
 
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default label colour, sRGB."""
@@ -33,6 +27,31 @@ _GAP = 7.0  # pixels between a point and its label
 _LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
 _RIM = 5.0  # pixels between a point and the start of its leader line
 _DARK = (0.05, 0.06, 0.08, 0.7)
+
+MARK_COLOR = (1.0, 0.16, 0.56)
+"""Colour of marks, sRGB, distinct from the colour maps and the lights."""
+
+_MARK_LINE = 1.0  # radius of lines, pixels
+_MARK_STYLE = SegmentStyle(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0.05))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Annotation:
+    """Segments, and labels drawn over them.
+
+    Attributes
+    ----------
+    segments : Segments
+        Segments in drawing order.
+    style : SegmentStyle
+        Style of the segments.
+    labels : Labels or None
+        Labels, which are never hidden.
+    """
+
+    segments: Segments
+    style: SegmentStyle
+    labels: Labels | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,62 +78,31 @@ class Labels:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Annotation:
-    """Segments, and labels drawn over them.
+class Marks:
+    """Positions of marks.
 
     Attributes
     ----------
-    segments : Segments
-        Segments in drawing order.
-    style : SegmentStyle
-        Style of the segments.
-    labels : Labels or None
-        Labels, which are never hidden.
+    points : (N, 3)
+        Scene space.
+    radii : (N,)
+        Radii of the points, pixels.
+    lines : (M, 2, 3)
+        Both ends of each line, scene space.
     """
 
-    segments: Segments
-    style: SegmentStyle
-    labels: Labels | None = None
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    radii: Floats = field(default_factory=lambda: np.zeros(0))
+    lines: Floats = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlacedLabels:
-    """Labels with their positions in the image.
-
-    Attributes
-    ----------
-    texts : tuple of M str
-        Their texts.
-    corners : (M, 2)
-        Top left corners, pixels from the image's left and upper edge.
-    colors : (M, 3)
-        sRGB, 0 to 1.
-    points : (M, 3)
-        Labelled points, scene space.
-    ends : (M, 2)
-        Point of each label that is nearest to the labelled point, pixels.
-    has_line : (M,) bool
-        Whether a leader line is needed.
-    owners : (M,)
-        Index of the ``Labels`` to which each label belongs.
-    n_seen : tuple of int
-        Number of points within the image for each ``Labels``.
-    """
-
-    texts: tuple[str, ...]
-    corners: Ints
-    colors: Floats
-    points: Floats
-    ends: Floats
-    has_line: Bools
-    owners: Ints
-    n_seen: tuple[int, ...]
-
-    @property
-    def n_left_out(self) -> tuple[int, ...]:
-        """Number of labels omitted for lack of room for each ``Labels``."""
-        drawn = np.bincount(self.owners, minlength=len(self.n_seen)).tolist()
-        return tuple(seen - count for seen, count in zip(self.n_seen, drawn, strict=True))
+def mark_annotation(marks: Marks) -> Annotation:
+    """Return marks as an annotation: lines first, so that points are drawn over them."""
+    radii = np.concatenate([np.full(len(marks.lines), _MARK_LINE), marks.radii])
+    colors = np.broadcast_to((*MARK_COLOR, 1.0), (len(radii), 4))
+    starts = np.concatenate([marks.lines[:, 0], marks.points])
+    ends = np.concatenate([marks.lines[:, 1], marks.points])
+    return Annotation(Segments(starts, ends, colors, 2.0 * radii), _MARK_STYLE)
 
 
 def letters_for(size: tuple[int, int]) -> int:
@@ -165,6 +153,46 @@ def place_labels(
         owners[chosen].astype(np.int32),
         tuple(np.bincount(owners[order], minlength=len(labels)).tolist()),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedLabels:
+    """Labels with their positions in the image.
+
+    Attributes
+    ----------
+    texts : tuple of M str
+        Their texts.
+    corners : (M, 2)
+        Top left corners, pixels from the image's left and upper edge.
+    colors : (M, 3)
+        sRGB, 0 to 1.
+    points : (M, 3)
+        Labelled points, scene space.
+    ends : (M, 2)
+        Point of each label that is nearest to the labelled point, pixels.
+    has_line : (M,) bool
+        Whether a leader line is needed.
+    owners : (M,)
+        Index of the ``Labels`` to which each label belongs.
+    n_seen : tuple of int
+        Number of points within the image for each ``Labels``.
+    """
+
+    texts: tuple[str, ...]
+    corners: Ints
+    colors: Floats
+    points: Floats
+    ends: Floats
+    has_line: Bools
+    owners: Ints
+    n_seen: tuple[int, ...]
+
+    @property
+    def n_left_out(self) -> tuple[int, ...]:
+        """Number of labels omitted for lack of room for each ``Labels``."""
+        drawn = np.bincount(self.owners, minlength=len(self.n_seen)).tolist()
+        return tuple(seen - count for seen, count in zip(self.n_seen, drawn, strict=True))
 
 
 def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Segments:

@@ -1,4 +1,4 @@
-"""Joint marks drawn over the image (X-ray bones and axes), and the joint at a pixel."""
+"""Joint marks drawn over the image (X-ray bones, axes, names), and the joint at a pixel."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.phrases import printable
 from viewer.rendering.gpu.box_buffers import joint_colors
-from viewer.rendering.overlay.segments import Segments, dots
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
+from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined
 from viewer.rendering.projection import picture_scale, project, project_segments
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
@@ -18,18 +21,8 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped_skeleton
-from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
+from viewer.rig.skeleton import Skeleton, joint_labels, shown_joints, shown_parents
 from viewer.rig.srgb import encode_srgb
-
-__all__ = [
-    "HIGHLIGHT",
-    "JointMarks",
-    "axis_segments",
-    "bone_segments",
-    "joint_at",
-    "joint_dots",
-    "marks_of",
-]
 
 HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
 """Colour of the selected joint, sRGB and opacity."""
@@ -42,6 +35,46 @@ _DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # diameter and widths in an image of standar
 _OUTLINE = 2.0
 _DARK = (0.05, 0.06, 0.08, 0.85)
 _DOT_REACH, _BONE_REACH = 8.0, 4.0  # maximum distances from the pointer, pixels
+_LONGEST_NAME = 40  # maximum number of characters of a name
+_LATE_RANK = 1000  # rank of unselected joints, so that other labels take precedence
+
+
+def joint_annotation(
+    actors: Sequence[Actor],
+    options: DisplayOptions,
+    size: tuple[int, int],
+    selected: tuple[int, int],
+) -> Annotation | None:
+    """Return the marks at the joints of all actors; None if there are no joints.
+
+    Parameters
+    ----------
+    actors : sequence of Actor
+        The actors of a scene.
+    options : DisplayOptions
+        Display options that select the marks.
+    size : (int, int)
+        Width and height of the image, pixels.
+    selected : (int, int)
+        Index of an actor and of its highlighted joint; -1 for none.
+    """
+    marks = marks_of(actors)
+    parts = [part for one in marks for part in _mark_segments(one, options, size, selected)]
+    if not parts:
+        return None
+    labels = name_labels(marks, selected) if options.joint_names else None
+    return Annotation(joined(parts), SegmentStyle(on_top=options.xray), labels)
+
+
+def _mark_segments(
+    marks: JointMarks, options: DisplayOptions, size: tuple[int, int], selected: tuple[int, int]
+) -> list[Segments]:
+    """Return the lines and dots of one actor, the topmost last."""
+    scale, joint = picture_scale(size), selected[1] if marks.actor == selected[0] else -1
+    parts = [bone_segments(marks, joint, scale)] if options.xray else []
+    if options.joint_axes:
+        parts.append(axis_segments(marks, scale))
+    return parts + joint_dots(marks, joint, scale)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,6 +202,36 @@ def _colors(skeleton: Skeleton, selected: int) -> Floats:
     if selected >= 0:
         colors[selected] = HIGHLIGHT
     return colors
+
+
+def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
+    """Return the joints' names: the selected joint first, then nearer joints.
+
+    Parameters
+    ----------
+    marks : sequence of JointMarks
+        Joints of all actors.
+    selected : (int, int)
+        Index of an actor and of its selected joint; -1 for none.
+    """
+    shown = [shown_joints(one.skeleton) for one in marks]
+    texts = [
+        printable(labels[joint], _LONGEST_NAME)
+        for one, joints in zip(marks, shown, strict=True)
+        for labels in (joint_labels(one.skeleton),)
+        for joint in joints.tolist()
+    ]
+    if not texts:
+        return Labels((), np.zeros((0, 3)), np.zeros(0, dtype=np.int32), np.zeros((0, 3)))
+    is_chosen = np.concatenate(
+        [
+            (joints == selected[1]) & (one.actor == selected[0])
+            for one, joints in zip(marks, shown, strict=True)
+        ]
+    )
+    points = np.concatenate([one.points[joints] for one, joints in zip(marks, shown, strict=True)])
+    colors = np.where(is_chosen[:, None], HIGHLIGHT[:3], LABEL_COLOR)
+    return Labels(tuple(texts), points, np.where(is_chosen, 0, _LATE_RANK).astype(np.int32), colors)
 
 
 def joint_at(

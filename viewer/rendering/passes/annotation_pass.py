@@ -15,8 +15,8 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import checked
 from viewer.rendering.gpu.vertex_arrays import InstanceRows
 from viewer.rendering.overlay.annotation import Annotation, leader_lines, letters_for, place_labels
-from viewer.rendering.overlay.lettering import Lettering, shelves
 from viewer.rendering.overlay.segments import SegmentPass, SegmentStyle
+from viewer.rendering.overlay.typeface import Lettering, shelves
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.overlay.legend import Legend
+from viewer.rendering.overlay.legend import Legend, legend_pixels
 
 __all__ = ["LegendPass"]
 
@@ -65,8 +65,6 @@ class LegendPass:
         return True
 
     def _prepare(self, legend: Legend, size: tuple[int, int], is_light: bool) -> None:
-        from viewer.rendering.overlay.legend_picture import legend_pixels
-
         self._free()
         pixels = legend_pixels(legend, size, is_light)
         if pixels is not None:
