@@ -17,21 +17,6 @@ if TYPE_CHECKING:
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.scene import Scene
 
-__all__ = [
-    "VIEWS",
-    "Camera",
-    "camera_axes",
-    "camera_from_view",
-    "eye",
-    "facing_camera",
-    "fit",
-    "follow_view",
-    "front_azimuth",
-    "look_from",
-    "orbit",
-    "pan",
-    "zoom",
-]
 
 VIEWS = {
     "front": (0.0, 0.0),

@@ -18,18 +18,6 @@ from viewer.rig.mesh import bounding_box
 from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene, scene_points
 
-__all__ = [
-    "find_follow",
-    "fit_turntable",
-    "follow_candidates",
-    "frame_motion",
-    "framed_poses",
-    "frames_looked_at",
-    "level_shifts",
-    "outermost",
-    "seen_aspect",
-]
-
 _MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # maximum numbers of frames and points for fitting
 _N_DIRECTIONS = 1000
 _BLOCK = 5_000  # points per batch, whose matrix of dot products stays below 40 MB

@@ -11,8 +11,6 @@ from viewer.rig.memo import Memo
 from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin, bind_positions, owners
 
-__all__ = ["box_spheres", "skin_spheres", "stretch"]
-
 _MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
 
 _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         ShadowPass,
     )
 
-__all__ = ["Lighting"]
 
 # Fraction of light removed; the remainder represents light reflected by other surfaces.
 _SHADOW_STRENGTH = 0.9

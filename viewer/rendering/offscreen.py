@@ -20,8 +20,6 @@ from viewer.rig.inspection.front import guess_front
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
 
-__all__ = ["Offscreen", "default_camera", "render"]
-
 _thread = threading.local()
 
 

@@ -35,8 +35,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["Passes", "Pick", "PickPass"]
-
 _REACH = 3  # search radius around the requested pixel, pixels
 _SIDE = 2 * _REACH + 1
 # Distance by which a keypoint may be farther from the pointer than a surface, pixels.
@@ -68,16 +66,6 @@ class Pick:
     point: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Passes:
-    """Resources that picking shares with drawing."""
-
-    programs: Programs
-    meshes: MeshPass
-    points: PointPass
-    buffers: ActorBuffers
-
-
 _Found = Callable[[int, int, Floats], Pick]
 """Function from instance, index of the drawn triangle and point in scene space to a Pick."""
 
@@ -87,14 +75,23 @@ class PickPass:
 
     Parameters
     ----------
-    context : moderngl.Context
-        The context in use.
-    passes : Passes
-        Programs and buffers shared with drawing.
+    programs : Programs
+        Provides the shader programs.
+    meshes, points : MeshPass, PointPass
+        The passes that draw the scene's surfaces and points.
+    buffers : ActorBuffers
+        The buffers uploaded for drawing.
     """
 
-    def __init__(self, context: moderngl.Context, passes: Passes) -> None:
-        self.context, self.passes = context, passes
+    def __init__(
+        self,
+        programs: Programs,
+        meshes: MeshPass,
+        points: PointPass,
+        buffers: ActorBuffers,
+    ) -> None:
+        self.context, self._programs = programs.context, programs
+        self._meshes, self._points, self._buffers = meshes, points, buffers
         self._numbers: moderngl.Texture | None = None
         self._found: list[_Found] = []
         self._is_small: list[bool] = []
@@ -132,7 +129,7 @@ class PickPass:
         near = replace(view, projection=_window(size, pixel) @ view.projection)
         self._found, self._is_small = [], []
         self._draw_meshes(scene, near, options)
-        update_skeletons(self.passes.buffers, scene.actors, options)
+        update_skeletons(self._buffers, scene.actors, options)
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
                 self._draw_skeleton(index, actor, near, options)
@@ -166,7 +163,7 @@ class PickPass:
         set_uniforms(program, {"u_item": len(self._found)})
 
     def _draw_meshes(self, scene: Scene, view: View, options: DisplayOptions) -> None:
-        meshes = update_meshes(self.passes.buffers, scene.actors, options)
+        meshes = update_meshes(self._buffers, scene.actors, options)
         index = {id(actor): number for number, actor in enumerate(scene.actors)}
         for actor, mesh in meshes.singles:
             self._draw_mesh(index[id(actor)], mesh, placement_of(actor, options), view, options)
@@ -186,7 +183,7 @@ class PickPass:
 
             self._number(program, found)
 
-        self.passes.meshes.draw_shape(mesh, placement, view, options, "pick", prepare)
+        self._meshes.draw_shape(mesh, placement, view, options, "pick", prepare)
 
     def _draw_instances(
         self,
@@ -207,31 +204,31 @@ class PickPass:
             self._number(program, found)
 
         how = view, options, "pick", prepare
-        draw_instance_shapes(self.passes.programs, instances, actors, *how)
+        draw_instance_shapes(self._programs, instances, actors, *how)
 
     def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
-        skeleton = self.passes.buffers.skeleton(actor)
+        skeleton = self._buffers.skeleton(actor)
         # A skeleton over a skin is drawn in front of it.
         view = in_front(view) if shows_mesh(actor.figure, options) else view
-        program = joint_program(self.passes.programs, skeleton, options, "", "pick")
+        program = joint_program(self._programs, skeleton, options, "", "pick")
         self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
         draw_joints(program, skeleton, placement_of(actor, options), view, options)
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
-        markers = self.passes.buffers.keypoints_of(actor)
+        markers = self._buffers.keypoints_of(actor)
         markers.update(actor.require_pose(), options.skinning)
-        program = self.passes.programs.drawing("joint", fragment="pick")
+        program = self._programs.drawing("joint", fragment="pick")
         self._number(program, lambda marker, _, point: Pick(index, -1, -1, marker, point), True)
         draw_boxes(program, markers.boxes, actor.placement, in_front(view), options)
 
     def _draw_points(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
-        points = self.passes.buffers.points_of(actor)
+        points = self._buffers.points_of(actor)
         points.update(actor, actor.placement, view, options)
         elements, places, layout = points.elements, actor.points, actor.figure.points
         assert places is not None and layout is not None  # guaranteed by has_points
         if not len(elements):
             return
-        program = self.passes.programs.drawing("point", fragment="pick")
+        program = self._programs.drawing("point", fragment="pick")
         set_model(program, view, actor.placement, points.center)
 
         def found(instance: int, _: int, point: Floats) -> Pick:
@@ -243,7 +240,7 @@ class PickPass:
             return Pick(index, -1, -1, int(ends[np.linalg.norm(apart, axis=1).argmin()]), point)
 
         self._number(program, found, True)
-        array = points.array(program, self.passes.points.shape(points))
+        array = points.array(program, self._points.shape(points))
         array.render(moderngl.TRIANGLES, instances=len(elements))
 
     def _read(self, view: View) -> Pick | None:

@@ -8,8 +8,6 @@ from viewer.data_classes import dataclass
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["Projected", "picture_scale", "project", "project_segments", "unproject"]
-
 _USUAL_HEIGHT = 720.0  # height of an image in which marks have their standard size, pixels
 _SCALES = 0.8, 4.0
 

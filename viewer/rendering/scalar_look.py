@@ -22,8 +22,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name
 from viewer.rig.srgb import decode_srgb
 
-__all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typical_span"]
-
 TYPICAL = 0.99
 """Minimum fraction of the nonzero values that a robust range contains."""
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.motion_path_pass import MotionPathBuffers
     from viewer.rendering.passes.point_pass import PointBuffers
 
-__all__ = ["ActorBuffers"]
-
 
 class _InstancedShapes:
     """Instance buffers of one figure, one per shape that several actors share."""

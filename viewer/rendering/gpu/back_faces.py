@@ -23,8 +23,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import Skinning, skinned
 
-__all__ = ["BackFaces", "Region"]
-
 Region = tuple[int, int, int, int]
 """Left, bottom, width and height in pixels, from the lower left corner."""
 

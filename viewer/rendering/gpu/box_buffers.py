@@ -14,8 +14,6 @@ from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.mesh import bounding_box
 
-__all__ = ["BoxBuffers", "joint_colors"]
-
 _GOLDEN = 0.618033988749895
 _MANY = 1000  # minimum number of boxes for which coincident boxes are searched
 

@@ -10,8 +10,6 @@ from typing import Any
 
 from viewer.data_classes import dataclass
 
-__all__ = ["EglDevice", "device_of_worker", "egl_devices"]
-
 _MOST = 64  # maximum number of devices
 _EXTENSIONS = 0x3055
 _CUDA_DEVICE = 0x323A  # EGL_CUDA_DEVICE_NV of EGL_NV_device_cuda

@@ -24,18 +24,6 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, split_seams
 from viewer.rig.scene import Scene
 
-__all__ = [
-    "IndexSet",
-    "MeshRun",
-    "curve_order",
-    "curve_places",
-    "index_set",
-    "kept_triangles",
-    "prepare_scene",
-    "split_vertices",
-    "triangle_order",
-]
-
 _CURVE_BITS = 10  # bits per axis
 _split: Memo[Figure, tuple[Ints, Ints, Ints]] = Memo()
 _orders: Memo[Figure, Ints] = Memo()

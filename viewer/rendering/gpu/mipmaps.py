@@ -20,8 +20,6 @@ from viewer.rendering.gpu.context import is_software
 from viewer.rig.arrays import Bytes
 from viewer.rig.srgb import decode_srgb, encode_srgb
 
-__all__ = ["add_mipmaps", "halved_pictures"]
-
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x1908, 0x1401, 0x0DE1
 _STEPS = 1 << 14  # number of steps of linear light; the sum of four values still fits into 16 bits

@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Generic, Protocol, TypeVar
 
-__all__ = ["Kept", "Owner"]
-
 
 class _Releasable(Protocol):
     def release(self) -> object: ...

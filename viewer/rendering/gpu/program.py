@@ -11,8 +11,6 @@ from viewer.errors import RenderError
 from viewer.interrupts import deferred
 from viewer.resources import resource
 
-__all__ = ["SHADING", "SHADING_CHOICES", "Programs", "set_uniforms"]
-
 SHADING = {
     "phong": "Blinn-Phong, two lights",
     "pbr": "Metallic-roughness, studio",

@@ -9,8 +9,6 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import checked
 from viewer.resources import resource
 
-__all__ = ["STUDIO_SAMPLERS", "Matcaps", "Studio"]
-
 STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
 """Texture units that materials and effects do not use; no program uses both of the last two."""
 

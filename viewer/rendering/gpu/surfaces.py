@@ -18,8 +18,6 @@ from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Texture
 from viewer.rig.materials.toon import Outline, Rim
 from viewer.rig.mesh import Mesh
 
-__all__ = ["PLAIN", "SAMPLERS", "Surface", "drawn_sets", "needs_materials", "upload_surfaces"]
-
 SAMPLERS = {
     "u_texture": 5,
     "u_metallic_map": 8,

@@ -13,26 +13,6 @@ from viewer.rendering.gpu.context import check_errors, is_software
 from viewer.rendering.gpu.mipmaps import add_mipmaps
 from viewer.rig.arrays import Bytes, Floats
 
-__all__ = [
-    "as_uniform",
-    "buffer",
-    "checked",
-    "empty_offsets",
-    "float32",
-    "matrix_rows",
-    "matrix_texture",
-    "offset_texture",
-    "pair_texture",
-    "picture_texture",
-    "ramp_texture",
-    "reserved",
-    "rigid_texture",
-    "write_matrices",
-    "write_pairs",
-    "write_rigid",
-    "write_stacked",
-]
-
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 
 # Fixed texture widths, on which the shaders rely: every OpenGL 3.3 driver allows at least 1024.

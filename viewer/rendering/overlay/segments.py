@@ -15,8 +15,6 @@ from viewer.rendering.options import Color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 
-__all__ = ["HIDDEN", "SegmentPass", "SegmentStyle", "Segments", "dots", "joined"]
-
 HIDDEN = 0.4
 """Default opacity of segments behind a surface."""
 

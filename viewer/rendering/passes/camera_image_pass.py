@@ -14,8 +14,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_images import CameraImage
 from viewer.rig.captures.camera_view import CameraView
 
-__all__ = ["CameraImagePass"]
-
 _UNIT = 0
 
 

@@ -18,8 +18,6 @@ from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 
-__all__ = ["GHOST_COLOR", "STYLES", "Ghost", "GhostPass"]
-
 GHOST_COLOR = (0.10, 0.42, 0.85)
 """Default colour of ghosts, linear."""
 

@@ -15,8 +15,6 @@ from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import box_size
 
-__all__ = ["GroundPass", "grid_step"]
-
 _LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
 _EXTENT = 6.0  # half the side length of the grid, relative to the scene's size

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from viewer.rendering.gpu.bones import BoneBuffers
     from viewer.rendering.gpu.box_buffers import BoxBuffers
 
-__all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # size of the cubes of a skeleton without boxes, as a fraction of its size

@@ -17,8 +17,6 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, pose_key
 from viewer.rig.skinning import Skinning
 
-__all__ = ["KeypointBuffers", "KeypointPass"]
-
 _CUBE_SIZE = 0.006  # half the side length of a cube, relative to the figure's size
 
 

@@ -44,8 +44,6 @@ if TYPE_CHECKING:
         | CameraImagePass
     )
 
-__all__ = ["LatePasses"]
-
 
 class LatePasses:
     """Passes that many scenes do not need, each created on demand.
@@ -101,10 +99,9 @@ class LatePasses:
     @cached_property
     def pick_pass(self) -> PickPass:
         """Pass that finds the object at a pixel."""
-        from viewer.rendering.picking import Passes, PickPass
+        from viewer.rendering.picking import PickPass
 
-        passes = Passes(self._programs, self._mesh_pass, self.point_pass, self._buffers)
-        picks = PickPass(self._context, passes)
+        picks = PickPass(self._programs, self._mesh_pass, self.point_pass, self._buffers)
         self._made.append(picks)
         return picks
 
@@ -175,10 +172,9 @@ class LatePasses:
     @cached_property
     def outline_pass(self) -> OutlinePass:
         """Pass for outlines of selected and hovered parts."""
-        from viewer.rendering.passes.outline_pass import OutlinePass, OutlineTools
+        from viewer.rendering.passes.outline_pass import OutlinePass
 
-        tools = OutlineTools(self._programs, self._mesh_pass, self.point_pass, self._buffers)
-        outlines = OutlinePass(self._context, tools)
+        outlines = OutlinePass(self._programs, self._mesh_pass, self.point_pass, self._buffers)
         self._made.append(outlines)
         return outlines
 

@@ -9,8 +9,6 @@ from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.overlay.legend import Legend, legend_pixels
 
-__all__ = ["LegendPass"]
-
 _MARGIN = 0.014  # margin of the legend, as a fraction of the image height
 
 

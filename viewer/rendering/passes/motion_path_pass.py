@@ -24,8 +24,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
-__all__ = ["Moment", "MotionPathBuffers", "MotionPathPass", "path_colors"]
-
 _WIDTH = 2.5  # width of the lines, pixels
 _HIDDEN = 0.3  # opacity of hidden parts
 _GOLDEN = 0.618033988749895

@@ -13,8 +13,6 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import checked
 from viewer.rendering.view import Occlusion, View
 
-__all__ = ["OcclusionPass"]
-
 _RADIUS = 0.09  # radius within which surfaces occlude, relative to a figure's size
 
 

@@ -65,33 +65,32 @@ class Outlined:
         return self.actor, self.joint, self.points.tobytes(), self.is_hovered
 
 
-@dataclass(frozen=True, slots=True)
-class OutlineTools:
-    """Resources that outlines share with the passes that draw the scene."""
-
-    programs: Programs
-    meshes: MeshPass
-    points: PointPass
-    buffers: ActorBuffers
-
-
 class OutlinePass:
     """Pass that draws outlines over everything, even over objects in front of the outlined parts.
 
     Parameters
     ----------
-    context : moderngl.Context
-        The context in use.
-    tools : OutlineTools
-        Programs, and the buffers uploaded for drawing.
+    programs : Programs
+        Provides the shader programs.
+    meshes, points : MeshPass, PointPass
+        The passes that draw the scene's surfaces and points.
+    buffers : ActorBuffers
+        The buffers uploaded for drawing.
     """
 
-    def __init__(self, context: moderngl.Context, tools: OutlineTools) -> None:
-        self.context, self.tools = context, tools
-        self._segments = SegmentPass(context, tools.programs)
-        self._spread = tools.programs.drawing("tile", fragment="spread")
-        self._line = tools.programs.drawing("tile", fragment="outline")
-        self._arrays = [context.vertex_array(p, []) for p in (self._spread, self._line)]
+    def __init__(
+        self,
+        programs: Programs,
+        meshes: MeshPass,
+        points: PointPass,
+        buffers: ActorBuffers,
+    ) -> None:
+        self.context, self._programs = programs.context, programs
+        self._meshes, self._points, self._buffers = meshes, points, buffers
+        self._segments = SegmentPass(self.context, programs)
+        self._spread = programs.drawing("tile", fragment="spread")
+        self._line = programs.drawing("tile", fragment="outline")
+        self._arrays = [self.context.vertex_array(p, []) for p in (self._spread, self._line)]
         self._mask: Target | None = None
         self._distance: list[Any] = []
 
@@ -219,30 +218,30 @@ class OutlinePass:
         view: View,
         options: DisplayOptions,
     ) -> None:
-        skeleton = self.tools.buffers.skeleton(actor)
-        program = joint_program(self.tools.programs, skeleton, options, "", "mask")
+        skeleton = self._buffers.skeleton(actor)
+        program = joint_program(self._programs, skeleton, options, "", "mask")
         set_uniforms(program, {"u_mask": mask})
         draw_joints(program, skeleton, placement_of(actor, options), view, options, only=joint)
 
     def _cover_mesh(
         self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
     ) -> None:
-        mesh = self.tools.buffers.posed_mesh(actor)
+        mesh = self._buffers.posed_mesh(actor)
         mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
 
         def prepare(program: moderngl.Program, _: MeshRun) -> None:
             set_uniforms(program, {"u_mask": mask})
 
         place = placement_of(actor, options)
-        self.tools.meshes.draw_shape(mesh, place, view, options, "mask", prepare)
+        self._meshes.draw_shape(mesh, place, view, options, "mask", prepare)
 
     def _cover_points(
         self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
     ) -> None:
-        points = self.tools.buffers.points_of(actor)
+        points = self._buffers.points_of(actor)
         points.update(actor, actor.placement, view, options)
-        set_uniforms(self.tools.programs.drawing("point", fragment="mask"), {"u_mask": mask})
-        self.tools.points.draw_shapes(points, actor.placement, view, "mask")
+        set_uniforms(self._programs.drawing("point", fragment="mask"), {"u_mask": mask})
+        self._points.draw_shapes(points, actor.placement, view, "mask")
 
     def _free(self) -> None:
         for item in self._distance:

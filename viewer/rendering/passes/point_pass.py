@@ -24,8 +24,6 @@ from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
 
-__all__ = ["LEFT", "MIDDLE", "RIGHT", "PointBuffers", "PointPass", "point_radii"]
-
 RIGHT: Color = (0.75, 0.06, 0.05)
 LEFT: Color = (0.05, 0.20, 0.75)
 MIDDLE: Color = (0.42, 0.42, 0.42)
