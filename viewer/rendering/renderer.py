@@ -10,6 +10,7 @@ import moderngl
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.camera_views import draw_image_behind, draw_image_planes, frusta_of, reach_of
+from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import draw_nearest, without_depth_writes
 from viewer.rendering.gpu.posed_mesh import PosedMesh
@@ -141,8 +142,6 @@ class Renderer:
         strength : float
             Strength of shadows and occlusion, 0 to 1.
         """
-        from viewer.rendering.casters import Casters
-
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
