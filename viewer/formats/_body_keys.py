@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from viewer.formats._archive.values import Value, describe, texts_in
+from viewer.formats._archive.checking import finite
+from viewer.formats._archive.values import Archive, Value, describe, texts_in
 from viewer.phrases import printable
 from viewer.rig.smpl_family import gender_of, model_title
 
-__all__ = ["GENDERS", "MODELS", "RATES", "gender_in", "model_in"]
+__all__ = ["GENDERS", "MODELS", "RATES", "gender_in", "model_in", "scale_in"]
 
 GENDERS = ("gender", "genders")
 MODELS = ("surface_model_type", "model_type", "body_model", "smpl_type", "model")
@@ -16,6 +17,7 @@ RATES = (
     *("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "frameRate", "framerate"),
     *("video_fps", "frames_per_second"),
 )
+_MOST_SCALED = 1e6  # maximum scale of a body; AIST++ scales by about 100
 
 
 def gender_in(value: Value) -> tuple[str, str]:
@@ -38,3 +40,21 @@ def model_in(values: Iterable[Value]) -> str:
     """Return the title of the first model of the family that values state; empty for none."""
     titles = (model_title(text) for value in values for text in texts_in(value)[:1])
     return next(filter(None, titles), "")
+
+
+def scale_in(archive: Archive, key: str) -> float:
+    """Return the scale of a body, by which AIST++ multiplies positions in metres.
+
+    Raises
+    ------
+    FormatError
+        If it is not a single positive number of a plausible size.
+    """
+    values = archive.array(key).values().ravel()
+    if len(values) != 1:
+        raise archive.fault("F002.motion-single", item=key, found=len(values))
+    scale = float(finite(archive, key, values)[0])
+    low, high = 1.0 / _MOST_SCALED, _MOST_SCALED
+    if not low <= scale <= high:
+        raise archive.fault("F002.motion-scale", item=key, low=low, high=high, found=scale)
+    return scale

@@ -22,7 +22,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive
-from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in
+from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in, scale_in
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
@@ -70,7 +70,6 @@ _KNOWN = {
 _OF_MOTIONS = (*RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
-_MOST_SCALED = 1e6  # maximum scale of a body; AIST++ scales by about 100
 _SAME = 1e-5  # tolerance in radians or metres: the precision of float32 for numbers below 100
 
 
@@ -291,12 +290,7 @@ def _translations(source: Source, archive: Archive, count: int, first: str) -> F
     rows = _rows(archive, key, count, first)
     if rows.shape[1] != 3:
         raise archive.fault("F002.motion-width", item=key, expected=[3], found=rows.shape[1])
-    scale = _single(archive, "smpl_scaling") if archive.has("smpl_scaling") else 1.0
-    if not 1.0 / _MOST_SCALED <= scale <= _MOST_SCALED:
-        low, high = 1.0 / _MOST_SCALED, _MOST_SCALED
-        raise archive.fault(
-            "F002.motion-scale", item="smpl_scaling", low=low, high=high, found=scale
-        )
+    scale = scale_in(archive, "smpl_scaling") if archive.has("smpl_scaling") else 1.0
     return within_reach(archive, key, finite_or_nan(archive, key, rows / scale))
 
 

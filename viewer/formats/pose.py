@@ -200,7 +200,7 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
         if not named.values:
             raise named.fault("F002.pose-no-keys")
         where = [odd] if odd else []
-        near = did_you_mean(odd, known)
+        near = did_you_mean(odd, (*_KNOWN, *KEYS))
         raise named.fault("F002.pose-keys", *where, keys=list(named.values), near=near)
     used = (
         (*_KNOWN, *_NOT_NEEDED)

@@ -246,3 +246,96 @@ def test_arrays_of_objects_are_lists_of_frames(tmp_path: Path) -> None:
     arrays["frame_ids"] = np.array([0, 3])
     source = Source(tmp_path / "people.npz", npz(**arrays))
     assert found_in(source)[0] == {4: [0], 7: [0, 3]}
+
+
+def facts_of(given: Any) -> tuple[dict[int, str], set[str], set[float], list[str]]:
+    """Return the genders of people, models, frame rates, and the keys of warnings."""
+    found = []
+    for source in (
+        Source("a.pkl", joblib_file(given)),
+        Source("a.json", json.dumps(plain(given)).encode()),
+    ):
+        motions = next(iter(open_results(source).parts())).bodies
+        genders = {person: motion.shape_space.gender for person, motion in motions.items()}
+        titles = {motion.shape_space.model for motion in motions.values()}
+        rates = {motion.timing.frame_rate for motion in motions.values()}
+        found.append((genders, titles, rates, [note.key for note in source.diagnostics]))
+    assert found[0] == found[1]  # pickle and JSON
+    return found[0]
+
+
+MEN = {"a": stacked(ALONE), "b": stacked([(0, 1), (1, 1)])}
+FACTS = {"gender": "F", "model_type": "smplx", "fps": 25.0}
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {**FACTS, "smpl": stacked(ALONE)},
+        {**FACTS, "a": {"b": stacked(ALONE)}},
+        {**FACTS, "frames": [body(frame, 0) for frame in range(3)]},
+        {"meta": FACTS, "smpl": stacked(ALONE)},
+        {"meta": FACTS, "people": [stacked(ALONE, id=0)]},
+        {"a": {"info": FACTS, "smpl": stacked(ALONE)}, "other": {"gender": 1, "fps": [1, 2]}},
+        stacked(ALONE, person_id=[0, 0, 0], gender=["F"] * 3, model="SMPL-X", frame_rate=25),
+        {**FACTS, "smpl": {**stacked(ALONE), "x": {"gender": "male"}}},
+    ],
+)
+def test_gender_model_and_rate_are_found_beside_the_parameters(given: Any) -> None:
+    genders, titles, rates, _ = facts_of(given)
+    assert (genders, titles, rates) == ({0: "female"}, {"SMPL-X"}, {25.0})
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"genders": ["m", "f"], "people": list(MEN.values())},
+        {"genders": {"b": "female", "a": "male"}, "people": MEN},
+        {key: {**man, "gender": said} for (key, man), said in zip(MEN.items(), "mf", strict=True)},
+        {"a": {"gender": "m", "smpl": MEN["a"]}, "b": {"gender": "f", "smpl": MEN["b"]}},
+        stacked(TWO, person_id=[0, 1] * 3, frame=[0, 0, 1, 1, 2, 2], gender=["m", "f"] * 3),
+        [stacked(TWO[row : row + 2], person_id=[0, 1], gender=["m", "f"]) for row in (0, 2, 4)],
+    ],
+)
+def test_each_person_has_its_gender(given: Any) -> None:
+    assert facts_of(given)[0] == {0: "male", 1: "female"}
+
+
+def test_several_genders_of_one_person_are_reported() -> None:
+    given = stacked(ALONE, person_id=[0, 0, 0], gender=["m", "f", "m"])
+    genders, _, _, notes = facts_of(given)
+    assert genders == {0: ""}
+    assert notes.count("F007.motion-gender") == 1
+
+
+def test_number_of_frames_is_not_a_frame_number() -> None:
+    # As in InterHuman.
+    given = {"frames": 3, "person1": stacked(ALONE), "person2": stacked([(f, 1) for f in range(3)])}
+    found = found_in(Source("a.pkl", joblib_file(given)))
+    assert found[:3] == ({1: [0, 1, 2], 2: [0, 1, 2]}, 0, 3)
+
+
+def test_places_are_divided_by_the_scale_beside_them() -> None:
+    given = {"smpl_scaling": np.array([2.0]), "smpl": stacked(ALONE)}
+    source = Source("a.pkl", joblib_file(given))
+    (motion,) = next(iter(open_results(source).parts())).bodies.values()
+    np.testing.assert_allclose(motion.translations, [[0, 0, 1.5], [0.5, 0, 1.5], [1, 0, 1.5]])
+
+
+def test_poses_under_the_keys_of_emdb_are_read() -> None:
+    given = stacked(ALONE)
+    poses = given.pop("pose")
+    given |= {"poses_root": poses[:, :3], "poses_body": poses[:, 3:]}
+    source = Source("a.pkl", joblib_file({"gender": "male", "smpl": given}))
+    (motion,) = next(iter(open_results(source).parts())).bodies.values()
+    np.testing.assert_array_equal(motion.vectors.reshape(3, 72), poses)
+
+
+@pytest.mark.parametrize(
+    ("face", "title"), [({}, "SMPL"), ({"jaw_pose": np.zeros((3, 3))}, "SMPL-X")]
+)
+def test_parameters_of_a_face_are_those_of_smplx(face: dict[str, Any], title: str) -> None:
+    # As SMPLify-X stores them, with a camera.
+    parts = {"global_orient": np.zeros((3, 3)), "body_pose": np.zeros((3, 63)), **face}
+    given = {**parts, "betas": np.ones(10), "camera_translation": np.zeros((3, 3))}
+    assert facts_of(given)[1] == {title}

@@ -7,16 +7,18 @@
     shape      betas, shape …
     frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
     person     person_id, track_id, id …, one number or name, or one for each row
-    gender     gender, of the body model
+    gender     gender, of the body model; one, or one for each row
+    model      model_type, model …: SMPL, SMPL+H or SMPL-X
     rate       fps, frame_rate, frameRate …, frames per second
+    scale      smpl_scaling, by which places are divided
 
 Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
-except the poses may also stand in one of the dicts around them, once, or as a list with one value
-for each dict. Several rows with the same frame are several people. Poses may also be a list with
-the rows of each frame, one for each person; other lists and arrays of this length then belong to
-the frames too. In a list of frames, None, an empty list, no rows and a dict without poses are
-frames without people. AMASS files and single poses have other spellings and are read by
-``amass.py`` and ``pose.py``.
+except the poses may also stand in one of the dicts around them, once, or as a list or dict with one
+value for each dict. Gender, model and rate may also stand in a dict beside the parameters. Several
+rows with the same frame are several people. Poses may also be a list with the rows of each frame,
+one for each person; other lists and arrays of this length then belong to the frames too. In a list
+of frames, None, an empty list, no rows and a dict without poses are frames without people. AMASS
+files and single poses have other spellings and are read by ``amass.py`` and ``pose.py``.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
-from viewer.formats._archive.values import Archive, Value, describe
+from viewer.formats._archive.values import Archive, Value, describe, texts_in
+from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in, scale_in
 from viewer.formats._frame_gaps import frame_spans
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
@@ -64,9 +67,9 @@ _WHOLE = (
 )
 _ROOTS = (
     *("global_orient", "root_orient", "pred_global_orient", "orient", "root_pose", "root_rot"),
-    *("smplx_root_pose", "global_rot"),
+    *("smplx_root_pose", "global_rot", "poses_root"),
 )
-_BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose")
+_BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose", "poses_body")
 _WORLD = (
     *("trans_world", "trans", "transl", "translation", "smpl_trans", "root_trans"),
     *("smplx_transl", "Th", "bodyTranslation"),
@@ -80,11 +83,10 @@ _SHAPES = (
     *("shapeParameters",),
 )
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
-_GENDERS = ("gender", "genders")
-_RATES = (
-    *("fps", "frame_rate", "frameRate", "framerate", "mocap_framerate", "mocap_frame_rate"),
-    *("video_fps", "frames_per_second"),
-)
+_OF_SMPLX = ("jaw_pose", "leye_pose", "reye_pose", "pose_jaw", "pose_eye", "expression")
+_BODY_JOINTS = 22  # of a body without hands, which SMPL, SMPL+H and SMPL-X share
+_COUNTS = ("frames", "frame_ids")  # a single number there is that of all frames
+_SCALES = ("smpl_scaling",)
 _DETECTIONS = "detection_all"
 _PEOPLE = (
     *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
@@ -109,6 +111,12 @@ class _Value:
     archive: Archive
     key: str
     item: int | None = None
+    within: str = ""
+    """The key of the dict that has the value, if neither has parameters."""
+
+    @property
+    def title(self) -> str:
+        return f"{self.within}.{self.key}" if self.within else self.key
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,6 +131,8 @@ class _Layout:
     person: _Value | None
     rate: _Value | None
     gender: _Value | None
+    model: _Value | None
+    scale: _Value | None
 
     @property
     def count(self) -> int:
@@ -130,10 +140,11 @@ class _Layout:
         return self.poses[0][1].n_frames
 
     @property
-    def keys(self) -> list[str]:
+    def others(self) -> list[_Value]:
+        """Values other than the poses."""
         frames = self.frames or self.frame
-        others = (self.place, self.shape, frames, self.person, self.rate, self.gender)
-        return [key for key, _ in self.poses] + [value.key for value in others if value]
+        found = (self.place, self.shape, frames, self.person, self.rate)
+        return [each for each in (*found, self.gender, self.model, self.scale) if each is not None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +175,7 @@ def recognises(archive: Archive) -> bool:
 
 def read(source: Source, archive: Archive) -> Results:
     """Read all people."""
-    found = [*_found(archive)]
+    found = _with_facts([*_found(archive)])
     layout = found[0].layout
     people, span = _people(source, found)
     is_camera = layout.place is not None and layout.place.key in _CAMERA
@@ -174,14 +185,22 @@ def read(source: Source, archive: Archive) -> Results:
     recognised = [
         f"{key} ({form.title} of {counted(form.n_joints, 'joint')})" for key, form in layout.poses
     ]
-    recognised += layout.keys[len(layout.poses) :]
-    used = {key for one in found for key in (*one.layout.keys, *one.path)}
+    recognised += [value.title for value in layout.others]
+    used = {key for one in found for key in one.path}
+    used |= {key for one in found for key, _ in one.layout.poses}
+    used |= {
+        key for one in found for value in one.layout.others for key in (value.key, value.within)
+    }
     scopes = [scope for scope in (found[0].archive, *found[0].around) if not scope.is_list]
     ignored = [key for scope in scopes for key in scope.keys if key not in used]
     rest = ", ".join(map(printable, ignored[:_LISTED]))
     source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
     n_joints = sum(form.n_joints for _, form in layout.poses)
     model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
+    if layout.model is not None:
+        model = model_in([layout.model.archive.objects(layout.model.key)])
+    elif n_joints == _BODY_JOINTS and any(map(found[0].archive.has, _OF_SMPLX)):
+        model = "SMPL-X"
     facts = (("recognised", ", ".join(recognised)),)
     return Results(
         "SMPL parameters",
@@ -235,7 +254,10 @@ def _layout(
         root, body = _first_form(archive, _ROOTS, (1,)), _first_form(archive, _BODIES, (21, 23))
         if root is None or body is None:
             return None
-        if root[1].n_frames != body[1].n_frames:
+        count = body[1].n_frames
+        if root[1].n_frames != count and archive.shape(root[0]) == (count, 3):
+            root = root[0], Form(count, 1, 3)  # three frames, not one matrix
+        if root[1].n_frames != count:
             return None
         poses = (root, body)
     count = poses[0][1].n_frames
@@ -252,18 +274,23 @@ def _layout(
             None,
         )
 
+    def is_single(scope: Archive, key: str) -> bool:
+        return scope.shape(key) in ((), (1,)) and _identity(scope.get(key)) is not None
+
     def of_item(keys: Sequence[str]) -> _Value | None:
         """Find a list with one value for each item of a list, or of a dict, on the path."""
         for level in range(len(around) - 1, 0, -1):
             items, beside = around[level].keys, around[level - 1]
             for key in keys:
-                is_free = key not in path and not archive.has(key)
-                if beside.has(key) and is_free and _length(beside, key) == len(items):
+                if not beside.has(key) or key in path:
+                    continue
+                is_free = not archive.has(key) or is_single(archive, key)
+                if is_free and _length(beside, key) == len(items):
                     return _Value(beside, key, items.index(path[level]))
+                named = beside.inside(key)
+                if named is not None and not named.is_list and named.has(path[level]):
+                    return _Value(named, path[level], within=key)
         return None
-
-    def is_single(scope: Archive, key: str) -> bool:
-        return scope.shape(key) in ((), (1,)) and _identity(scope.get(key)) is not None
 
     frames = frame = None
     if count > 1:
@@ -278,18 +305,85 @@ def _layout(
             (_DETECTIONS,), lambda scope, key: scope.shape(key)[:1] == (count,)
         )
     if frames is None:
-        frame = first(_FRAMES, is_single) or of_item(_FRAMES)
+        single = _FRAMES if count == 1 else [key for key in _FRAMES if key not in _COUNTS]
+        frame = first(single, is_single) or of_item(_FRAMES)
     person = of_item(_PEOPLE) or first(
         _PEOPLE, lambda scope, key: count > 1 and _length(scope, key) == count
     )
     person = person or first(_PEOPLE, is_single)
-    rate = first(_RATES, lambda scope, key: scope.shape(key) in ((), (1,)))
     place = first((*_WORLD, *_CAMERA), lambda scope, key: _is_place(scope.shape(key), count))
     shape = first(_SHAPES, lambda scope, key: _is_shape(scope.shape(key), count))
-    gender = of_item(_GENDERS) or first(
-        _GENDERS, lambda scope, key: bool(gender_of(scope.plain_text(key)))
+    return _Layout(
+        poses,
+        place,
+        shape,
+        frames,
+        frame,
+        person,
+        rate=first(RATES, _is_number),
+        gender=of_item(GENDERS) or first(GENDERS, lambda scope, key: _is_gender(scope, key, count)),
+        model=first(MODELS, _is_model),
+        scale=first(_SCALES, _is_number),
     )
-    return _Layout(poses, place, shape, frames, frame, person, rate, gender)
+
+
+def _is_number(scope: Archive, key: str) -> bool:
+    return scope.shape(key) in ((), (1,))
+
+
+def _is_model(scope: Archive, key: str) -> bool:
+    return bool(model_in([scope.objects(key)]))
+
+
+def _is_gender(scope: Archive, key: str, count: int) -> bool:
+    """Return whether a value states one gender, or that of each row."""
+    said = texts_in(scope.objects(key))
+    is_each = len(said) == count and all(map(gender_of, said))
+    return is_each or bool(gender_in(scope.objects(key))[0])
+
+
+def _with_facts(found: list[_Found]) -> list[_Found]:
+    """Return dicts with the gender, model and rate that a dict beside them states.
+
+    Such a dict describes the parameters, as "meta" or "info", and has none itself.
+    """
+    on_path = {id(scope) for one in found for scope in (one.archive, *one.around)}
+    described: dict[int, list[tuple[str, Archive]]] = {}
+
+    def facts(scope: Archive) -> list[tuple[str, Archive]]:
+        if id(scope) not in described:
+            known = described[id(scope)] = []
+            for key in () if scope.is_list else scope.keys:
+                try:
+                    inner = scope.inside(key)
+                except FormatError:  # its values are not needed
+                    continue
+                if inner is not None and not inner.is_list and id(inner) not in on_path:
+                    known.append((key, inner))
+        return described[id(scope)]
+
+    def first(
+        one: _Found, keys: Sequence[str], fits: Callable[[Archive, str], bool]
+    ) -> _Value | None:
+        for scope in reversed(one.around):
+            for name, inner in facts(scope):
+                for key in keys:
+                    if inner.has(key) and fits(inner, key):
+                        return _Value(inner, key, within=name)
+        return None
+
+    def completed(one: _Found) -> _Found:
+        layout = one.layout
+        rate = layout.rate or first(one, RATES, _is_number)
+
+        def is_gender(scope: Archive, key: str) -> bool:
+            return _is_gender(scope, key, layout.count)
+
+        gender = layout.gender or first(one, GENDERS, is_gender)
+        model = layout.model or first(one, MODELS, _is_model)
+        return replace(one, layout=replace(layout, rate=rate, gender=gender, model=model))
+
+    return [completed(one) for one in found]
 
 
 def _first_form(
@@ -445,6 +539,7 @@ class _Rows:
     track: Track
     frames: Frames
     persons: Sequence[_Person]
+    genders: Sequence[str]
 
 
 def _people(source: Source, found: list[_Found]) -> tuple[dict[int, Track], tuple[int, ...]]:
@@ -482,7 +577,7 @@ def _rows_of_people(source: Source, found: list[_Found], tracks: list[Track]) ->
             number = next((each for each in known if each is not None), None)
             is_free = number is not None and taken.setdefault(number, index) == index
             persons = [number if number is not None and is_free else (index, 0)] * len(frames)
-        rows.append(_Rows(track, frames, persons))
+        rows.append(_Rows(track, frames, persons, _genders(one.layout.gender, len(frames))))
     return rows
 
 
@@ -531,7 +626,8 @@ def _rows_of_frames(
         elif number is not None and count == 1:
             own = [number]
         seen[frame] += count
-        rows.append(_Rows(track, np.full(count, frame), own))
+        genders = _genders(one.layout.gender, count)
+        rows.append(_Rows(track, np.full(count, frame), own, genders))
     most = max(seen.values())
     if most > 1 and not is_known:
         source.warn("F007.video-repeated", n=most)
@@ -636,6 +732,7 @@ def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
     """Return the tracks of people, each with the rows of one or several dicts."""
     numbers = _numbers_of(source, [person for each in rows for person in each.persons])
     listed: dict[int, list[tuple[Track, Frames]]] = {}
+    genders: dict[int, dict[str, None]] = {}
     untracked: Counter[int] = Counter()
     for each in rows:
         own = np.zeros(len(each.frames), dtype=np.int64)
@@ -647,6 +744,9 @@ def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
         for number in np.unique(own).tolist():
             chosen = np.flatnonzero(own == number)
             part = each.track.selected(chosen)
+            genders.setdefault(number, {}).update(
+                dict.fromkeys(each.genders[row] for row in chosen.tolist())
+            )
             listed.setdefault(number, []).append((part, each.frames[chosen]))
     if untracked:
         source.warn("F007.record-untracked")
@@ -654,7 +754,10 @@ def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
     for number, parts in sorted(listed.items()):
         frames, first = first_rows(source, np.concatenate([own for _, own in parts]))
         whole = _joined([track for track, _ in parts]).selected(first)
-        people[number] = replace(whole, frames=frames)
+        said = [*filter(None, genders[number])]
+        if len(said) > 1:
+            source.warn("F007.motion-gender", found=", ".join(said))
+        people[number] = replace(whole, frames=frames, gender=said[0] if len(said) == 1 else "")
     return people
 
 
@@ -691,7 +794,6 @@ def _joined(tracks: list[Track]) -> Track:
         np.concatenate([track.vectors for track in tracks if track.vectors is not None]),
         np.concatenate([track.translations for track in tracks if track.translations is not None]),
         np.concatenate(shapes) if len(shapes) == len(tracks) else None,
-        gender=tracks[0].gender,
     )
 
 
@@ -707,6 +809,8 @@ def _track(one: _Found) -> Track:
             placed = within_reach(beside, key, rows(beside, key, (3,))[None])
         else:
             placed = places(beside, key, count)
+    if layout.scale is not None:
+        placed = placed / scale_in(layout.scale.archive, layout.scale.key)
     frames = np.arange(count)
     if layout.frames is not None:
         frames = frames_of(layout.frames.archive, layout.frames.key, count)
@@ -719,16 +823,21 @@ def _track(one: _Found) -> Track:
         vectors,
         placed,
         _coefficients(layout, count),
-        gender=_gender(layout.gender),
     )
 
 
-def _gender(value: _Value | None) -> str:
+def _genders(value: _Value | None, count: int) -> tuple[str, ...]:
+    """Return the gender of each row; empty if the file does not state it."""
     if value is None:
-        return ""
-    if value.item is None:
-        return gender_of(value.archive.plain_text(value.key))
-    return gender_of(str(_identities(value, 1)[0]))
+        return ("",) * count
+    found = value.archive.objects(value.key)
+    if value.item is not None:
+        items = found.values().tolist() if isinstance(found, Deferred) else found
+        found = items[value.item] if isinstance(items, list | tuple) else None
+    said = texts_in(found)
+    if len(said) == count:
+        return tuple(map(gender_of, said))
+    return (gender_in(found)[0],) * count
 
 
 def _coefficients(layout: _Layout, count: int) -> Floats | None:

@@ -20,7 +20,7 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._video_mocap.numbers import rows, six, vectors_of
 from viewer.rig.arrays import Floats
 
-__all__ = ["Form", "form_of", "rotation_vectors"]
+__all__ = ["Form", "form_of", "rotation_vectors", "shape_form"]
 
 _TITLES = {3: "rotation vectors", 6: "6D rotations", 9: "matrices"}
 
@@ -51,7 +51,11 @@ def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
     joints : tuple of int
         Possible numbers of joints.
     """
-    shape = archive.shape(key)
+    return shape_form(archive.shape(key), joints)
+
+
+def shape_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
+    """Return the form of an array of a shape; see ``form_of``."""
     sizes: tuple[int, ...] = ()
     lead: tuple[int, ...] = ()
     if shape[-2:] == (3, 3) and (len(shape) != 2 or joints == (1,)):
