@@ -339,3 +339,59 @@ def test_parameters_of_a_face_are_those_of_smplx(face: dict[str, Any], title: st
     parts = {"global_orient": np.zeros((3, 3)), "body_pose": np.zeros((3, 63)), **face}
     given = {**parts, "betas": np.ones(10), "camera_translation": np.zeros((3, 3))}
     assert facts_of(given)[1] == {title}
+
+
+def table_of(n_outer: int, n_inner: int, is_outer_frame: bool, **columns: Any) -> list[Any]:
+    """Return lists of bodies; ``columns``: functions of frame and person."""
+    found = []
+    for outer in range(n_outer):
+        found.append([])
+        for inner in range(n_inner):
+            frame, person = (outer, inner) if is_outer_frame else (inner, outer)
+            more = {key: of(frame, person) for key, of in columns.items()}
+            found[-1].append(body(frame, person, **more))
+    return found
+
+
+@pytest.mark.parametrize("is_outer_frame", [False, True])
+@pytest.mark.parametrize("n_outer", [2, 3])
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"id": lambda frame, person: 10 + person},
+        {"gender": lambda frame, person: ["female", "male", "neutral"][person]},
+        {"betas": lambda frame, person: np.full(10, 0.5 * person)},
+        # Shapes that the tool estimates in each frame
+        {"betas": lambda frame, person: np.full(10, 0.5 * person + 0.01 * (frame + person))},
+    ],
+)
+def test_axis_of_people_is_told_by_what_stays(columns, n_outer: int, is_outer_frame: bool) -> None:
+    given = table_of(n_outer, 5 - n_outer, is_outer_frame, **columns)
+    source = Source("a.pkl", joblib_file(given))
+    n_frames, n_people = (n_outer, 5 - n_outer) if is_outer_frame else (5 - n_outer, n_outer)
+    first = 10 if "id" in columns else 0
+    people = {first + person: [*range(n_frames)] for person in range(n_people)}
+    assert found_in(source)[0] == people
+    assert "F007.video-lists" not in [note.key for note in source.diagnostics]
+
+
+def test_axis_of_people_is_told_by_ids_of_people_who_come_and_go() -> None:
+    table = [[body(0, 0, id=4), body(0, 1, id=9), body(0, 2, id=7)],
+             [body(1, 1, id=9), body(1, 2, id=7), body(1, 0, id=4)]]  # fmt: skip
+    assert found_in(Source("a.pkl", joblib_file(table)))[0] == {4: [0, 1], 7: [0, 1], 9: [0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("step", "people", "frames"), [(0.02, 3, 2), (1.0, 2, 3)], ids=["places", "the longer list"]
+)
+def test_axis_of_people_that_nothing_states_is_said(step: float, people: int, frames: int) -> None:
+    # Two frames of three people who are a metre apart; steps as large tell nothing.
+    given = table_of(2, 3, True)
+    for row in given:
+        for one in row:
+            one["trans"] = one["trans"] * [step, 1.0, 1.0]
+    source = Source("a.pkl", joblib_file(given))
+    capture = open_results(source)
+    assert (len(next(iter(capture.parts())).bodies), capture.n_frames) == (people, frames)
+    (note,) = [note for note in source.diagnostics if note.key == "F007.video-lists"]
+    assert note.values == {"people": people, "frames": frames}

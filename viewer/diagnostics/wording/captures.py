@@ -107,6 +107,8 @@ MESSAGES = {
     "treated as present in every frame",
     "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
     "their order",
+    "F007.video-lists": "lists in a list: {people} people in {frames:#frame} assumed, because no "
+    "number tells the people apart; write one to each dict as person_id",
     "F007.video-same-frame": "{n:#row} ignored: the person is in an earlier row of the same frame",
     "F002.video-identity": "{item:text}: expected a number or a name for each person or frame, "
     "found {found}",

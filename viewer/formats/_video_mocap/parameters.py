@@ -26,7 +26,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -101,6 +101,9 @@ _COST = 20  # number of frames that take about as long to read as one dict takes
 _LOOKED_AT = 5000  # number of dicts of which at least one must be recognised
 # Maximum number of frames of a numbered dict: this many for every item, plus a constant.
 _MOST_HOLES, _FEW = 10, 1000
+_STEADIER = (
+    0.1  # ratio of variances of one person and of several; they have the same number of rows
+)
 _LISTED = 12  # maximum number of ignored keys that are listed
 
 
@@ -614,7 +617,7 @@ def _rows_of_frames(
     source: Source, found: list[_Found], tracks: list[Track]
 ) -> tuple[list[_Rows], tuple[int, ...]]:
     """Return the rows of dicts of single frames, and the first and last frame of their list."""
-    frames, persons, span = _on_timeline(source, found)
+    frames, persons, span = _on_timeline(source, found, tracks)
     is_known = all(one.layout.person is not None for one in found)
     rows: list[_Rows] = []
     seen: Counter[int] = Counter()
@@ -635,13 +638,12 @@ def _rows_of_frames(
 
 
 def _on_timeline(
-    source: Source, found: list[_Found]
+    source: Source, found: list[_Found], tracks: list[Track]
 ) -> tuple[list[int], list[int | None], tuple[int, ...]]:
     """Return the frame of each dict, its person if its place tells it, and the range of frames.
 
-    Frames have numbers in the dicts, or are the items of a list or dict. Of two lists or dicts, one
-    inside the other, the outer one has the frames, unless it is the shorter one or its keys are
-    people.
+    Frames have numbers in the dicts, or are the items of a list or dict. Of two of these, one in
+    the other, ``_level_of_people`` tells which.
     """
     depth = min(len(one.path) for one in found)
     levels = [
@@ -665,8 +667,7 @@ def _on_timeline(
         ]
         return keyed, persons, ()
     if len(levels) > 1 and not of_people:
-        sizes = [max(len(one.around[level].keys) for one in found) for level in levels[:2]]
-        of_people = [levels[0] if sizes[0] < sizes[1] else levels[1]]
+        of_people = [_level_of_people(source, found, tracks, levels[:2])]
     of_frames = next((level for level in levels if level not in of_people), None)
     others = [level for level in range(depth) if level != of_frames]
     names = [[_person_named(one.path[level]) for level in others] for one in found]
@@ -678,6 +679,80 @@ def _on_timeline(
         spans = frame_spans(np.array(missing))
         source.warn("F007.frames-empty", n=len(missing), frames=spans)
     return frames, persons, span
+
+
+def _level_of_people(
+    source: Source, found: list[_Found], tracks: list[Track], levels: Sequence[int]
+) -> int:
+    """Return which of two lists or dicts, one inside the other, has the people.
+
+    No identity occurs twice in a frame. Otherwise, it is the one whose items keep their gender or
+    shape in all items of the other one. Shapes that vary from frame to frame vary less than between
+    people, and so do places. A note says what was assumed if nothing but places, or the longer
+    list, tells it.
+    """
+    keys = {level: [one.path[level] for one in found] for level in levels}
+    persons = [_stated(one, one.layout.person) for one in found]
+    genders = [_genders(one.layout.gender, 1)[0] for one in found]
+    shapes = [None if one.shape is None else one.shape.tobytes() for one in tracks]
+    outer, inner = levels
+    if all(isinstance(one, str) or (one is not None and one >= 0) for one in persons):
+        is_once = [_most_repeated(keys[level], persons) == 1 for level in levels]
+        if any(is_once):
+            return inner if is_once[0] else outer
+    # Items of one dict each have the same values in any case.
+    is_table = all(len(set(keys[level])) < len(found) for level in levels)
+    for values in (genders, shapes) if is_table else ():
+        is_same = [_are_constant(keys[level], values) for level in levels]
+        if is_same[0] != is_same[1] and not {None, ""}.intersection(values):
+            return outer if is_same[0] else inner
+    by_shape = by_place = None
+    if is_table:
+        by_shape = _steadier_level(keys, [one.shape for one in tracks])
+        by_place = _steadier_level(keys, [one.translations for one in tracks])
+    if by_shape is not None:
+        return by_shape
+    sizes = {level: max(len(one.around[level].keys) for one in found) for level in levels}
+    chosen = by_place if by_place is not None else outer if sizes[outer] < sizes[inner] else inner
+    if min(sizes.values()) > 1:
+        other = outer if chosen == inner else inner
+        source.warn("F007.video-lists", people=sizes[chosen], frames=sizes[other])
+    return chosen
+
+
+def _stated(one: _Found, value: _Value | None) -> int | str | None:
+    return None if value is None else _identities(value, 1)[0]
+
+
+def _most_repeated(groups: Sequence[str], values: Sequence[object]) -> int:
+    """Return how often the most frequent value of any group occurs in it."""
+    return max(Counter(zip(groups, values, strict=True)).values())
+
+
+def _are_constant(groups: Sequence[str], values: Sequence[object]) -> bool:
+    """Return whether all values of a group are the same, but not those of all groups."""
+    pairs = set(zip(groups, values, strict=True))
+    return len(pairs) == len(set(groups)) and len(set(values)) > 1
+
+
+def _steadier_level(
+    keys: Mapping[int, Sequence[str]], values: Sequence[Floats | None]
+) -> int | None:
+    """Return the level within whose items values vary much less; None if neither is."""
+    rows = [value for value in values if value is not None and len(value) == 1]
+    if len(rows) < len(values) or len({row.shape for row in rows}) > 1:
+        return None
+    table = np.concatenate(rows)
+    spreads: dict[int, float] = {}
+    for level, groups in keys.items():
+        members = np.unique(np.array(groups), return_inverse=True)[1]
+        counts = np.bincount(members)[:, None]
+        means = np.stack([np.bincount(members, column) for column in table.T], axis=1) / counts
+        # The variance within items has a degree of freedom less for the mean of each item.
+        spreads[level] = float(((table - means[members]) ** 2).sum()) / (len(table) - len(counts))
+    low = min(spreads, key=spreads.__getitem__)
+    high = max(spreads, key=spreads.__getitem__)
+    return low if spreads[low] < _STEADIER * spreads[high] else None
 
 
 def _are_people(found: list[_Found], level: int) -> bool:
