@@ -493,3 +493,12 @@ def test_frame_rate_of_other_datasets_is_read(tmp_path, key):
     motion, warnings = motion_of(saved(tmp_path / "a.npz", **arrays))
     assert motion.timing.frame_rate == 50.0
     assert warnings == []
+
+
+def test_errors_in_json_name_the_line(tmp_path):
+    path = tmp_path / "a.json"
+    poses = json.dumps([[0.0] * 72] * 2)
+    path.write_text('{"poses": ' + poses + ',\n"fps": 30,\n"trans": [[0, 0, 0]]}')
+    with pytest.raises(FormatError) as caught:
+        amass.read(Source.open(path))
+    assert (caught.value.diagnostic.key, caught.value.line) == ("F002.motion-frames", 3)

@@ -395,3 +395,21 @@ def test_axis_of_people_that_nothing_states_is_said(step: float, people: int, fr
     assert (len(next(iter(capture.parts())).bodies), capture.n_frames) == (people, frames)
     (note,) = [note for note in source.diagnostics if note.key == "F007.video-lists"]
     assert note.values == {"people": people, "frames": frames}
+
+
+@pytest.mark.parametrize(
+    ("changes", "line", "item"),
+    [
+        ({"betas": [1.0, float("nan")]}, 6, "people.0.betas"),
+        ({"track_id": [1, {}, 3]}, 6, "people.0.track_id"),
+        ({"smpl_scaling": 0.0}, 6, "people.0.smpl_scaling"),
+    ],
+)
+def test_errors_in_json_name_the_line(changes: dict[str, Any], line: int, item: str) -> None:
+    members = {**plain(stacked(ALONE)), **changes}
+    rows = ",\n".join(f"{json.dumps(key)}: {json.dumps(value)}" for key, value in members.items())
+    text = '{"fps": 30,\n"people": [\n{\n' + rows + "\n}]}"
+    with pytest.raises(FormatError) as caught:
+        open_results(Source("a.json", text.encode()))
+    assert caught.value.diagnostic is not None
+    assert (caught.value.diagnostic.line, caught.value.diagnostic.values["item"]) == (line, item)

@@ -127,7 +127,7 @@ def _open_member(source: Source, key: str, data: bytes) -> Archive | None:
 
     machine = Machine(source, data)
     machine.load_bytes = read_bytes
-    return nested_archive(source, "npz", len(data), run(machine), f"{key}.")
+    return nested_archive(source, "npz", len(data), run(machine), (key,))
 
 
 def _list_member(source: Source, key: str, data: bytes) -> Value:

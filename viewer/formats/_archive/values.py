@@ -20,6 +20,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.half_floats import in_double, widened
 from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
+from viewer.formats._text.json_places import Keys, nearest_place
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
@@ -178,6 +179,8 @@ class Archive:
         for other values.
     is_list : bool
         Whether the values are the items of a list, called "0", "1" …
+    path : tuple of str and int
+        Keys and indices that lead to it, from which errors in JSON files find their line.
     """
 
     def __init__(
@@ -190,9 +193,10 @@ class Archive:
         label: str = "",
         objects: Callable[[str], Value] | None = None,
         is_list: bool = False,
+        path: Keys = (),
     ) -> None:
         self.source, self.kind, self.keys = source, kind, keys
-        self.label, self.is_list = label, is_list
+        self.label, self.is_list, self.path = label, is_list, path
         self._load, self._branch, self._objects = load, branch, objects
         self._values: dict[str, Value] = {}
         self._arrays: dict[str, Deferred | None] = {}
@@ -345,8 +349,8 @@ class Archive:
         **values: Any,
     ) -> None:
         """Record an error in the value called ``item``; see ``Source.refuse``."""
-        item = printable(self.label + item, 60)
-        self.source.refuse(key, None, count, part, places, item=item, **values)
+        offset, item = self._offset(item), printable(self.label + item, 60)
+        self.source.refuse(key, offset, count, part, places, item=item, **values)
 
     def leave_gap(self, key: str, *, item: str, **values: Any) -> None:
         """Record an error in frames of ``item``, which become gaps; only the first is reported."""
@@ -355,7 +359,16 @@ class Archive:
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
         """Return the exception for an error in the value called ``item``; see ``Source.fault``."""
-        return self.source.fault(key, item=printable(self.label + item, 60), **values)
+        offset, item = self._offset(item), printable(self.label + item, 60)
+        return self.source.fault(key, offset, item=item, **values)
+
+    def _offset(self, item: str) -> int | None:
+        """Return the offset of a value in a JSON file, or of the dict that lacks it."""
+        if self.kind != "json":
+            return None
+        text = self.source.data.decode("utf-8", "replace")
+        place = nearest_place(text, (*self.path, int(item) if self.is_list else item))
+        return None if place is None else len(text[:place].encode())
 
 
 def texts_in(value: Value) -> list[str]:

@@ -25,6 +25,7 @@ from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.resolving import resolve
 from viewer.formats._pickle.values import Array, noun
 from viewer.formats._source import Source
+from viewer.formats._text.json_places import Keys
 from viewer.phrases import printable
 
 __all__ = ["has_names", "listed", "named_archive", "nested_archive", "warn_of_rest"]
@@ -58,22 +59,21 @@ def named_archive(source: Source, kind: str, size: int, whole: object) -> Archiv
     """
     found = _objects(whole)
     is_list = not isinstance(found, dict)
-    return _archive(source, kind, size, _named(source, found), "", is_list)
+    return _archive(source, kind, size, _named(source, found), (), is_list)
 
 
 def nested_archive(
-    source: Source, kind: str, size: int, whole: object, label: str
+    source: Source, kind: str, size: int, whole: object, path: Keys
 ) -> Archive | None:
     """Return the values that a pickle inside an archive builds; None if they have no names.
 
-    ``label`` is the path of the pickle in the archive, for messages: ``"results."``; for the
-    others, see ``named_archive``.
+    ``path`` has the keys and indices that lead to it; for the others, see ``named_archive``.
     """
     found = _items(_objects(whole))
     if found is None:
         return None
     is_list = not isinstance(_objects(whole), dict)
-    return _archive(source, kind, size, _strings(source, found), label, is_list)
+    return _archive(source, kind, size, _strings(source, found), path, is_list)
 
 
 def listed(source: Source, size: int, key: str, whole: object) -> Value:
@@ -105,21 +105,23 @@ def _archive(
     kind: str,
     size: int,
     values: dict[str, object],
-    label: str,
+    path: Keys,
     is_list: bool,
 ) -> Archive:
-    path = source.path
+    label = "".join(f"{key}." for key in path)
 
     def load(key: str) -> Value:
-        return resolve(path, size, label + key, values[key])
+        return resolve(source.path, size, label + key, values[key])
 
     def branch(key: str) -> Archive | None:
-        return nested_archive(source, kind, size, values[key], f"{label}{key}.")
+        inner = (*path, int(key) if is_list else key)
+        return nested_archive(source, kind, size, values[key], inner)
 
     def objects(key: str) -> Value:
         return listed(source, size, label + key, values[key])
 
-    return Archive(source, kind, tuple(values), load, branch, label, objects, is_list)
+    keys = tuple(values)
+    return Archive(source, kind, keys, load, branch, label, objects, is_list, path)
 
 
 def _items(value: object) -> Mapping[str | bytes | int, object] | None:
