@@ -93,5 +93,5 @@ def test_info_lists_all_animations_without_reading_their_keys():
     assert found[0]["range"] == [0.5, 2.5]
     assert animation_lines(found) == [
         "  animations 1  wave: 0.5 to 2.5 s",
-        "             2* bow: 0 to 0.208333 s",
+        "             2* bow: 0 to 0.208 s",
     ]
