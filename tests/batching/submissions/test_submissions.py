@@ -148,7 +148,7 @@ def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch) ->
         f": expected a compression ratio of at most 100, found {found} bytes in {size}"
     )
     monkeypatch.setattr(unpacking, "MOST_BYTES", 1000)
-    assert refusal(path) == f": expected at most 1000 bytes of files, found {found}"
+    assert refusal(path) == f": expected at most 1,000 bytes of files, found {found:,}"
     monkeypatch.setattr(unpacking, "MOST_FILES", 1)
     assert refusal(path) == ": expected at most 1 file, found 2"
 
