@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from PIL import Image
 
 import viewer.app
-from viewer.app.closing.state import Closing
+from viewer.app.closing import Closing
 from viewer.app.features import KEYS
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from viewer.app.features import KEYS, MOUSE
 from viewer.app.keys import Keyboard
-from viewer.app.keys_list import column_layout
+from viewer.app.overlays import column_layout
 
 N_LINES = len(KEYS) + len(MOUSE)
 

@@ -6,7 +6,7 @@ import pytest
 from formats.capture_files import body, write_frames
 
 from viewer.app.curves.clip_actions import ask_for_clip, new_clip
-from viewer.app.files.motion_dialog import ask_for_motion
+from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.recording.record_dialog import ask_where
 from viewer.app.recording.state import KINDS, RecordSettings

@@ -7,8 +7,8 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app import theme
-from viewer.app.curves import plotted_keys
-from viewer.app.manual.manual_window import Manual
+from viewer.app.curves import plot as plotted_keys
+from viewer.app.manual import Manual
 from viewer.rendering.overlay.typeface import interface_font
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from viewer.app.closing.questions import keep_open, question_of
-from viewer.app.closing.state import Closing
+from viewer.app.closing import Closing, keep_open, question_of
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
 from viewer.app.linting.state import Linting
-from viewer.app.manual.manual_window import Manual
+from viewer.app.manual import Manual
 from viewer.app.posing.tool_actions import cancel_drag
 from viewer.app.preferences.preferences_window import close_preferences
 from viewer.app.preferences.state import Appearance
-from viewer.app.recording.state import Recording
+from viewer.app.recording.state import RecordingState
 from viewer.app.rigging.tools import drop_rig_tool
 from viewer.app.weights.actions import unpin
 from viewer.app.weights.state import Weights
@@ -23,7 +22,7 @@ __all__ = ["cancel"]
 def cancel(state: AppState) -> None:
     """Close the topmost message, dialog or key list; otherwise clear the selection."""
     files = state.of(Files)
-    recording = state.of(Recording)
+    recording = state.of(RecordingState)
     keyboard = state.of(Keyboard)
     linting = state.of(Linting)
     manual = state.of(Manual)

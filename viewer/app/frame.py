@@ -10,9 +10,13 @@ import moderngl
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import follow_actor, stop_following
-from viewer.app.closing.question_window import draw_question
-from viewer.app.closing.questions import advance_closing, may_replace_scene, request_quit
-from viewer.app.closing.state import Closing
+from viewer.app.closing import (
+    Closing,
+    advance_closing,
+    draw_question,
+    may_replace_scene,
+    request_quit,
+)
 from viewer.app.context.context_menu import answer_right_click, draw_context_menu
 from viewer.app.core.edited_animations import Animations, keep_edited
 from viewer.app.core.fitting import keep_fitting
@@ -34,19 +38,19 @@ from viewer.app.overlays import draw_hints
 from viewer.app.pace import Pace, Step
 from viewer.app.palette.palette_window import draw_palette
 from viewer.app.picture_key import PictureKeys
-from viewer.app.posing.gizmo_drawing import draw_gizmo
+from viewer.app.posing.gizmo import draw_gizmo
 from viewer.app.posing.shape_guard import drop_unreadable_shapes
 from viewer.app.preferences.applying import follow_preferences
 from viewer.app.preferences.state import Preferences
 from viewer.app.recording.preview import Preview
 from viewer.app.recording.record_dialog import draw_record_dialog
-from viewer.app.recording.starting import start_recording
+from viewer.app.recording.recording_steps import start_recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.screenshot import save_screenshot
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
 from viewer.app.view.hovering import draw_hovered_name, hover_joint
-from viewer.app.view.outline_layer import OutlineLayer
+from viewer.app.view.outlines import OutlineLayer
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError

@@ -7,7 +7,7 @@ from dataclasses import field
 
 from imgui_bundle import imgui
 
-from viewer.app.closing.questions import question_of
+from viewer.app.closing import question_of
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.state import Files

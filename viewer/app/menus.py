@@ -23,12 +23,12 @@ from viewer.app.features import PANELS
 from viewer.app.files.export_formats import N_ROWS, draw_pose_formats, pose_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.model_menu import draw_model_menu
-from viewer.app.files.motion_dialog import ask_for_motion
+from viewer.app.files.motion_export import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
 from viewer.app.layout import toggle_panel
 from viewer.app.linting.actions import check_rig
-from viewer.app.manual.manual_window import draw_manual_menu
+from viewer.app.manual import draw_manual_menu
 from viewer.app.palette.palette_window import toggle_palette
 from viewer.app.posing.pose_actions import (
     ask_for_pose,

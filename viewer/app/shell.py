@@ -17,8 +17,10 @@ from imgui_bundle import imgui, implot  # noqa: E402
 from viewer.app.display_loss import stop_watching  # noqa: E402
 from viewer.app.files.recent import load_layout, save_layout  # noqa: E402
 from viewer.app.preferences.applying import chosen_scale  # noqa: E402
-from viewer.app.preferences.state import Appearance  # noqa: E402
-from viewer.app.preferences.storage import load_preferences  # noqa: E402
+from viewer.app.preferences.state import (  # noqa: E402
+    Appearance,
+    load_preferences,
+)
 from viewer.app.preferences.system_theme import system_theme  # noqa: E402
 from viewer.app.theme import apply_theme  # noqa: E402
 from viewer.app.typed_keys import TypedKeys, end_frame, end_frame_before  # noqa: E402

@@ -15,8 +15,10 @@ glfw = import_glfw()
 
 from imgui_bundle import imgui  # noqa: E402  after glfw, whose library imgui-bundle chooses
 
-from viewer.app.closing.questions import request_quit  # noqa: E402
-from viewer.app.closing.state import Closing  # noqa: E402
+from viewer.app.closing import (  # noqa: E402
+    Closing,
+    request_quit,
+)
 from viewer.app.core.jobs import FrameJob  # noqa: E402
 from viewer.app.core.state import AppState  # noqa: E402
 from viewer.app.display_loss import stop_watching  # noqa: E402
@@ -31,7 +33,7 @@ from viewer.app.files.recent import (  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.layout import Layout  # noqa: E402
 from viewer.app.preferences.applying import start_with  # noqa: E402
-from viewer.app.preferences.storage import load_preferences  # noqa: E402
+from viewer.app.preferences.state import load_preferences  # noqa: E402
 from viewer.app.shell import Shell, create_context, create_window  # noqa: E402
 from viewer.app.theme import add_system_fonts  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402

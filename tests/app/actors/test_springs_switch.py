@@ -5,7 +5,7 @@ from formats.vrm.swinging import swinging
 from numpy.testing import assert_allclose
 
 import viewer
-from viewer.app.actors.springs import no_springs
+from viewer.app.actors.actors_panel import no_springs
 from viewer.app.files.motion_export import save_motion
 from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actor

@@ -15,15 +15,13 @@ from PIL import Image
 from rig.animated import animated_leg
 
 import viewer
-from viewer.app.closing.questions import request_quit
-from viewer.app.closing.state import Closing
-from viewer.app.closing.unsaved import unsaved_edits
+from viewer.app.closing import Closing, request_quit, unsaved_edits
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.files.motion_export import save_motion
 from viewer.app.files.saving import save_in_background
 from viewer.app.files.state import Files
 from viewer.app.playback.animations import choose_animation
-from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.recording.state import RecordingState, RecordSettings
 from viewer.app.retargeting.match_actions import (
     ask_where_to_save,
     match_automatically,
@@ -166,8 +164,10 @@ def test_window_stays_open_if_the_export_is_cancelled_or_fails(exporting, tmp_pa
 
 
 def test_quitting_during_a_recording_asks_too(curves, tmp_path):
-    curves.state.of(Recording).settings = RecordSettings(kind=".gif", size="own", own_size=(16, 16))
-    curves.state.of(Recording).wanted = tmp_path / "a.gif"
+    curves.state.of(RecordingState).settings = RecordSettings(
+        kind=".gif", size="own", own_size=(16, 16)
+    )
+    curves.state.of(RecordingState).wanted = tmp_path / "a.gif"
     curves.step()
     curves.key("q", "ctrl")
     assert asks(curves, "Cancel recording and quit") and not is_over(curves)

@@ -7,8 +7,7 @@ import pytest
 from imgui_bundle import imgui
 from PIL import Image
 
-from viewer.app.closing.state import Closing
-from viewer.app.closing.unsaved import unsaved_edits
+from viewer.app.closing import Closing, unsaved_edits
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.files.motion_export import save_motion
 from viewer.app.files.state import Files

@@ -9,7 +9,7 @@ import pytest
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
-from viewer.app.core.spaces import switch_space
+from viewer.app.actors.actors_panel import switch_space
 from viewer.errors import RigError
 from viewer.loading import assembly
 from viewer.loading.cleaning import CleanUp, clean_up

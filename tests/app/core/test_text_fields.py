@@ -7,7 +7,7 @@ import math
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app.core.typed_numbers import read_number
+from viewer.app.core.text_fields import read_number
 from viewer.app.files.state import Files
 
 

@@ -20,10 +20,10 @@ from viewer.app.curves.editing import (
     delete_chosen,
     extrapolate,
     place_key,
-    set_clip_range,
+    set_playback_range,
 )
 from viewer.app.curves.state import Curves
-from viewer.app.playback.frame_rate import set_rate
+from viewer.app.playback.timeline_panel import set_rate
 from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene
@@ -174,7 +174,7 @@ def test_undo_of_a_new_clip_and_of_keys_in_it(drive, rig):
 
 def test_undo_of_a_shorter_range_restores_the_time(curves):
     go(curves, 1.75)
-    set_clip_range(curves.state, 0.0, 1.0)
+    set_playback_range(curves.state, 0.0, 1.0)
     curves.step(3)
     assert curves.state.clock.time <= 1.75
     curves.key("z", "ctrl")

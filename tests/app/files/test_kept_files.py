@@ -18,8 +18,12 @@ from viewer.app.files.recent import (
     save_layout,
     state_folder,
 )
-from viewer.app.preferences.state import Preferences
-from viewer.app.preferences.storage import load_preferences, preferences_file, save_preferences
+from viewer.app.preferences.state import (
+    Preferences,
+    load_preferences,
+    preferences_file,
+    save_preferences,
+)
 from viewer.media.kept_files import checked
 
 # As ImGui writes it; the ids of docks must fit together.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app.manual.manual_window import Manual
+from viewer.app.manual import Manual
 from viewer.manual import PAGES
 
 

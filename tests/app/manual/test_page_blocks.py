@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.app.manual.blocks import Block, blocks_of
+from viewer.app.manual import Block, blocks_of
 from viewer.manual import PAGES, page_text
 
 

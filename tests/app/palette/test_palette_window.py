@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app.palette.entries import entries
-from viewer.app.palette.palette_window import Palette
+from viewer.app.palette.palette_window import Palette, entries
 from viewer.app.shown_panels import is_open
 
 

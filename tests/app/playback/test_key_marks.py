@@ -5,7 +5,7 @@ from app.captured import people
 from numpy.testing import assert_array_equal
 from rig.animated import animated_leg, wave
 
-from viewer.app.playback.key_marks import key_times
+from viewer.app.playback.tracks import key_times
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor
 

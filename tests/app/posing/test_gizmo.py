@@ -8,7 +8,7 @@ from app.posing_rigs import SIZE, arm_figure, arm_scene, around, drag_along, joi
 from app.tiny import write_rig
 from numpy.testing import assert_allclose, assert_array_equal
 
-from viewer.app.closing.state import Closing
+from viewer.app.closing import Closing
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.posing.rotate_tool import RADIUS

@@ -10,8 +10,8 @@ import pytest
 from app.tiny import FILE_POSE, LABELS, chain, comb
 
 from viewer.app.keys import Keyboard
-from viewer.app.posing.joint_rows import joint_rows
 from viewer.app.posing.joint_tree import joint_tree
+from viewer.app.posing.joints_panel import joint_rows
 
 SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
 

@@ -7,7 +7,7 @@ import pytest
 from app.posing_rigs import arm_figure
 from numpy.testing import assert_allclose
 
-from viewer.app.posing.limit_arcs import arc_points, limit_arcs
+from viewer.app.posing.gizmo import arc_points, limit_arcs
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.geometry.vectors import unit

@@ -13,8 +13,13 @@ from viewer.app.features import KEYS
 from viewer.app.files.model_folder import set_model_folder
 from viewer.app.preferences import preferences_window
 from viewer.app.preferences.key_map import chord_name, conflicts, parse_chord
-from viewer.app.preferences.state import Appearance, Preferences
-from viewer.app.preferences.storage import load_preferences, preferences_file, save_preferences
+from viewer.app.preferences.state import (
+    Appearance,
+    Preferences,
+    load_preferences,
+    preferences_file,
+    save_preferences,
+)
 from viewer.phrases import printable
 
 WIREFRAME = next(key.name for key in KEYS if key.label == "W")

@@ -9,9 +9,13 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from viewer.app.files.state import Files
-from viewer.app.recording.recorded_frames import playback_frames, recorded_times
-from viewer.app.recording.recorded_marks import RecordedMarks
-from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.recording.recording_steps import RecordedMarks
+from viewer.app.recording.state import (
+    RecordingState,
+    RecordSettings,
+    playback_frames,
+    recorded_times,
+)
 from viewer.app.weights.actions import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
@@ -30,8 +34,8 @@ def moving(drive, rig):
 
 
 def start(hand, path, **settings):
-    hand.state.of(Recording).settings = RecordSettings(**settings)
-    hand.state.of(Recording).wanted = path
+    hand.state.of(RecordingState).settings = RecordSettings(**settings)
+    hand.state.of(RecordingState).wanted = path
     hand.step(1)
 
 
@@ -56,12 +60,12 @@ def test_menu_opens_the_dialog_and_escape_closes_it(moving):
     moving.key("escape")
     moving.key("escape")
     moving.step(2)
-    assert moving.state.of(Recording).settings is None
+    assert moving.state.of(RecordingState).settings is None
 
 
 def test_typed_suffix_selects_the_video_format(moving, tmp_path):
     settings = RecordSettings(size="own", own_size=(64, 64), rate=5.0)
-    moving.state.of(Recording).settings = settings
+    moving.state.of(RecordingState).settings = settings
     moving.step(2)
     moving.click("Save as…")
     moving.step(2)
@@ -76,13 +80,13 @@ def test_typed_suffix_selects_the_video_format(moving, tmp_path):
 def test_preview_is_kept_as_long_as_the_panels_show_it(moving):
     moving.menu("menu File", "Record pictures or video…")
     moving.screen()
-    moving.state.of(Recording).settings.size = "1080x1920"
+    moving.state.of(RecordingState).settings.size = "1080x1920"
     moving.screen()
     for is_down in (True, False):
         moving.io.add_key_event(imgui.Key.escape, is_down)
         moving.step()
         moving.app.pixels()
-    assert moving.state.of(Recording).settings is None
+    assert moving.state.of(RecordingState).settings is None
     assert moving.app.context.error == "GL_NO_ERROR"
 
 
@@ -155,7 +159,7 @@ def test_annotations_follow_the_pose_of_each_frame(moving):
 
 
 def test_dialog_offers_the_legend_only_if_there_is_one(moving):
-    moving.state.of(Recording).settings = RecordSettings()
+    moving.state.of(RecordingState).settings = RecordSettings()
     moving.step(2)
     moving.click("Legend in pictures")
     assert not moving.state.options.legend

@@ -18,8 +18,7 @@ from viewer.app.core.undo_actions import undo
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
 from viewer.app.retargeting import drive_changes
-from viewer.app.retargeting.drive_changes import no_edit
-from viewer.app.retargeting.feet import plants_feet, toggle_feet
+from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
 from viewer.formats import Source, read
 from viewer.loading import bundled_body
 from viewer.loading.capturing import Builder

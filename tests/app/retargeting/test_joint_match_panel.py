@@ -16,6 +16,7 @@ from viewer.app.core.undo_actions import redo, undo
 from viewer.app.files.state import Files
 from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit
+from viewer.app.retargeting.joint_match_panel import JointMatch, shown_match
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
     ask_where_to_save,
@@ -23,7 +24,6 @@ from viewer.app.retargeting.match_actions import (
     match_automatically,
     match_joint,
 )
-from viewer.app.retargeting.state import JointMatch, shown_match
 from viewer.formats import Source
 from viewer.formats._text.joint_map import read_joint_map
 from viewer.rig.retargeting.driven_clip import driven_clip

@@ -24,8 +24,8 @@ from viewer.app.rigging.placing import (
 )
 from viewer.app.rigging.sources import current_template, target_mesh
 from viewer.app.rigging.state import Rigging
-from viewer.app.rigging.steps import align_template
-from viewer.app.rigging.template_gizmo import RADIUS
+from viewer.app.rigging.tools import RADIUS
+from viewer.app.rigging.work import align_template
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import bounding_box
 

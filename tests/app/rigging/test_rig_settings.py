@@ -18,15 +18,12 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 import viewer
-from viewer.app.closing.questions import request_quit
-from viewer.app.closing.state import Closing
-from viewer.app.closing.unsaved import unsaved_edits
+from viewer.app.closing import Closing, request_quit, unsaved_edits
 from viewer.app.files.state import Files
 from viewer.app.rigging.placing import placing_now
 from viewer.app.rigging.sources import target_mesh, targets, template_texts, templates
 from viewer.app.rigging.state import Rigging
-from viewer.app.rigging.steps import align_template
-from viewer.app.rigging.work import start_adding, start_reading
+from viewer.app.rigging.work import align_template, start_adding, start_reading
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.export import export
 from viewer.formats.rigged import save

@@ -6,7 +6,7 @@ import numpy as np
 from app.tiny import write_rig
 
 import viewer
-from viewer.app.rigging.trial_motion import trial_clip
+from viewer.app.rigging.results import trial_clip
 from viewer.rig.motion.clip_sampling import sample
 
 

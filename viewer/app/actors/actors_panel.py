@@ -5,28 +5,26 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
-from viewer.app.actors.springs import toggle_springs
+from viewer.app.core.calibrated import look_through_view
 from viewer.app.core.fields import begin_field, drag_float, in_row
-from viewer.app.core.spaces import draw_space
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
     checkbox,
+    choice,
     explain,
     note_item,
     plain_zero,
     same_line_if_room,
 )
-from viewer.app.retargeting.drive_changes import no_edit
-from viewer.app.retargeting.feet import plants_feet, toggle_feet
+from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
+from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
-from viewer.rig.motion.spring_motion import has_springs
+from viewer.rig.motion.spring_motion import has_springs, release_springs, springs_for
 from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor
-
-__all__ = ["draw"]
 
 _PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without their own colour
 _LONGEST_WINDOW = 1e4  # maximum extent of a motion path, seconds
@@ -38,7 +36,7 @@ _LOOK = (
 def draw(state: AppState) -> None:
     """Draw the panel."""
     _draw_list(state)
-    draw_space(state)
+    _draw_space(state)
     actor = state.actor
     imgui.separator()
     _draw_place(state, actor)
@@ -194,3 +192,89 @@ def _draw_fit(state: AppState, actor: Actor) -> None:
             imgui.text_unformatted(f"{factor * distance:8.1f} {unit}  {printable(name, 40)}")
         imgui.tree_pop()
     note_item(state, "fit")
+
+
+def no_springs(state: AppState) -> str:
+    """Return the reason why springs cannot be switched; empty if they can."""
+    return "" if has_springs(state.actor) else f"{state.actor.name} has no spring joints"
+
+
+def toggle_springs(state: AppState) -> None:
+    """Switch the simulation of the chosen actor's springs on or off, and pose it again."""
+    actor = state.actor
+    if not has_springs(actor):
+        state.say_status(no_springs(state))
+        return
+    if actor.springs is None:
+        actor.springs = springs_for(actor, state.scene.up)
+    else:
+        actor.springs = None
+        release_springs(actor)
+    state.clock.pose(actor, again=True)
+    state.say_status(f"Springs: {'off' if actor.springs is None else 'on'}")
+
+
+_SPACES = {"world": "World", "camera": "Camera"}
+
+
+def _draw_space(state: AppState) -> None:
+    """Draw the choice of the space if the files of the people contain both."""
+    if state.scene.in_space is None:
+        return
+    chosen = choice(state, "Space", state.scene.space, _SPACES)
+    explain(
+        "space of the people: the world, or the camera that filmed them; switching discards edits"
+    )
+    if chosen != state.scene.space:
+        switch_space(state, chosen)
+
+
+def switch_space(state: AppState, space: str) -> None:
+    """Show the people in another space; keep time, selection, appearance and calibrated camera.
+
+    The people are read again, so edits of their motions and the undo history are discarded.
+    """
+    old = state.scene
+    if old.in_space is None:
+        return
+    try:
+        scene = old.in_space(space)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    for actor in scene.actors:
+        _dress(actor, old.actors)
+    time, chosen, joint = state.clock.time, state.actor, state.selected_joint
+    was_selected, mode, speed = state.is_actor_selected, state.clock.mode, state.clock.speed
+    is_playing, fixed = state.clock.playing, state.camera.fixed
+    state.show_scene(scene, state.paths)
+    state.clock.seek(time)
+    state.clock.mode, state.clock.speed, state.clock.playing = mode, speed, is_playing
+    index = next((i for i, a in enumerate(scene.actors) if _is_same(a, chosen)), 0)
+    state.choose_actor(index)
+    state.is_actor_selected, state.selected_joint = was_selected, joint
+    state.clock.pose(state.actor, again=True)
+    view = next((v for v in scene.views if fixed is not None and v.name == fixed.name), None)
+    if view is not None:
+        look_through_view(state, view)
+        state.framing.is_fitting = False
+
+
+def _is_same(actor: Actor, other: Actor) -> bool:
+    """Return whether two actors are the same person or figure of the same files."""
+    is_point = actor.figure.points is None
+    return (actor.person, actor.title, is_point) == (
+        other.person,
+        other.title,
+        other.figure.points is None,
+    )
+
+
+def _dress(actor: Actor, others: list[Actor]) -> None:
+    """Give an actor the appearance that it had in the other space."""
+    for other in others:
+        if _is_same(actor, other):
+            actor.color, actor.visible, actor.opacity = other.color, other.visible, other.opacity
+            actor.hidden_parts = other.hidden_parts
+            actor.offset = other.offset
+            return

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.actors.part_actions import (
-    isolate_part,
-    part_label,
-    set_part_shown,
-    show_all_parts,
-)
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item, same_line_if_room
 from viewer.phrases import printable
 from viewer.rig.scene import Actor
-
-__all__ = ["draw"]
 
 _LONGEST = 60  # maximum length of a name in characters
 
@@ -59,3 +51,28 @@ def _draw_part(state: AppState, actor: Actor, part: int) -> None:
         note_item(state, "Show all parts")
         imgui.end_popup()
     imgui.pop_id()
+
+
+def part_label(actor: Actor, part: int) -> str:
+    """Return a part's name or number, followed by its view if it is drawn in only one."""
+    mesh = actor.figure.require_mesh()
+    view = mesh.part_views[part] if mesh.part_views else "both"
+    note = f" ({view.replace('-', ' ')} only)" if view.endswith("person") else ""
+    return (mesh.parts[part] or f"part {part}") + note
+
+
+def set_part_shown(actor: Actor, part: int, shown: bool) -> None:
+    """Show or hide one part of an actor."""
+    one = frozenset({part})
+    actor.hidden_parts = actor.hidden_parts - one if shown else actor.hidden_parts | one
+
+
+def isolate_part(actor: Actor, part: int) -> None:
+    """Hide all other parts of an actor."""
+    count = len(actor.figure.require_mesh().parts)
+    actor.hidden_parts = frozenset(range(count)) - {part}
+
+
+def show_all_parts(state: AppState) -> None:
+    """Show all parts of the chosen actor."""
+    state.actor.hidden_parts = frozenset()

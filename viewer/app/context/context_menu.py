@@ -7,7 +7,7 @@ from functools import partial
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
-from viewer.app.actors.part_actions import isolate_part, part_label, set_part_shown
+from viewer.app.actors.parts_panel import isolate_part, part_label, set_part_shown
 from viewer.app.core.reasons import no_pose, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, menu_item

@@ -13,8 +13,7 @@ from typing import TypeVar
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.text_fields import is_typed_in_place, number_field
-from viewer.app.core.typed_numbers import unit_of
+from viewer.app.core.text_fields import is_typed_in_place, number_field, unit_of
 from viewer.rig.number_text import number_text
 
 __all__ = [

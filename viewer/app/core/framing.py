@@ -2,14 +2,151 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
 
-from viewer.app.core.motion_extent import MotionExtent
+import numpy as np
+
+from viewer.app.core.clock import Clock
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
+from viewer.rendering.framing import frames_looked_at, outermost
+from viewer.rendering.recorder import copied
 from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box
+from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, Scene, scene_points
 
-__all__ = ["Framing"]
+
+@dataclass(slots=True)
+class _MotionExtent:
+    """Outermost points of a scene in sampled frames of its motion, or in its initial pose.
+
+    A capture is sampled while it is being read: the step between sampled frames doubles whenever
+    there are too many. Once reading is complete, the same frames are sampled as for a recording.
+
+    Attributes
+    ----------
+    is_done : bool
+        Whether all frames have been sampled.
+    was_edited : bool
+        Whether a shape or a motion has been edited since the scene was opened.
+    """
+
+    is_done: bool = False
+    was_edited: bool = False
+    _clouds: dict[float, Floats] = field(default_factory=dict)  # points by time in seconds
+    _kept: dict[float, Floats] = field(default_factory=dict)  # samples taken before an edit
+    _shapes: tuple[bytes, ...] = ()
+    _motions: tuple[object, ...] = ()
+    _opened: dict[int, tuple[Actor, Figure, Pose]] = field(default_factory=dict)
+    _grew: bool = False
+    _is_another: bool = False  # whether another motion has been chosen since the last sample
+
+    def restart(self) -> None:
+        """Start over, for other figures or other poses."""
+        self.is_done = self.was_edited = self._grew = False
+        self._clouds, self._kept, self._opened = {}, {}, {}
+        self._shapes, self._motions = (), ()
+
+    def note_choice(self) -> None:
+        """Record that another motion has been chosen, which is not an edit."""
+        self._is_another = True
+
+    @property
+    def points(self) -> Floats:
+        """Points found: (N, 3), scene space; the origin if all actors were absent."""
+        clouds = [cloud for cloud in {**self._kept, **self._clouds}.values() if len(cloud)]
+        return np.concatenate(clouds) if clouds else np.zeros((1, 3))
+
+    @property
+    def box(self) -> Floats:
+        """Bounding box of the points: (2, 3)."""
+        return bounding_box(self.points)
+
+    def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
+        """Sample a few more frames; return whether there were any left.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that is shown; it is not modified.
+        clock : Clock
+            Source of the times of frames.
+        show : str
+            Visible parts of the figures, a key of ``SHOWN``.
+        grows : bool
+            Whether more of the motion is still being read.
+        """
+        shapes = tuple(map(_own_shape, scene.actors))
+        motions = tuple(map(_own_motion, scene.actors))
+        is_edited = shapes[: len(self._shapes)] != self._shapes
+        if not grows and not self._grew:  # growing motions are not edits
+            is_edited |= motions[: len(self._motions)] != self._motions
+        if is_edited or (self._grew and not grows):
+            # Frames are sampled again after an edit, and once reading is complete.
+            self._kept, self._clouds = {**self._kept, **self._clouds}, {}
+        self.was_edited |= is_edited and not self._is_another
+        self._is_another = False
+        self._shapes, self._motions, self._grew = shapes, motions, grows
+        self._keep_poses(scene)
+        left = self._left(scene, clock, grows)
+        self.is_done = not left and not grows
+        n_points = max(_n_points(scene), 1)
+        for time in left[: max(_POINTS_A_TIME // n_points, 1)]:
+            self._clouds[time] = self._cloud(scene, clock, time, show)
+            self._kept.pop(time, None)
+        return bool(left)
+
+    def _keep_poses(self, scene: Scene) -> None:
+        """Remember each actor's initial pose, so that editing a pose does not move the ground."""
+        for actor in scene.actors:
+            known = self._opened.get(id(actor))
+            if actor.pose is not None and (known is None or known[1] is not actor.figure):
+                self._opened[id(actor)] = actor, actor.figure, actor.pose.copy()
+
+    def _left(self, scene: Scene, clock: Clock, grows: bool) -> list[float]:
+        """Return the times to sample next, and drop samples that are no longer needed."""
+        first, last = clock.frame_range if clock.has_motion else (0, 0)
+        last = max(first, last)  # a motion may lie entirely between two frames
+        if grows:
+            wanted = set(map(clock.frame_time, _growing(first, last)))
+        else:
+            most = min(max(_MOST_POINTS // max(_n_points(scene), 1), 2), _MOST_FRAMES)
+            frames = frames_looked_at(last - first + 1, most)
+            wanted = {clock.frame_time(first + frame) for frame in frames}
+            for known in (self._clouds, self._kept):
+                for time in known.keys() - wanted:
+                    del known[time]
+        # The frame that was lowest comes first: the ground must follow a shape slider immediately.
+        up = "xyz".index(scene.up)
+        lowest = {time: cloud[:, up].min() for time, cloud in self._kept.items() if len(cloud)}
+        left = wanted - self._clouds.keys()
+        return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
+
+    def _cloud(self, scene: Scene, clock: Clock, time: float, show: str) -> Floats:
+        """Return the outermost points at one time; none if all actors are absent."""
+        seen = copied(scene)
+        for actor, shown in zip(seen.actors, scene.actors, strict=True):
+            # Hair and clothes hardly change the size of a motion, but simulating them takes long.
+            actor.springs = None
+            if actor.pose is not None:
+                weights = actor.pose.shape_weights
+                actor.pose = self._opened[id(shown)][2].copy()
+                actor.pose.shape_weights = weights
+        if clock.has_motion:
+            pose_actors(seen.actors, time, clock.interpolate_gaps)
+            if not any(actor.is_drawn for actor in seen.actors):
+                return np.zeros((0, 3))
+        points = scene_points(seen, show)
+        if not clock.has_motion:
+            return points  # one frame: keeping all points is faster than reducing them
+        low, high = _N_DIRECTIONS
+        return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))
 
 
 @dataclass(slots=True)
@@ -28,7 +165,7 @@ class Framing:
     """
 
     is_fitting: bool = False
-    extent: MotionExtent = field(default_factory=MotionExtent)
+    extent: _MotionExtent = field(default_factory=_MotionExtent)
     points: Floats | None = None
     _placed: tuple[object, ...] | None = None  # key of the camera's position when it was fitted
     _fitted: tuple[object, ...] | None = None  # size of the view at the last fit
@@ -86,3 +223,42 @@ def _place(camera: Camera) -> tuple[object, ...]:
     """Return a key that identifies a camera's position."""
     lens = camera.fov, id(camera.fixed)
     return camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination, *lens
+
+
+_POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
+_MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
+_MOST_FRAMES = 32
+_MOST_PRODUCTS = 100_000_000  # maximum number of dot products with directions
+_N_DIRECTIONS = (100, 1000)
+
+
+def _growing(first: int, last: int) -> list[int]:
+    """Return at most 33 frames of a growing motion, such that earlier samples can be reused.
+
+    >>> _growing(0, 3), _growing(0, 70)[:4]
+    ([0, 1, 2, 3], [0, 4, 8, 12])
+    """
+    step = 1
+    while (last - first) // step > _MOST_FRAMES:
+        step *= 2
+    return list(range(first, last + 1, step))
+
+
+def _own_shape(actor: Actor) -> bytes:
+    """Return a key that identifies an actor's shape; empty if its motion sets the shape."""
+    clip, is_driven = actor.clip, False
+    if isinstance(clip, SampledClip):
+        is_driven = clip.shape_weights is not None
+    elif isinstance(clip, TransformClip):
+        is_driven = any(channel.path == "weights" for channel in clip.channels)
+    return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
+
+
+def _own_motion(actor: Actor) -> tuple[object, ...]:
+    """Return a key of an actor's motion and placement; edited clips are new objects."""
+    return actor.clip, actor.offset, actor.placement.tobytes()
+
+
+def _n_points(scene: Scene) -> int:
+    meshes: Sequence[object] = [actor.figure.mesh for actor in scene.actors]
+    return sum(getattr(mesh, "n_vertices", 0) for mesh in meshes)

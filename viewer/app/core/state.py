@@ -16,23 +16,33 @@ from viewer.app.core.framing import Framing
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
 from viewer.app.core.saved_work import SavedWork
-from viewer.app.core.stats import Stats
 from viewer.app.core.undo_history import History
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.legend import Legend
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import Front, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene, scene_points
 
-__all__ = ["AppState"]
-
 _FARTHEST = 1e4  # maximum distance of the camera, relative to the scene's size
-
 Part = TypeVar("Part")
+
+
+@dataclass(slots=True)
+class Stats:
+    """Duration and renderer of the last frame."""
+
+    frame_ms: float = 0.0
+    renderer: str = ""
+    version: str = ""
+    samples: int = 0
+    scalar_range: tuple[float, float] = (0.0, 0.0)
+    scalar_ends: tuple[float, float] = (0.0, 0.0)
+    legend: Legend | None = None
 
 
 @dataclass(slots=True)

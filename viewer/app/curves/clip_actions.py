@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.app.curves.keyed import keyed_of
+from viewer.app.curves.editing import keyed_of
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.saving import save_files
 from viewer.app.files.state import Files

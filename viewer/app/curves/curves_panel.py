@@ -17,11 +17,12 @@ from viewer.app.core.widgets import (
     plain_zero,
     same_line_if_room,
 )
-from viewer.app.curves.axes import curve_color, factor_of
 from viewer.app.curves.clip_actions import ask_for_clip, can_have_keys, key_present_pose, new_clip
 from viewer.app.curves.data import Curve, channel_of, curves_of
-from viewer.app.curves.dof_keys import DofKeys
 from viewer.app.curves.editing import (
+    DofKeys,
+    KeyedMotion,
+    TransformKeys,
     add_key_at,
     change_slope,
     change_tangent,
@@ -30,12 +31,11 @@ from viewer.app.curves.editing import (
     extrapolate,
     focused_rows,
     interpolate,
+    keyed_of,
     place_key,
 )
-from viewer.app.curves.keyed import KeyedMotion, keyed_of
-from viewer.app.curves.plot import draw_plot
+from viewer.app.curves.plot import curve_color, draw_plot, factor_of
 from viewer.app.curves.state import Curves, KeyPlace
-from viewer.app.curves.transform_keys import TransformKeys
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
 from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel

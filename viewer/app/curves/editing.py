@@ -2,34 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
 from viewer.app.core.state import AppState
-from viewer.app.curves.dof_keys import DofKeys
-from viewer.app.curves.keyed import KeyedMotion, keyed_of
+from viewer.app.curves.data import channel_of, keyed_values
 from viewer.app.curves.state import Curves, KeyPlace
-from viewer.app.curves.transform_keys import TransformKeys
-from viewer.rig.motion.clip import Extrapolation, Tangent
-from viewer.rig.motion.clip_edit import set_extrapolation, with_channel
-from viewer.rig.motion.transform_clip import Interpolation
-
-__all__ = [
-    "add_key_at",
-    "change_slope",
-    "change_tangent",
-    "delete_chosen",
-    "drop_missing",
-    "extrapolate",
-    "focused_rows",
-    "interpolate",
-    "move_chosen",
-    "nearest_row",
-    "place_key",
-    "set_clip_range",
-]
+from viewer.data_classes import dataclass
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.clip import Channel, Clip, Extrapolation, Tangent, slopes
+from viewer.rig.motion.clip_edit import (
+    add_key,
+    delete_keys,
+    key_pose,
+    move_keys,
+    set_extrapolation,
+    set_key,
+    set_range,
+    set_tangent,
+    with_channel,
+)
+from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
+from viewer.rig.scene import Actor, Motion
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.edit import (
+    add_transform_key,
+    delete_transform_keys,
+    move_transform_keys,
+    set_clip_interpolation,
+    set_clip_range,
+    set_transform_key,
+    set_transform_slope,
+)
+from viewer.rig.transforms.keying import joint_values, key_transform_pose
+from viewer.rig.transforms.rows import TransformRow, key_values, row_values, rows_of
 
 _GAP = 1e-3  # minimum distance between dragged keys, seconds
 
@@ -131,8 +140,218 @@ def interpolate(state: AppState, mode: Interpolation) -> None:
         state.actor.clip = keyed.interpolated(focused_rows(state.of(Curves)), mode)
 
 
-def set_clip_range(state: AppState, start: float, end: float) -> None:
+def set_playback_range(state: AppState, start: float, end: float) -> None:
     """Set the clip's own time range, seconds."""
     keyed = keyed_of(state.actor)
     if keyed is not None:
         state.actor.clip = keyed.ranged(start, end)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DofKeys:
+    """A clip of DOFs, whose rows are those of the DOF table."""
+
+    clip: Clip
+    skeleton: Skeleton
+
+    def keys(self, row: int) -> tuple[Floats, Floats] | None:
+        """Return the times and values of a curve's keys."""
+        channel = channel_of(self.clip, row)
+        return None if channel is None else (channel.times, channel.values)
+
+    def slopes(self, row: int) -> Floats | None:
+        """Return the slopes at the keys of a curve with at least two keys."""
+        channel = channel_of(self.clip, row)
+        return None if channel is None or len(channel.times) < 2 else slopes(channel)
+
+    def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
+        """Return the values of some curves at many times."""
+        return keyed_values(self.clip, rows, times)
+
+    def wraps(self, row: int) -> bool:
+        """Return False: angles of DOFs are not limited to one revolution."""
+        return False
+
+    def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Clip:
+        """Move keys together."""
+        keys: dict[int, list[int]] = {}
+        for row, key in places:
+            keys.setdefault(row, []).append(key)
+        clip = self.clip
+        for row, chosen in keys.items():
+            clip = with_channel(clip, row, partial(move_keys, keys=chosen, dt=dt, dv=dv, gap=gap))
+        return clip
+
+    def placed(self, place: KeyPlace, time: float | None, value: float | None, gap: float) -> Clip:
+        """Set the time or value of one key; a typed time may equal a neighbour's."""
+        return self._changed([place[0]], lambda old: set_key(old, place[1], time, value))
+
+    def added(self, rows: Iterable[int], time: float, actor: Actor) -> Clip:
+        """Add keys on curves."""
+        return self._changed(rows, lambda old: add_key(old, time)[0])
+
+    def deleted(self, places: Iterable[KeyPlace]) -> Clip:
+        """Delete keys."""
+        clip, places = self.clip, list(places)
+        for row in {row for row, _ in places}:
+            keys = [key for place, key in places if place == row]
+            clip = with_channel(clip, row, partial(delete_keys, keys=keys))
+        return clip
+
+    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Clip:
+        """Set the slope on one side of keys."""
+        return self.with_tangent(places, side, slope)
+
+    def with_tangent(self, places: Iterable[KeyPlace], side: int, to: Tangent) -> Clip:
+        """Set the tangent rule or slope on one side of keys."""
+        clip = self.clip
+        for row, key in places:
+            clip = with_channel(clip, row, partial(set_tangent, key=key, side=side, tangent=to))
+        return clip
+
+    def ranged(self, start: float, end: float) -> Clip:
+        """Set the playback range, seconds."""
+        return set_range(self.clip, start, end)
+
+    def posed(self, actor: Actor, time: float, only_changed: bool) -> Clip:
+        """Key an actor's pose at a time."""
+        return key_pose(self.clip, self.skeleton, actor.require_pose(), time, only_changed)
+
+    def _changed(self, rows: Iterable[int], change: Callable[[Channel], Channel]) -> Clip:
+        clip = self.clip
+        for row in rows:
+            clip = with_channel(clip, row, change)
+        return clip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TransformKeys:
+    """A clip of transforms, whose rows are indices into ``rows_of``."""
+
+    clip: TransformClip
+    skeleton: Skeleton
+
+    def row(self, row: int) -> TransformRow:
+        """Return the component that a curve shows."""
+        return rows_of(self.clip, self.skeleton)[row]
+
+    def channel(self, row: int) -> TransformChannel | None:
+        """Return the channel of a curve; None for rotations without keys."""
+        index = self.row(row).channel
+        return None if index < 0 else self.clip.channels[index]
+
+    def keys(self, row: int) -> tuple[Floats, Floats] | None:
+        """Return the times and values of a curve's keys."""
+        channel = self.channel(row)
+        if channel is None:
+            return None
+        return channel.times, key_values(channel, self.skeleton)[:, self.row(row).component]
+
+    def slopes(self, row: int) -> Floats | None:
+        """Return the slopes at cubic keys; None for rotations, whose angles have other slopes."""
+        channel = self.channel(row)
+        if channel is None or channel.tangents is None or channel.path == "rotation":
+            return None
+        return channel.tangents[:, :, self.row(row).component]
+
+    def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
+        """Return the values of some curves at many times."""
+        return row_values(self.clip, self.skeleton, rows, times)
+
+    def wraps(self, row: int) -> bool:
+        """Return whether a curve is an angle, which jumps by full rotations."""
+        return self.row(row).path == "rotation"
+
+    def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> TransformClip:
+        """Move keys together, including all components that share them."""
+        return move_transform_keys(self.clip, self.skeleton, places, dt, dv, gap)
+
+    def placed(
+        self, place: KeyPlace, time: float | None, value: float | None, gap: float
+    ) -> TransformClip:
+        """Set the time or value of one key."""
+        return set_transform_key(self.clip, self.skeleton, place, time, value, gap)
+
+    def added(self, rows: Iterable[int], time: float, actor: Actor) -> TransformClip:
+        """Add keys on curves; rotations without keys get the values of the actor's pose."""
+        clip, now = self.clip, joint_values(self.skeleton, actor.require_pose())
+        # The components of a channel share their keys.
+        wanted = {(row.path, row.joint, row.channel): row for row in map(self.row, rows)}
+        for row in wanted.values():
+            value = now[row.path][row.joint] if row.channel < 0 else None
+            clip = add_transform_key(clip, row, time, value)
+        return clip
+
+    def deleted(self, places: Iterable[KeyPlace]) -> TransformClip:
+        """Delete keys, including all components that share them."""
+        return delete_transform_keys(self.clip, self.skeleton, places)
+
+    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> TransformClip:
+        """Set the slope on one side of cubic keys."""
+        clip = self.clip
+        for row, key in places:
+            clip = set_transform_slope(clip, self.row(row), key, side, slope)
+        return clip
+
+    def interpolated(self, rows: Iterable[int], mode: Interpolation) -> TransformClip:
+        """Set the interpolation of the channels of some curves."""
+        channels = sorted({self.row(row).channel for row in rows} - {-1})
+        return set_clip_interpolation(self.clip, channels, mode)
+
+    def ranged(self, start: float, end: float) -> TransformClip:
+        """Set the playback range, seconds."""
+        return set_clip_range(self.clip, start, end)
+
+    def posed(self, actor: Actor, time: float, only_changed: bool) -> TransformClip:
+        """Key an actor's pose at a time."""
+        pose = actor.require_pose()
+        return key_transform_pose(self.clip, actor.figure, pose, time, only_changed)
+
+
+class KeyedMotion(Protocol):
+    """A keyed motion; every edit returns a new motion. Rows are as in ``curves_of``."""
+
+    def keys(self, row: int) -> tuple[Floats, Floats] | None:
+        """Return the times and values of a curve's keys, (N,) each; None without keys."""
+
+    def slopes(self, row: int) -> Floats | None:
+        """Return the slopes at the keys that can be dragged, (N, 2); None if there are none."""
+
+    def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
+        """Return the values of some curves at many times: (T, C); those without keys are 0."""
+
+    def wraps(self, row: int) -> bool:
+        """Return whether a curve shows angles that jump by full rotations."""
+
+    def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Motion:
+        """Move keys together; they stop at unselected keys."""
+
+    def placed(
+        self, place: KeyPlace, time: float | None, value: float | None, gap: float
+    ) -> Motion:
+        """Set the time or value of one key."""
+
+    def added(self, rows: Iterable[int], time: float, actor: Actor) -> Motion:
+        """Add keys on curves; those without keys get the value of the actor's pose."""
+
+    def deleted(self, places: Iterable[KeyPlace]) -> Motion:
+        """Delete keys."""
+
+    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Motion:
+        """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
+
+    def ranged(self, start: float, end: float) -> Motion:
+        """Set the playback range, seconds."""
+
+    def posed(self, actor: Actor, time: float, only_changed: bool) -> Motion:
+        """Key an actor's pose at a time."""
+
+
+def keyed_of(actor: Actor) -> KeyedMotion | None:
+    """Return an actor's motion if it has keys to edit."""
+    clip, skeleton = actor.clip, actor.figure.skeleton
+    if skeleton is None:
+        return None
+    if isinstance(clip, Clip):
+        return DofKeys(clip, skeleton)
+    return TransformKeys(clip, skeleton) if isinstance(clip, TransformClip) else None

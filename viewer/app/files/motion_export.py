@@ -1,4 +1,4 @@
-"""Export of the motions of one actor or all actors for other programs."""
+"""Dialog to export motions: choice of actors, format and file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
-from viewer.app.files.export_formats import FOLDER
+from viewer.app.core.widgets import checkbox, choice, explain
+from viewer.app.files.export_formats import FOLDER, N_ROWS, draw_formats
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.state import Files
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
@@ -28,8 +31,9 @@ from viewer.export import (
 )
 from viewer.export._gltf.sampled import placed_actor
 from viewer.export._motion_paths import is_together, motion_paths
+from viewer.export._options import SAFE_NAMES
 from viewer.export._vrm.humanoid import is_humanoid
-from viewer.formats import all_or_none, check_folder_target, check_targets
+from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import printable
 from viewer.progress import receiving
 from viewer.rig.captures.points import PointClip
@@ -45,22 +49,77 @@ from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
+
+@dataclass(slots=True)
+class _Selection:
+    """Whether to export all actors' motions or only the selected actor's, and how."""
+
+    everyone: bool
+    safe_names: bool = False
+
+
+def ask_for_motion(state: AppState, suffix: str = "") -> None:
+    """Open the dialog; all actors are preselected if there are several.
+
+    Parameters
+    ----------
+    state : AppState
+        Receives the dialog.
+    suffix : str
+        Suffix of the suggested name of a file with edited keys; that of the first format if empty.
+    """
+    moving = _moving_actors(state)
+    asks = len(moving) > 1 or state.actor not in moving
+    selection = _Selection(asks)
+    first = _first(state, selection)
+    # The number of each person is appended to the name if there are several files.
+    stem = file_stem(first.title if len(moving) > 1 else first.name)
+    suffixes = motion_suffixes()
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_motion(state, paths[0], selection.everyone, selection.safe_names),
+        "save",
+        "Export motion",
+        suffixes,
+        f"{stem}_edited{suffix}" if suffix else f"{stem}{suffixes[0]}",
+        more=lambda state, dialog: _draw_more(state, dialog, selection),
+        more_rows=N_ROWS + (3.0 if asks else 1.5),
+        written=lambda path: motion_files(state, path, selection.everyone),
+    )
+
+
+def _first(state: AppState, selection: _Selection) -> Actor:
+    """Return the first actor whose motion is exported."""
+    return _moving_actors(state)[0] if selection.everyone else state.actor
+
+
+def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> None:
+    """Draw the choice of actors and format."""
+    moving = _moving_actors(state)
+    if len(moving) > 1 or state.actor not in moving:
+        whose = {"all": f"all {len(moving)} actors"}
+        if state.actor in moving:
+            whose["one"] = f"only {printable(state.actor.name, 60)}"
+        selection.everyone = (
+            choice(state, "Actors##exported", "all" if selection.everyone else "one", whose, 12.0)
+            == "all"
+        )
+        is_one = dialog.suffix == "" or _is_one_file(Path(f"motion{dialog.suffix}"))
+        explain("one file for all" if is_one else "one file per actor, numbered by actor")
+    actor = _first(state, selection)
+    draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))
+    suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
+    why = "" if suffix == ".bvh" else "for .bvh only"
+    selection.safe_names = checkbox(state, "Safe names", selection.safe_names, why)
+    explain(SAFE_NAMES, why)
+
+
 _MANY = (".obj",)  # one file per frame: exported by the command line only
 _ALL_ANIMATIONS = (".gltf", ".glb")  # these contain all animations of a figure, not only one
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
-__all__ = [
-    "is_one_file",
-    "motion_files",
-    "motion_formats",
-    "motion_suffixes",
-    "moving_actors",
-    "save_motion",
-    "unsuited_formats",
-]
 
-
-def moving_actors(state: AppState) -> list[Actor]:
+def _moving_actors(state: AppState) -> list[Actor]:
     """Return the actors whose joints are moved by a motion."""
     return [a for a in state.scene.actors if isinstance(a.clip, JointMotion)]
 
@@ -112,13 +171,13 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     """
     if not path.suffix:
         return [path / _FRAMES]
-    actors = moving_actors(state) if everyone else [state.actor]
+    actors = _moving_actors(state) if everyone else [state.actor]
     paths = _paths(path, actors) if actors else []
     beside = [file.with_suffix(".bin") for file in paths if file.suffix.lower() == ".gltf"]
     return [*paths, *beside]
 
 
-def is_one_file(path: Path) -> bool:
+def _is_one_file(path: Path) -> bool:
     """Return whether a name selects one file with all actors."""
     kinds = [kind for kind in EXPORTERS.values() if path.suffix.lower() in kind.suffixes]
     return any(kind.writes_several for kind in kinds) and is_together(path, MotionOptions())
@@ -126,7 +185,7 @@ def is_one_file(path: Path) -> bool:
 
 def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
     """Return the distinct files of actors."""
-    return [path] if is_one_file(path) else motion_paths(path, actors)
+    return [path] if _is_one_file(path) else motion_paths(path, actors)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,7 +241,7 @@ def save_motion(
         return
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
     still = [each.copy() for each in state.scene.actors if everyone and each.clip is None]
-    in_one_file = is_one_file(path) and (len(parts) + len(still) > 1 or bool(scene.views))
+    in_one_file = _is_one_file(path) and (len(parts) + len(still) > 1 or bool(scene.views))
     known, written = state.of(SavedWork), [one for part in parts for one in part.saved]
     if in_one_file:
         written += [
@@ -215,8 +274,8 @@ def save_motion(
 
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
     """Return the parts to write, and notes about omitted actors."""
-    actors = moving_actors(state) if everyone else [state.actor]
-    is_one = not path.suffix or is_one_file(path)
+    actors = _moving_actors(state) if everyone else [state.actor]
+    is_one = not path.suffix or _is_one_file(path)
     paths = [path] * len(actors) if is_one else motion_paths(path, actors)
     parts, notes = list[_Part](), list[Diagnostic]()
     for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):

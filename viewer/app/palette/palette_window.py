@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field
+from functools import partial
 
 from imgui_bundle import imgui
 
 from viewer.app.core.ink import ink
+from viewer.app.core.key_names import key_name
+from viewer.app.core.reasons import no_panel, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, overlay_rect
-from viewer.app.palette.entries import Entry, entries
-from viewer.app.palette.matching import ranked
+from viewer.app.features import ACTIONS, KEYS, PANELS
+from viewer.app.playback.animations import choose_animation
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.shown_panels import show_panel
+from viewer.app.view.display_actions import set_shading, show, show_bones
 from viewer.data_classes import dataclass
-
-__all__ = ["Palette", "draw_palette", "toggle_palette"]
+from viewer.phrases import printable
+from viewer.rendering.gpu.program import SHADING
+from viewer.rendering.options import BONES, SHOWN
+from viewer.rig.motion.animation_choice import animation_labels
+from viewer.rig.skeleton import joint_labels, shown_joints
+from viewer.rig.skinning import METHODS
 
 _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
 _TOP = 0.14  # upper edge, as a fraction of the window's height
@@ -47,7 +58,7 @@ class Palette:
     has_focus: bool = False
     query: str = ""
     row: int = 0
-    known: list[Entry] = field(default_factory=list)
+    known: list[_Entry] = field(default_factory=list)
     shown: list[int] = field(default_factory=list)
     matched: str | None = None
 
@@ -91,7 +102,7 @@ def _is_closed() -> bool:
     return is_again or imgui.is_key_pressed(_K.escape, False)
 
 
-def _draw_content(state: AppState, palette: Palette) -> Entry | None:
+def _draw_content(state: AppState, palette: Palette) -> _Entry | None:
     """Draw the text box and the rows; return the entry to run."""
     if not palette.has_focus:
         imgui.set_keyboard_focus_here()
@@ -134,7 +145,7 @@ def _move(palette: Palette) -> bool:
     return True
 
 
-def _draw_rows(state: AppState, palette: Palette, moved: bool) -> Entry | None:
+def _draw_rows(state: AppState, palette: Palette, moved: bool) -> _Entry | None:
     """Draw the rows in view; return the entry that was clicked."""
     chosen, count = None, len(palette.shown)
     if not count:
@@ -164,7 +175,7 @@ def _reveal(top: float, height: float) -> None:
         imgui.set_scroll_y(top + height - room)
 
 
-def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
+def _draw_row(state: AppState, entry: _Entry, row: int, is_chosen: bool) -> bool:
     """Draw an entry with its kind, and its key or reason; return whether it was clicked."""
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
     flags = imgui.SelectableFlags_.disabled if entry.why else imgui.SelectableFlags_.none
@@ -183,3 +194,195 @@ def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
         imgui.same_line(left)
         imgui.text_disabled(note)
     return bool(clicked)
+
+
+_LEFT_OUT = ("Ctrl+P", "Esc")  # shortcuts that open and close the palette
+_LONGEST = 60  # maximum length of a name in characters
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """An entry that can be found and run.
+
+    Attributes
+    ----------
+    text : str
+        Name of the entry.
+    kind : str
+        Category in one word.
+    run : callable
+        Called with the state.
+    key : str
+        Keyboard shortcut; empty for none.
+    why : str
+        Reason why the entry cannot be run now; empty if it can.
+    """
+
+    text: str
+    kind: str
+    run: Callable[[AppState], None]
+    key: str = ""
+    why: str = ""
+
+
+def entries(state: AppState) -> list[_Entry]:
+    """Return all entries for the current scene."""
+    kinds = (_actions, _panels, _choices, _animations, _joints, _figures)
+    return [entry for kind in kinds for entry in kind(state)]
+
+
+def _actions(state: AppState) -> Iterator[_Entry]:
+    for key in KEYS:
+        if key.label not in _LEFT_OUT:
+            yield _Entry(
+                key.text[0].upper() + key.text[1:],
+                "action",
+                key.run,
+                key_name(state, key.label),
+            )
+    for action in ACTIONS:
+        yield _Entry(action.text, "action", action.run, why=action.reason(state))
+
+
+def _panels(state: AppState) -> Iterator[_Entry]:
+    for name, panel in PANELS.items():
+        why = no_panel(state, panel.needs)
+        yield _Entry(panel.title, "panel", partial(_open_panel, name=name), why=why)
+
+
+def _open_panel(state: AppState, name: str) -> None:
+    """Open a panel, or bring it to the front of its tabs."""
+    state.panels_visible = True
+    show_panel(state, name)
+
+
+def _choices(state: AppState) -> Iterator[_Entry]:
+    """Yield the choices of shading, skeletons and skinning."""
+    for name, text in SHADING.items():
+        yield _Entry(f"Shading: {text}", "choice", partial(_shade, name=name))
+    for name, text in SHOWN.items():
+        yield _Entry(f"Show: {text}", "choice", partial(show, what=name))
+    for name, text in BONES.items():
+        yield _Entry(
+            f"Bones: {text}", "choice", partial(show_bones, style=name), why=no_skeleton(state)
+        )
+    for name, method in METHODS.items():
+        yield _Entry(f"Skinning: {method.title}", "choice", partial(_skin, name=name))
+
+
+def _shade(state: AppState, name: str) -> None:
+    set_shading(state, name)
+    state.say_status(SHADING[name])
+
+
+def _skin(state: AppState, name: str) -> None:
+    state.options.skinning.method = name
+    state.say_status(METHODS[name].title)
+
+
+def _animations(state: AppState) -> Iterator[_Entry]:
+    """Yield the animations of the chosen actor."""
+    labels = animation_labels(state.actor.figure)
+    for index, label in enumerate(labels):
+        text = f"Play animation: {printable(label, _LONGEST)}"
+        yield _Entry(text, "animation", partial(choose_animation, index=index))
+    if labels:
+        yield _Entry("Play no animation", "animation", partial(choose_animation, index=-1))
+
+
+def _joints(state: AppState) -> Iterator[_Entry]:
+    """Yield the joints of the chosen actor."""
+    skeleton = state.actor.figure.skeleton
+    if skeleton is None:
+        return
+    labels = joint_labels(skeleton)
+    for joint in shown_joints(skeleton).tolist():
+        yield _Entry(
+            printable(labels[joint], _LONGEST), "joint", partial(select_joint, joint=joint)
+        )
+
+
+def _figures(state: AppState) -> Iterator[_Entry]:
+    for index, actor in enumerate(state.scene.actors):
+        yield _Entry(printable(actor.name, _LONGEST), "figure", partial(_choose, index=index))
+
+
+def _choose(state: AppState, index: int) -> None:
+    state.select_actor(index)
+    state.say_status(printable(state.actor.name, _LONGEST))
+
+
+_START, _INSIDE, _SCATTERED = 100.0, 60.0, 20.0
+_BOUNDARIES = " _-.:/#("
+
+
+def score(query: str, name: str) -> float:
+    """Return how well a name matches a query: higher is better, negative for no match.
+
+    Every word of the query must match: best at the start of a word in the name, next best inside a
+    word, otherwise as a sequence of letters. For ties, the shorter name comes first.
+
+    Parameters
+    ----------
+    query : str
+        Words in any order and case; empty matches everything.
+    name : str
+        Name to compare with.
+
+    >>> score("wire", "Wireframe") > score("frame", "Wireframe") > score("wfm", "Wireframe") > 0
+    True
+    >>> score("wirex", "Wireframe")
+    -1.0
+    """
+    lower, total = name.lower(), 0.0
+    for word in query.lower().split():
+        found = _score_word(word, lower)
+        if found < 0.0:
+            return -1.0
+        total += found
+    return total + 10.0 / (10.0 + len(name))
+
+
+def _score_word(word: str, name: str) -> float:
+    """Return the score of one word; negative if the name lacks its letters in this order."""
+    place = name.find(word)
+    while place > 0 and name[place - 1] not in _BOUNDARIES:
+        following = name.find(word, place + 1)
+        if following < 0:
+            return _INSIDE - min(place, 20)
+        place = following
+    if place >= 0:
+        return _START - min(place, 20)
+    return _score_letters(word, name)
+
+
+def _score_letters(word: str, name: str) -> float:
+    """Return the score of a sequence of letters; starts of words and runs count more."""
+    points = _walk(word, name, True)
+    points = _walk(word, name, False) if points < 0 else points
+    return -1.0 if points < 0 else _SCATTERED * points / (2.0 * len(word))
+
+
+def _walk(word: str, name: str, prefers_starts: bool) -> int:
+    """Return the score of letters found in order, from left to right; -1 if one is missing."""
+    points, last = 0, -1
+    for letter in word:
+        places = [place for place in range(last + 1, len(name)) if name[place] == letter]
+        if not places:
+            return -1
+        starts = [place for place in places if place == 0 or name[place - 1] in _BOUNDARIES]
+        if places[0] != last + 1 and prefers_starts and starts:
+            last, points = starts[0], points + 2
+        else:
+            points += int(places[0] == last + 1)
+            last = places[0]
+    return points
+
+
+def ranked(query: str, names: Sequence[str]) -> list[int]:
+    """Return the indices of matching names, best first; ties keep their order."""
+    scores = [score(query, name) for name in names]
+    return sorted(
+        (index for index, value in enumerate(scores) if value >= 0.0),
+        key=lambda index: (-scores[index], index),
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from imgui_bundle import imgui
 
 from viewer.app.core.clock import FASTEST, MODES
@@ -21,14 +23,18 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     slider,
 )
+from viewer.app.files.state import Files
 from viewer.app.playback.actions import go_to_end, play, step
 from viewer.app.playback.animations import animation_texts, choose_animation, played
-from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
-from viewer.app.playback.gaps import no_gaps
 from viewer.app.playback.tracks import draw_tracks
+from viewer.rig.captures.points import PointClip
+from viewer.rig.memo import Memo
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
-
-__all__ = ["draw"]
+from viewer.rig.scene import Actor, Motion
 
 _WIDEST_LIST = 16.0  # maximum width of the list of animations, in font sizes
 _CLAMP = imgui.SliderFlags_.always_clamp
@@ -129,7 +135,7 @@ def _draw_settings(state: AppState) -> None:
     same_line_if_room("M" * 14)
     _draw_range(state)
     same_line_if_room("Interpolate gaps")
-    gapless = no_gaps(state)
+    gapless = _no_gaps(state)
     clock.interpolate_gaps = checkbox(state, "Interpolate gaps", clock.interpolate_gaps, gapless)
     text = "interpolate missing frames of captures between the frames before and after the gap"
     explain(text, gapless)
@@ -165,3 +171,89 @@ def _draw_range(state: AppState) -> None:
             for is_last, kept in ((False, clock.start), (True, clock.end))
         )
         clock.set_range(start, end)
+
+
+_gaps: Memo[Motion, bool] = Memo()
+
+
+def _no_gaps(state: AppState) -> str:
+    """Return the reason why gaps cannot be interpolated; empty if they can or files are read."""
+    if state.of(Files).stream is not None or any(
+        _has_gaps(actor.clip) for actor in state.scene.actors if actor.clip is not None
+    ):
+        return ""
+    return "no motion has missing frames"
+
+
+def _has_gaps(clip: Motion) -> bool:
+    if isinstance(clip, Clip | TransformClip):
+        return False
+    return _gaps.get(clip, None, lambda: not clip.timing.holds or not clip.timing.present.all())
+
+
+_LIMITS = (0.01, 1000.0)
+"""Lowest and highest rate that can be set, frames per second."""
+
+
+def rate_of(state: AppState) -> float:
+    """Return the frame rate of the chosen actor's motion, frames per second."""
+    clip = state.actor.clip
+    if isinstance(clip, SampledClip | PointClip):
+        return clip.timing.frame_rate
+    return state.clock.frame_rate
+
+
+def foreign_rate(state: AppState) -> str:
+    """Return the reason why the actor's rate cannot be set: another actor defines the frames."""
+    clock = state.clock
+    if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
+        return ""
+    return "the frames belong to another motion: select its actor"
+
+
+def set_rate(state: AppState, rate: float) -> None:
+    """Set the frame rate of the chosen actor and of all people of its capture.
+
+    Keyed clips have no frames: only the rate for stepping and frame numbers is set for them.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the actors; their clips are replaced, so that the edit can be undone.
+    rate : float
+        Frames per second; a rate outside ``_LIMITS`` is rejected with a message.
+    """
+    if foreign_rate(state) or rate == rate_of(state):
+        return
+    if not (math.isfinite(rate) and _LIMITS[0] <= rate <= _LIMITS[1]):
+        low, high = _LIMITS
+        state.say(f"frames per second: expected {low:g} to {high:g}, found {rate:g}")
+        return
+    clip = state.actor.clip
+    if not isinstance(clip, SampledClip | PointClip):
+        state.clock.count_by(rate)
+        state.say_status(f"Frames of keyed clips are numbered at {rate:g} frames per second")
+        return
+    together = [actor for actor in state.scene.actors if _is_together(actor, state.actor)]
+    for actor in together:
+        if isinstance(actor.clip, SampledClip | PointClip):
+            actor.clip = with_rate(actor.clip, rate)
+    who = f" for {len(together)} actors of this capture" if len(together) > 1 else ""
+    state.say_status(f"{rate:g} frames per second{who}")
+
+
+def _is_together(one: Actor, other: Actor) -> bool:
+    """Return whether two actors are identical or belong to the same capture."""
+    first, second = one.clip, other.clip
+    if one is other:
+        return True
+    if not isinstance(first, SampledClip | PointClip):
+        return False
+    if not isinstance(second, SampledClip | PointClip):
+        return False
+    if one.person is None or other.person is None or first.name != second.name:
+        return False
+    a, b = first.timing, second.timing
+    return (a.frame_rate, a.n_frames, a.first_frame, a.start) == (
+        b.frame_rate, b.n_frames, b.first_frame, b.start,
+    )  # fmt: skip

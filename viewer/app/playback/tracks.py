@@ -12,14 +12,13 @@ from viewer.app.core.clock import Clock
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
-from viewer.app.playback.key_marks import key_times
 from viewer.phrases import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rig.scene import Actor, Motion
 from viewer.rig.srgb import encode_color
-
-__all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
 _NAME_WIDTH = 9.0  # width of the actors' names, in font sizes
 _TICK_GAP = 5.0  # font sizes: minimum distance between two numbers on the ruler
@@ -194,7 +193,7 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float]) -> None:
     # Room for two numbers: the last number may be to the left of its tick.
     room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
     room = max(_TICK_GAP * imgui.get_font_size(), room)
-    step = nice_step(room / scale * clock.frame_rate)
+    step = _nice_step(room / scale * clock.frame_rate)
     for number in range(math.ceil(first / step) * step, last + 1, step):
         x = left + (clock.frame_time(number - clock.first_frame) - low) * scale
         draw_list.add_line((x, top), (x, top + total), line)
@@ -237,7 +236,7 @@ def _draw_time(clock: Clock, area: tuple[float, float, float, float]) -> None:
     draw_list.add_triangle_filled((x - half, top), (x + half, top), (x, top + 1.4 * half), color)
 
 
-def nice_step(smallest: float) -> int:
+def _nice_step(smallest: float) -> int:
     """Return the smallest of 1, 2, 5, 10, 20, 50 … that is at least as large as a number.
 
     >>> [nice_step(x) for x in (0.2, 1.5, 3, 11, 60)]
@@ -245,3 +244,41 @@ def nice_step(smallest: float) -> int:
     """
     power = 10 ** max(math.floor(math.log10(max(smallest, 1.0))), 0)
     return next(f * power for f in (1, 2, 5, 10) if f * power >= smallest - 1e-9)
+
+
+_times: Memo[Clip | TransformClip, Floats] = Memo(kept=4)
+
+
+def key_times(actor: Actor, joint: int) -> Floats:
+    """Return the times of an actor's keys.
+
+    Parameters
+    ----------
+    actor : Actor
+        An actor with any motion; a sampled motion has no keys.
+    joint : int
+        Joint whose keys are returned; -1 for the keys of all channels.
+
+    Returns
+    -------
+    (N,)
+        Scene times in seconds, increasing.
+    """
+    clip, skeleton = actor.clip, actor.figure.skeleton
+    if skeleton is None or not isinstance(clip, Clip | TransformClip):
+        return np.zeros(0)
+    dof_joints = skeleton.dof_joints
+
+    def found() -> Floats:
+        # Most channels of a file share their times.
+        lists = {}
+        for channel in clip.channels:
+            if isinstance(channel, TransformChannel):
+                own = channel.joint
+            else:
+                own = int(dof_joints[channel.target])
+            if joint < 0 or own == joint:
+                lists[channel.times.tobytes()] = channel.times
+        return np.unique(np.concatenate([np.zeros(0), *lists.values()]))
+
+    return _times.get(clip, joint, found) + actor.offset

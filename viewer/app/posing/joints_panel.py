@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
+import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
@@ -23,21 +25,13 @@ from viewer.app.core.widgets import (
     show_tooltip,
 )
 from viewer.app.curves.state import Curves
-from viewer.app.posing.ball_joint import draw_own_numbers, draw_vector_component, is_ball
-from viewer.app.posing.captured_points import draw_captured_points
 from viewer.app.posing.clip_pause import pause_for_edit
-from viewer.app.posing.figure_place import draw_figure_place
-from viewer.app.posing.joint_rows import (
-    OWN_NUMBERS,
-    SCALE,
-    TRANSLATION,
-    Rows,
-    joint_rows,
-    row_labels,
-)
-from viewer.app.posing.joint_transform import (
+from viewer.app.posing.joint_fields import (
+    draw_own_numbers,
     draw_scale,
     draw_translation,
+    draw_vector_component,
+    is_ball,
     moved_joints,
     toggle_transform,
     unlocked_joints,
@@ -53,12 +47,22 @@ from viewer.app.posing.pose_actions import (
 )
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.points import PointLayout
+from viewer.rig.hierarchy import depth_first
+from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.number_text import angle_text, number_text
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton
-
-__all__ = ["draw"]
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import (
+    DOF_KINDS,
+    FIRST_ROTATION,
+    Skeleton,
+    joint_labels,
+    shown_joints,
+    shown_parents,
+)
 
 _LABEL_WIDTH = 1.6  # width of a label, in font sizes
 _INDENT = 0.6  # indentation per level, in font sizes
@@ -73,7 +77,7 @@ def draw(state: AppState) -> None:
     _draw_actor_choice(state)
     actor = state.actor
     if actor.figure.points is not None:
-        draw_captured_points(state, actor, actor.figure.points)
+        _draw_captured_points(state, actor, actor.figure.points)
         return
     if actor.figure.skeleton is None or actor.pose is None:
         offer_files(
@@ -87,11 +91,11 @@ def draw(state: AppState) -> None:
     if not imgui.begin_child("joints", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         imgui.end_child()
         return
-    draw_figure_place(state, actor.pose)
+    _draw_figure_place(state, actor.pose)
     has_own = actor.figure.pose_layout is not None
     tree, moved = joint_tree(state), moved_joints(state)
     shown = joint_rows(skeleton, frozenset(tree.opened), tree.filter, has_own, moved)
-    labels = row_labels(skeleton)
+    labels = _row_labels(skeleton)
     if not shown:
         imgui.text_disabled("no joint name contains this text")
     clipper = imgui.ListClipper()
@@ -99,13 +103,13 @@ def draw(state: AppState) -> None:
     _include_wanted(state, clipper, shown)
     while clipper.step():
         for joint, dof, depth in shown[clipper.display_start : clipper.display_end]:
-            if dof == OWN_NUMBERS:
+            if dof == _OWN_NUMBERS:
                 _indent(depth)
                 draw_own_numbers(state, actor.figure, actor.pose, joint)
-            elif dof == TRANSLATION:
+            elif dof == _TRANSLATION:
                 _indent(depth)
                 draw_translation(state, actor.pose, joint, labels[joint])
-            elif dof == SCALE:
+            elif dof == _SCALE:
                 _indent(depth)
                 draw_scale(state, actor.pose, joint, labels[joint])
             elif dof < 0:
@@ -116,7 +120,7 @@ def draw(state: AppState) -> None:
     imgui.end_child()
 
 
-def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: Rows) -> None:
+def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: _Rows) -> None:
     """Include the row of a joint selected elsewhere, so that the list can scroll to it."""
     for row, (joint, dof, _) in enumerate(shown if joint_tree(state).scrolls_to >= 0 else ()):
         if joint == joint_tree(state).scrolls_to and dof == -1:
@@ -301,3 +305,177 @@ def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
 def _value_text(value: float, kind: int, in_degrees: bool) -> str:
     """Return a DOF's value in the displayed unit."""
     return angle_text(value, in_degrees) if kind >= FIRST_ROTATION else number_text(value)
+
+
+_Rows: TypeAlias = tuple[tuple[int, int, int], ...]
+_OWN_NUMBERS = -2
+"""Value used instead of a DOF for the row with the raw pose values of the body model."""
+_TRANSLATION, _SCALE = -3, -4
+"""Values used instead of a DOF for the rows with the translation and the scale of a joint."""
+_LONGEST = 60  # maximum length of a name in characters
+_known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
+_known_rows: Memo[Skeleton, _Rows] = Memo(kept=4)
+
+
+def _row_labels(skeleton: Skeleton) -> tuple[str, ...]:
+    """Return the displayed labels of all joints."""
+
+    def make() -> tuple[str, ...]:
+        return tuple(printable(label, _LONGEST) for label in joint_labels(skeleton))
+
+    return _known_labels.get(skeleton, None, make)
+
+
+def joint_rows(
+    skeleton: Skeleton,
+    opened: frozenset[int],
+    wanted: str,
+    has_own: bool = False,
+    moved: frozenset[int] = frozenset(),
+) -> _Rows:
+    """Return the listed rows as (joint, DOF or -1 for the joint's own row, depth).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Joints and DOFs.
+    opened : frozenset of int
+        Joints whose DOFs and children are listed.
+    wanted : str
+        If not empty, only joints whose name contains it are listed, without hierarchy.
+    has_own : bool
+        Whether a row with the file's own numbers, ``_OWN_NUMBERS``, follows each joint's DOFs.
+    moved : frozenset of int
+        Joints with rows for ``_TRANSLATION`` and ``_SCALE`` after their DOFs.
+    """
+    key = (opened, wanted, has_own, moved)
+    return _known_rows.get(skeleton, key, lambda: _rows(skeleton, *key))
+
+
+def _rows(
+    skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool, moved: frozenset[int]
+) -> _Rows:
+    dofs: list[list[int]] = [[] for _ in range(skeleton.n_joints)]
+    for dof, joint in enumerate(skeleton.dof_joints.tolist()):
+        dofs[joint].append(dof)
+    for joint in range(skeleton.n_joints):
+        dofs[joint] += [_TRANSLATION, _SCALE] if joint in moved else []
+        dofs[joint] += [_OWN_NUMBERS] if has_own else []
+    listed: list[tuple[int, int, int]] = []
+    depths, visible = [0] * skeleton.n_joints, [True] * skeleton.n_joints
+    labels, parents = _row_labels(skeleton), shown_parents(skeleton).tolist()
+    for joint in shown_joints(skeleton).tolist():
+        parent = parents[joint]
+        if wanted:
+            visible[joint] = wanted.lower() in labels[joint].lower()
+        elif parent >= 0:
+            depths[joint] = depths[parent] + 1
+            visible[joint] = visible[parent] and parent in opened
+        if visible[joint]:
+            listed.append((joint, -1, depths[joint]))
+            if wanted or joint in opened:
+                listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
+    # In a skeleton, parents come before their children, but not always immediately before.
+    place = np.argsort(depth_first(skeleton.parents)).tolist()
+    return tuple(sorted(listed, key=lambda row: place[row[0]]))
+
+
+def _draw_figure_place(state: AppState, pose: Pose) -> None:
+    """Draw translation and scale, which are applied after skinning."""
+    imgui.set_next_item_open(state.actor.figure.pose_layout is not None, imgui.Cond_.once)
+    is_open = imgui.tree_node_ex("Whole figure", imgui.TreeNodeFlags_.span_avail_width)
+    note_item(state, "figure")
+    if not is_open:
+        return
+    reach = box_size(state.box) or 1.0
+    for axis, name in enumerate(("tx", "ty", "tz")):
+        value = _row(state, name, float(pose.figure_translation[axis]), -reach, reach, 0.0)
+        pose.figure_translation[axis] = value
+    scale = _row(state, "scale", pose.figure_scale, 0.1, 3.0, 1.0)
+    pose.figure_scale = max(scale, 1e-3)
+    imgui.tree_pop()
+
+
+def _row(state: AppState, name: str, value: float, low: float, high: float, rest: float) -> float:
+    imgui.align_text_to_frame_padding()
+    imgui.text_disabled(name)
+    imgui.same_line(4.2 * imgui.get_font_size())
+    imgui.set_next_item_width(-1.0)
+    changed, moved = slider_float(
+        state, f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f"
+    )
+    note_item(state, f"figure.{name}")
+    if imgui.is_item_hovered():
+        show_tooltip(f"figure.{name}\nCtrl+click to type a value, double-click to reset")
+        if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+            return rest
+    return moved if changed and math.isfinite(moved) and abs(moved) < 1e9 else value
+
+
+_SEEN, _DOUBTFUL = (0.30, 0.55, 0.38, 1.0), (0.62, 0.42, 0.22, 1.0)
+_NAME_WIDTH = 0.55  # width of the names, as a fraction of the panel's width
+
+
+def _draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> None:
+    """Draw a description of the captured points, and their list.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the filter and the minimum confidence of drawn points.
+    actor : Actor
+        Actor that consists of captured points.
+    layout : PointLayout
+        Names of the points.
+    """
+    points = actor.points if actor.is_present else None
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(
+        f"{len(layout.names)} captured points ({printable(layout.title, 40)}), not a skeleton: "
+        "there are no joints to rotate."
+    )
+    imgui.text_disabled(_seen_text(state, points))
+    imgui.pop_text_wrap_pos()
+    imgui.set_next_item_width(-1.0)
+    tree = joint_tree(state)
+    tree.filter = search_field("##filter", tree.filter, "Filter points")
+    note_item(state, "Filter")
+    wanted = joint_tree(state).filter.lower()
+    shown = [row for row, name in enumerate(layout.names) if wanted in name.lower()]
+    if imgui.begin_child("points", (0.0, 0.0)):
+        if not shown:
+            imgui.text_disabled("no point name contains this text")
+        clipper = imgui.ListClipper()
+        clipper.begin(len(shown))
+        while clipper.step():
+            for row in shown[clipper.display_start : clipper.display_end]:
+                _draw_row(state, row, layout.names[row], points)
+        clipper.end()
+    imgui.end_child()
+
+
+def _seen_text(state: AppState, points: Floats | None) -> str:
+    """Return a sentence with the number of points detected at the current time."""
+    if points is None:
+        return "Absent at this time."
+    confidences, least = points[:, 3], state.options.min_confidence
+    text = f"{int((confidences > 0.0).sum())} detected at this time"
+    doubtful = int(((confidences > 0.0) & (confidences < least)).sum())
+    hidden = f", {doubtful} of them with confidence below {least:g} and not drawn"
+    return f"{text}{hidden if doubtful else ''}."
+
+
+def _draw_row(state: AppState, row: int, name: str, points: Floats | None) -> None:
+    """Draw the name of a point, and its confidence as a bar with a number."""
+    imgui.align_text_to_frame_padding()
+    imgui.text_unformatted(printable(name, 40))
+    imgui.same_line(_NAME_WIDTH * imgui.get_content_region_avail().x)
+    confidence = 0.0 if points is None else float(points[row, 3])
+    if confidence <= 0.0:
+        imgui.text_disabled("not detected")
+    else:
+        is_drawn = confidence >= state.options.min_confidence
+        imgui.push_style_color(imgui.Col_.plot_histogram, _SEEN if is_drawn else _DOUBTFUL)
+        imgui.progress_bar(min(confidence, 1.0), (-1.0, 0.0), f"{confidence:.3g}")
+        imgui.pop_style_color()
+    note_item(state, f"point {name}")

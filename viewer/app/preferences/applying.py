@@ -8,8 +8,7 @@ from viewer.app.core.key_names import KeyNames
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS
 from viewer.app.preferences.key_map import label_of
-from viewer.app.preferences.state import Appearance, Preferences
-from viewer.app.preferences.storage import save_preferences
+from viewer.app.preferences.state import Appearance, Preferences, save_preferences
 from viewer.app.theme import change_scale, set_theme
 
 __all__ = ["change", "chosen_scale", "chosen_theme", "follow_preferences", "scale_of", "start_with"]

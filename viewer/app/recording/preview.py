@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.app.recording.recorded_options import recorded_options
-from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.recording.state import RecordingState, RecordSettings, recorded_options
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
@@ -40,7 +39,7 @@ class Preview:
         key : object
             Identifies the image of the view.
         """
-        recording = state.of(Recording)
+        recording = state.of(RecordingState)
         settings = recording.settings
         self._release_old()
         if settings is None:

@@ -23,13 +23,14 @@ from viewer.app.core.widgets import (
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.state import Files
 from viewer.app.recording.preview import preview_size
-from viewer.app.recording.recorded_frames import playback_frames, recorded_times
 from viewer.app.recording.state import (
     KINDS,
     LEAST_PIXELS,
     VIDEO_KINDS,
-    Recording,
+    RecordingState,
     RecordSettings,
+    playback_frames,
+    recorded_times,
 )
 from viewer.formats import file_stem
 from viewer.phrases import counted
@@ -64,12 +65,12 @@ _MOST_CELLS = 400
 
 def open_record_dialog(state: AppState) -> None:
     """Open the window."""
-    state.of(Recording).settings = RecordSettings()
+    state.of(RecordingState).settings = RecordSettings()
 
 
 def draw_record_dialog(state: AppState) -> None:
     """Draw the window if it is open."""
-    recording = state.of(Recording)
+    recording = state.of(RecordingState)
     settings = recording.settings
     if settings is None:
         return
@@ -96,7 +97,7 @@ def draw_record_dialog(state: AppState) -> None:
 
 def _draw_preview(state: AppState, settings: RecordSettings) -> None:
     """Draw the current view as a frame of the recording, centred."""
-    texture = state.of(Recording).preview
+    texture = state.of(RecordingState).preview
     width, height = preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
     scale = imgui.get_font_size() / 15.0
     size = (scale * width, scale * height)
@@ -236,7 +237,7 @@ def ask_where(state: AppState, settings: RecordSettings) -> None:
 
 
 def _start(state: AppState, paths: list[Path]) -> None:
-    recording, suffix = state.of(Recording), paths[0].suffix.lower()
+    recording, suffix = state.of(RecordingState), paths[0].suffix.lower()
     if recording.settings is not None and {suffix, recording.settings.kind} <= {*VIDEO_KINDS}:
         recording.settings.kind = suffix  # the user typed a different suffix
     recording.wanted = paths[0]

@@ -3,30 +3,41 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
+from viewer.app.core.jobs import FrameJob
 from viewer.app.core.state import AppState
-from viewer.app.recording.recorded_frames import recorded_times
-from viewer.app.recording.recorded_marks import RecordedMarks
-from viewer.app.recording.recorded_options import recorded_follow, recorded_options
-from viewer.app.recording.state import RecordSettings
+from viewer.app.linting.marks import marks_of
+from viewer.app.linting.state import Linting
+from viewer.app.recording.state import (
+    RecordingState,
+    RecordSettings,
+    recorded_follow,
+    recorded_options,
+    recorded_times,
+)
+from viewer.app.weights.explanation_lines import vertex_annotation
+from viewer.app.weights.state import Weights
 from viewer.errors import OutputError, ViewerError
 from viewer.formats import check_targets
+from viewer.lint import Finding, places_of
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.overlay.annotation import Annotation, mark_annotation
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats
-
-__all__ = ["recording_steps"]
+from viewer.rig.inspection.explanation import explain
+from viewer.rig.scene import Scene
 
 _FULL = 360.0  # full revolution, degrees
 
 
-def recording_steps(
+def _recording_steps(
     state: AppState,
     programs: Programs,
     settings: RecordSettings,
@@ -145,3 +156,68 @@ def _sink(
     from viewer.media.video import VideoSink
 
     return VideoSink(files[0], size, rate, settings.quality, settings.is_transparent), size
+
+
+class RecordedMarks:
+    """Annotations of a moving scene: those of the pinned vertex and of the chosen finding.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the marks and the explanation; they are copied, so later changes have no effect.
+    """
+
+    def __init__(self, state: AppState) -> None:
+        weights = state.of(Weights)
+        linting = state.of(Linting)
+        self._pinned, self._draws_lines = weights.pinned, weights.draws_lines
+        self._finding: Finding | None = linting.finding if linting.marks else None
+        self._skinning = deepcopy(state.options.skinning)
+        self._binding = state.options.show == "binding"
+
+    def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
+        """Return the annotations of one frame.
+
+        Parameters
+        ----------
+        scene : Scene
+            Posed scene with the actors of the state, or copies of them.
+        size : (int, int)
+            Width and height of the image, pixels.
+
+        Raises
+        ------
+        ViewerError
+            If a figure's shapes cannot be read.
+        """
+        found = []
+        if self._finding is not None:
+            places = places_of(self._finding, scene, self._skinning, self._binding)
+            found.append(mark_annotation(marks_of(places)[0]))
+        pinned = self._pinned
+        if pinned is not None and not self._binding:
+            actor = scene.actors[pinned.actor]
+            if actor.pose is not None and actor.is_drawn:
+                why = explain(actor.figure, actor.pose, self._skinning, pinned.vertex)
+                found.append(vertex_annotation(why, actor, self._draws_lines, size))
+        return found
+
+
+def start_recording(state: AppState, renderer: Renderer) -> None:
+    """Start a requested recording unless another job is running.
+
+    Parameters
+    ----------
+    state : AppState
+        Holds the request, and receives the job.
+    renderer : Renderer
+        Renderer of the view, whose programs and marks are used.
+    """
+    recording = state.of(RecordingState)
+    path, settings, recording.wanted = recording.wanted, recording.settings, None
+    if path is None or settings is None or state.job is not None:
+        return
+
+    steps = _recording_steps(state, renderer.programs, replace(settings), path, renderer.ghost)
+    state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps, "recording")
+    state.clock.playing, recording.settings = False, None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import field, replace
 
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_drive, no_job_room
@@ -20,11 +20,8 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor
 
-__all__ = ["NOT_DRIVEN", "change_drive", "no_edit", "shown_drive"]
-
 NOT_DRIVEN = "too few joints match, so the motion does not move this figure: choose its joints"
 """What to do if a motion does not move a figure yet."""
-
 _SHORT = 1000  # maximum number of frames, of all people together, that are retargeted without a job
 
 
@@ -133,3 +130,24 @@ def _retargeted(actor: Actor, drive: Drive) -> SampledClip:
     """Return the motion of an actor retargeted by a changed drive."""
     clip = driven_clip(drive, actor.figure)[0]
     return clip if drive.finish is None else drive.finish(clip)
+
+
+def plants_feet(state: AppState) -> bool:
+    """Return whether the feet of the chosen actor are planted, or will be after retargeting."""
+    drive = shown_drive(state, state.actor)
+    return drive is not None and drive.plants_feet
+
+
+def toggle_feet(state: AppState) -> None:
+    """Switch planted feet on or off for the chosen actor and all people of its capture."""
+    if no_edit(state):
+        state.say_status(no_edit(state))
+        return
+    if state.actor.clip is None:
+        state.say_status(NOT_DRIVEN)
+        return
+    is_on = not plants_feet(state)
+    text = f"Feet: {'kept on the ground' if is_on else 'as retargeted'}"
+    change_drive(
+        state, lambda drive: replace(drive, plants_feet=is_on), lambda: state.say_status(text)
+    )

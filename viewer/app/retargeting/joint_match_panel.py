@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import field
+
+import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.ink import WARNING, ink
+from viewer.app.core.ink import WARNING, faint, ink
 from viewer.app.core.reasons import no_drive
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
@@ -16,7 +19,7 @@ from viewer.app.core.widgets import (
     note_item,
     same_line_if_room,
 )
-from viewer.app.retargeting.drive_changes import NOT_DRIVEN, no_edit
+from viewer.app.retargeting.drive_changes import NOT_DRIVEN, no_edit, shown_drive
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
     ask_where_to_save,
@@ -24,12 +27,15 @@ from viewer.app.retargeting.match_actions import (
     match_automatically,
     match_joint,
 )
-from viewer.app.retargeting.skeleton_preview import draw_preview, hover_pair
-from viewer.app.retargeting.state import JointMatch, Shown, shown_match
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import counted, printable
-
-__all__ = ["draw"]
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import matches_of
+from viewer.rig.retargeting.joint_positions import front_axes, rest_positions
+from viewer.rig.skeleton import joint_labels, shown_joints
 
 _ORIGINS = {
     "map": ("edited", "chosen by hand or in a joint map"),
@@ -68,10 +74,10 @@ def draw(state: AppState) -> None:
     if is_wide:
         imgui.same_line()
     left = imgui.get_content_region_avail()
-    draw_preview(state, shown, (left.x, left.y))
+    _draw_preview(state, shown, (left.x, left.y))
 
 
-def _draw_buttons(state: AppState, shown: Shown) -> None:
+def _draw_buttons(state: AppState, shown: _Shown) -> None:
     view = state.of(JointMatch)
     text = f"{shown.n_driven} of {counted(len(shown.target.joints), 'joint')} driven"
     imgui.align_text_to_frame_padding()
@@ -103,7 +109,7 @@ def _draw_buttons(state: AppState, shown: Shown) -> None:
     view.only_unmatched = checkbox(state, "Only unmatched", view.only_unmatched)
 
 
-def _draw_table(state: AppState, shown: Shown, hovered: set[int]) -> None:
+def _draw_table(state: AppState, shown: _Shown, hovered: set[int]) -> None:
     rows = _listed(state, shown)
     if not rows:
         imgui.text_disabled("no joint matches the filter")
@@ -132,7 +138,7 @@ def _draw_table(state: AppState, shown: Shown, hovered: set[int]) -> None:
     imgui.end_table()
 
 
-def _listed(state: AppState, shown: Shown) -> list[int]:
+def _listed(state: AppState, shown: _Shown) -> list[int]:
     """Return the joints of the figure that pass the filter."""
     view = state.of(JointMatch)
     wanted, found = view.filter.lower(), []
@@ -145,7 +151,7 @@ def _listed(state: AppState, shown: Shown) -> list[int]:
     return found
 
 
-def _draw_row(state: AppState, shown: Shown, joint: int, is_hovered: bool) -> None:
+def _draw_row(state: AppState, shown: _Shown, joint: int, is_hovered: bool) -> None:
     """Draw a pair of joints; ``is_hovered``: whether the pair is hovered in the drawing."""
     label, partner = shown.target.labels[joint], int(shown.partners[joint])
     imgui.table_next_row()
@@ -174,10 +180,10 @@ def _draw_row(state: AppState, shown: Shown, joint: int, is_hovered: bool) -> No
         imgui.text_colored(ink(WARNING), text)
     explain(what)
     if is_over:
-        hover_pair(state, shown, joint)
+        _hover_pair(state, shown, joint)
 
 
-def _draw_choice(state: AppState, shown: Shown, joint: int, partner: int) -> None:
+def _draw_choice(state: AppState, shown: _Shown, joint: int, partner: int) -> None:
     """Draw the list of the motion's joints, with a filter."""
     view, labels = state.of(JointMatch), shown.source.labels
     label = shown.target.labels[joint]
@@ -208,3 +214,281 @@ def _draw_choice(state: AppState, shown: Shown, joint: int, partner: int) -> Non
             text = f"drives {printable(', '.join(drives[:_MOST_DRIVEN]), 60)}{more}"
             imgui.text_disabled(text)
     imgui.end_combo()
+
+
+_MATCHED = (0.45, 0.78, 1.0, 1.0)
+_HOVERED = (1.0, 0.86, 0.35, 1.0)
+_NEAR = 0.7  # distance in font sizes within which a joint is hovered
+_DOT = 0.16  # radius of a joint, font sizes
+_DRAG = 0.01  # radians per pixel
+_Box = tuple[float, float, float, float]
+
+
+def _draw_preview(state: AppState, shown: _Shown, size: tuple[float, float]) -> None:
+    """Draw both skeletons at rest; a click selects a joint of the figure, a drag orbits.
+
+    Parameters
+    ----------
+    state : AppState
+        State that contains the panel's state.
+    shown : Shown
+        The match.
+    size : (float, float)
+        Width and height in window coordinates.
+    """
+    view = state.of(JointMatch)
+    corner = imgui.get_cursor_screen_pos()
+    imgui.invisible_button("##preview", (max(size[0], 1.0), max(size[1], 1.0)))
+    note_item(state, "preview")
+    is_over = imgui.is_item_hovered()
+    if imgui.is_item_active():
+        view.yaw += _DRAG * imgui.get_io().mouse_delta.x
+    half = 0.5 * size[0]
+    boxes = [(corner.x + k * half, corner.y, corner.x + (k + 1) * half, corner.y + size[1])
+             for k in range(2)]  # fmt: skip
+    placed = [
+        _placed(side, view.yaw, box)
+        for side, box in zip((shown.target, shown.source), boxes, strict=True)
+    ]
+    if is_over:
+        _hover(state, shown, placed)
+    draw_list = imgui.get_window_draw_list()
+    draw_list.push_clip_rect((corner.x, corner.y), (corner.x + size[0], corner.y + size[1]), True)
+    target = shown.target, {j for j in shown.target.joints.tolist() if shown.partners[j] >= 0}
+    source = shown.source, set(shown.driven)
+    for number, (side, used) in enumerate((target, source)):
+        title = f"{('Figure', 'Motion')[number]}: {printable(side.name, 40)}"
+        place = boxes[number][0] + 0.4 * imgui.get_font_size(), corner.y
+        draw_list.add_text(place, imgui.get_color_u32(imgui.Col_.text), title)
+        _draw_side(side, placed[number], used, view.hovered[number])
+    draw_list.pop_clip_rect()
+
+
+def _hover_pair(state: AppState, shown: _Shown, joint: int) -> None:
+    """Highlight a joint of the figure and the joint that drives it."""
+    partner = int(shown.partners[joint])
+    state.of(JointMatch).hovered = {joint}, {partner} if partner >= 0 else set()
+
+
+def _hover(state: AppState, shown: _Shown, placed: list[Floats]) -> None:
+    """Highlight the joint under the mouse and its partners; a click selects the figure's joint."""
+    view = state.of(JointMatch)
+    near = _NEAR * imgui.get_font_size()
+    mouse = np.array([imgui.get_mouse_pos().x, imgui.get_mouse_pos().y])
+    number, joint = -1, -1
+    for index, side in enumerate((shown.target, shown.source)):
+        distances = np.linalg.norm(placed[index][side.joints] - mouse, axis=1)
+        if len(distances) and distances.min() < near:
+            near = float(distances.min())
+            number, joint = index, int(side.joints[distances.argmin()])
+    if number == 0:
+        _hover_pair(state, shown, joint)
+    elif number == 1:
+        view.hovered = set(shown.driven.get(joint, ())), {joint}
+    chosen = sorted(view.hovered[0]) if number >= 0 else []
+    if chosen and imgui.is_mouse_released(imgui.MouseButton_.left) and not _was_dragged():
+        state.selected_joint = view.scrolls_to = chosen[0]
+
+
+def _was_dragged() -> bool:
+    delta = imgui.get_mouse_drag_delta(imgui.MouseButton_.left)
+    return bool(abs(delta.x) + abs(delta.y) > imgui.get_io().mouse_drag_threshold)
+
+
+def _placed(side: _Side, yaw: float, box: _Box) -> Floats:
+    """Return the joints in window coordinates, scaled to fit the box: (J, 2)."""
+    letter = imgui.get_font_size()
+    flat = np.stack(
+        [
+            np.cos(yaw) * side.points[:, 0] + np.sin(yaw) * side.points[:, 2],
+            -side.points[:, 1],
+        ],
+        axis=1,
+    )
+    low, high = flat[side.joints].min(axis=0), flat[side.joints].max(axis=0)
+    # The title is above, and labels of the outer joints need some room.
+    room = np.array([box[2] - box[0] - 3.0 * letter, box[3] - box[1] - 3.0 * letter])
+    # The width must not change during a rotation about the up axis.
+    wide = float(np.ptp(side.points[side.joints][:, [0, 2]], axis=0).max())
+    extent = np.array([max(wide, 1e-9), max(float(high[1] - low[1]), 1e-9)])
+    scale = float((np.maximum(room, letter) / extent).min())
+    middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]) + 0.6 * letter])
+    placed: Floats = middle + scale * (flat - 0.5 * (low + high))
+    return placed
+
+
+def _draw_side(side: _Side, placed: Floats, used: set[int], hovered: set[int]) -> None:
+    """Draw one skeleton; ``used``: joints with a partner."""
+    draw_list, letter = imgui.get_window_draw_list(), imgui.get_font_size()
+    bone = imgui.get_color_u32(faint(0.35))
+    shown = set(side.joints.tolist())
+    for joint in side.joints.tolist():
+        parent = int(side.parents[joint])
+        if parent in shown:
+            draw_list.add_line(_at(placed[parent]), _at(placed[joint]), bone, 0.12 * letter)
+    colors = {True: imgui.get_color_u32(ink(_MATCHED)), False: imgui.get_color_u32(ink(WARNING))}
+    for joint in side.joints.tolist():
+        is_used = joint in used
+        if is_used:
+            draw_list.add_circle_filled(_at(placed[joint]), _DOT * letter, colors[True])
+        else:
+            draw_list.add_circle(_at(placed[joint]), _DOT * letter, colors[False], 0, 1.5)
+    marked = imgui.get_color_u32(ink(_HOVERED))
+    for joint in sorted(hovered & shown):
+        draw_list.add_circle(_at(placed[joint]), 2.2 * _DOT * letter, marked, 0, 0.14 * letter)
+        _draw_label(printable(side.labels[joint], 40), placed[joint])
+
+
+def _draw_label(text: str, at: Floats) -> None:
+    """Draw the name of a joint on a background, so that bones do not cross it."""
+    draw_list, letter = imgui.get_window_draw_list(), imgui.get_font_size()
+    size = imgui.calc_text_size(text)
+    x, y = float(at[0]) + 0.6 * letter, float(at[1]) - 0.5 * size.y
+    edge = draw_list.get_clip_rect_max().x
+    x = min(x, edge - size.x - 0.3 * letter)
+    plate = imgui.get_color_u32(imgui.Col_.popup_bg)
+    draw_list.add_rect_filled(
+        (x - 0.2 * letter, y), (x + size.x + 0.2 * letter, y + size.y), plate, 0.2 * letter
+    )
+    draw_list.add_text((x, y), imgui.get_color_u32(imgui.Col_.text), text)
+
+
+def _at(point: Floats) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
+
+
+_LONG = 1.3  # ratio of length to width from which a body is shown from the side
+_SIDE_VIEW = -1.1  # yaw of the view from the side, radians
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Side:
+    """One of the two skeletons.
+
+    Attributes
+    ----------
+    name : str
+        Name of the figure or the motion.
+    labels : tuple of J str
+        Labels of its joints.
+    joints : (N,) int32
+        Joints that are shown.
+    parents : (J,)
+        Parents of its joints.
+    points : (J, 3)
+        Joints at rest seen from the front: to the body's left, up, and forward.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    joints: Ints
+    parents: Ints
+    points: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """A match of joints with everything that the panel draws.
+
+    Attributes
+    ----------
+    drive, figure : Drive, Figure
+        The drive and the figure that were matched.
+    target, source : Side
+        The figure and the motion.
+    partners : (J,)
+        Joint of the motion for each joint of the figure, -1 for none.
+    origins : tuple of J str
+        How each joint was matched, see ``Matches``.
+    driven : dict
+        Joints of the figure that each joint of the motion drives.
+    """
+
+    drive: Drive
+    figure: Figure
+    target: _Side
+    source: _Side
+    partners: Ints
+    origins: tuple[str, ...]
+    driven: dict[int, list[int]]
+
+    @property
+    def n_driven(self) -> int:
+        """Number of joints of the figure that are driven."""
+        return int((self.partners[self.target.joints] >= 0).sum())
+
+    @property
+    def unused(self) -> list[int]:
+        """Joints of the motion that drive no joint."""
+        return [joint for joint in self.source.joints.tolist() if joint not in self.driven]
+
+
+@dataclass(slots=True)
+class JointMatch:
+    """State of the panel.
+
+    Attributes
+    ----------
+    filter : str
+        Text that the names of a listed pair must contain.
+    source_filter : str
+        Text that the names offered in an open list must contain.
+    only_unmatched : bool
+        Whether only joints without a partner are listed.
+    yaw : float
+        Rotation of the drawn skeletons about the up axis, radians.
+    hovered : (set of int, set of int)
+        Joints of the figure and of the motion under the mouse, and their partners.
+    scrolls_to : int
+        Joint to whose row the table scrolls, -1 for none.
+    shown : Shown or None
+        The match, computed again when the drive or the figure changes.
+    """
+
+    filter: str = ""
+    source_filter: str = ""
+    only_unmatched: bool = False
+    yaw: float = 0.0
+    hovered: tuple[set[int], set[int]] = field(default_factory=lambda: (set(), set()))
+    scrolls_to: int = -1
+    shown: _Shown | None = None
+
+
+def shown_match(state: AppState) -> _Shown | None:
+    """Return the match of the chosen actor's joints; None if no motion drives it.
+
+    A change is shown at once, even while the motion is still retargeted.
+    """
+    view, actor = state.of(JointMatch), state.actor
+    drive, figure = shown_drive(state, actor), actor.figure
+    if drive is None:
+        return None
+    shown = view.shown
+    if shown is None or shown.drive is not drive or shown.figure is not figure:
+        is_other = shown is None or shown.drive.motion is not drive.motion
+        shown = view.shown = _match(drive, figure)
+        if is_other:
+            lengths = np.ptp(shown.target.points, axis=0)
+            view.yaw = _SIDE_VIEW if lengths[2] > _LONG * lengths[0] else 0.0
+            view.filter, view.only_unmatched = "", False
+    return shown
+
+
+def _match(drive: Drive, figure: Figure) -> _Shown:
+    """Return the match of a drive with a figure."""
+    matches = matches_of(drive, figure)
+    driven: dict[int, list[int]] = {}
+    for joint, partner in enumerate(matches.partners.tolist()):
+        if partner >= 0:
+            driven.setdefault(partner, []).append(joint)
+    source, target = rest_positions(drive, figure)
+    mine = target @ front_axes(target, matches, figure.up, is_source=False).T
+    theirs = source @ front_axes(source, matches, figure.up, is_source=True).T
+    sides = _side(figure, mine), _side(drive.motion.figure, theirs)
+    return _Shown(drive, figure, *sides, matches.partners, matches.origins, driven)
+
+
+def _side(figure: Figure, points: Floats) -> _Side:
+    skeleton = figure.require_skeleton()
+    joints = shown_joints(skeleton)
+    return _Side(figure.name, joint_labels(skeleton), joints, skeleton.parents, points)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,6 @@ from viewer.app.core.state import AppState
 from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.state import Comparison, Result, Rigging
-from viewer.app.rigging.trial_motion import TRIAL, trial_clip
 from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
@@ -21,35 +21,16 @@ from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import Pairs
 from viewer.rig.comparison.weights import row_distances
+from viewer.rig.hierarchy import depth_first
 from viewer.rig.motion.baking import baked
-from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 from viewer.rig.skin import Skin, owners
-
-__all__ = [
-    "MATCH_COLORS",
-    "RESULT_COLORS",
-    "TARGET",
-    "compare",
-    "no_motion_of",
-    "no_trial_of",
-    "plays_motion",
-    "plays_trial",
-    "put_results",
-    "save_rigged",
-    "set_motion",
-    "set_trial",
-    "show_colors",
-    "show_match",
-    "show_version",
-    "shown_result",
-    "shown_version",
-    "switch_version",
-    "versions",
-]
 
 MATCH_COLORS = {
     "class:match": "matched or not",
@@ -57,14 +38,12 @@ MATCH_COLORS = {
     "field:match angle": "angle",
 }
 """Scalar quantities that show how the target matches the template, with their labels."""
-
 RESULT_COLORS = {
     "class:confidence": "confidence",
     "field:distance": "distance",
     "class:guarded": "rest position",
 }
 """Scalar quantities that show how the weights of a result were found, with their labels."""
-
 TARGET = "target"
 """Key of the original mesh among the versions; the others are named after methods."""
 
@@ -224,7 +203,7 @@ def plays_motion(result: Result) -> bool:
 def plays_trial(result: Result) -> bool:
     """Return whether a result plays the trial motion."""
     clip = result.actor.clip
-    return isinstance(clip, Clip) and clip.name == TRIAL
+    return isinstance(clip, Clip) and clip.name == _TRIAL
 
 
 def no_trial_of(result: Result) -> str:
@@ -294,3 +273,52 @@ def save_rigged(state: AppState, result: Result, path: Path) -> None:
         return
     inputs = result.template.paths
     save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, result)
+
+
+_TRIAL = "trial motion"
+"""Name of the clip."""
+_ANGLE = math.radians(35.0)
+_LONGEST, _WHOLE = 0.9, 20.0
+"""Maximum duration of the motion of one joint, and of all joints, in seconds."""
+
+
+def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
+    """Return a motion that begins and ends in a pose; None if no joint can rotate.
+
+    Each joint except the roots rotates about the axis with the widest range, within its limits.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Skeleton with J joints and their DOFs.
+    pose : Pose
+        Pose of the skeleton.
+    """
+    order = depth_first(skeleton.parents)
+    dofs = [dof for joint in order.tolist() if (dof := _bending_dof(skeleton, joint)) >= 0]
+    if not dofs:
+        return None
+    seconds = min(_LONGEST, _WHOLE / len(dofs))
+    channels = tuple(
+        _channel(skeleton, dof, float(pose.dofs[dof]), number * seconds, seconds)
+        for number, dof in enumerate(dofs)
+    )
+    return Clip(_TRIAL, channels, 0.0, seconds * len(dofs))
+
+
+def _bending_dof(skeleton: Skeleton, joint: int) -> int:
+    """Return the rotation DOF of a joint with the widest range; -1 if it has none or is a root."""
+    if skeleton.parents[joint] < 0:
+        return -1
+    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
+    ranges = np.ptp(skeleton.dof_limits[own], axis=1)
+    own, ranges = own[ranges > 0.0], ranges[ranges > 0.0]
+    return int(own[np.argmax(ranges)]) if len(own) else -1
+
+
+def _channel(skeleton: Skeleton, dof: int, value: float, start: float, seconds: float) -> Channel:
+    low, high = skeleton.dof_limits[dof]
+    bent = np.clip([value, value + _ANGLE, value - _ANGLE, value], low, high)
+    bent[[0, 3]] = value
+    times = start + seconds * np.array([0.0, 0.3, 0.7, 1.0])
+    return Channel(dof, times, bent, (("smooth", "smooth"),) * 4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -30,34 +31,28 @@ from viewer.app.rigging.state import (
     Running,
     Template,
 )
-from viewer.app.rigging.steps import (
-    align_template,
-    match_fields,
-    match_settings,
-    transfer_settings,
-    with_known_method,
-)
-from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.similarity import Similarity
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings, alignment_lines
+from viewer.autorig.correspondence.matching import MatchSettings, match
+from viewer.autorig.correspondence.matching import Template as Surface
 from viewer.autorig.pipeline import transfer
-from viewer.autorig.settings import METHODS
+from viewer.autorig.rigged import Rigged
+from viewer.autorig.settings import METHODS, TransferSettings
+from viewer.autorig.surface.welding import weld
+from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.errors import RigError
 from viewer.loading import load
 from viewer.loading.placing import placed_like
 from viewer.phrases import printable
+from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import surface_point
-from viewer.rig.mesh import Mesh
+from viewer.rig.mesh import Mesh, bounding_box, box_size
+from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, free_title
-
-__all__ = [
-    "finish_work",
-    "landmark_settings",
-    "start_adding",
-    "start_align",
-    "start_match",
-    "start_reading",
-    "start_run",
-]
+from viewer.rig.shape import shaped
+from viewer.rig.skinning import deform
 
 _Finish = Callable[[AppState], None]
 _STEPS = {
@@ -280,7 +275,7 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
 def start_match(state: AppState) -> None:
     """Find the vertices of the target that match the template, and show them as colours."""
     rigging, placing = state.of(Rigging), placing_now(state)
-    settings, actor = match_settings(rigging.choices), rigging.target
+    settings, actor = _match_settings(rigging.choices), rigging.target
     if placing is None or actor is None:
         return
     take, similarity = _snapshot(state, aligned=True), placing.similarity
@@ -289,7 +284,7 @@ def start_match(state: AppState) -> None:
     def act(report: Report) -> _Finish:
         template = take(report)
         report(0, 0, "Finding closest points")
-        fields, fraction = match_fields(template, similarity, mesh, settings)
+        fields, fraction = _match_fields(template, similarity, mesh, settings)
         return lambda state: show_match(state, actor, fields, fraction)
 
     _begin(state, "Finding closest points", act)
@@ -323,10 +318,10 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
         for number, method in enumerate(methods):
             low, high = (start + (1.0 - start) * (number + k) / len(methods) for k in (0, 1))
             progress = _part_progress(report, low, high, f"{printable(name, 40)}, {method}: ")
-            settings = transfer_settings(choices, method, found)
+            settings = _transfer_settings(choices, method, found)
             called = f"{name} {_CALLED[method]}"
             rigged = transfer(aligned.figure, aligned.pose, mesh, settings, progress, name=called)
-            rigged = with_known_method(rigged, found)
+            rigged = _with_known_method(rigged, found)
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
         return lambda state: _put(state, results, found)
@@ -339,3 +334,154 @@ def _put(state: AppState, results: list[Result], placing: Placing | None) -> Non
     _keep(state, results[0].template)
     state.of(Rigging).placing = placing
     put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)
+
+
+_Progress = Callable[[float, str], None]
+
+
+def align_template(
+    template: Template,
+    own: Template,
+    target: Mesh,
+    settings: AlignmentSettings,
+    fits: bool,
+    progress: _Progress,
+) -> Placing:
+    """Align a template with a target.
+
+    Parameters
+    ----------
+    template : Template
+        Template in its initial pose.
+    own : Template
+        Template before any fit.
+    target : Mesh
+        Mesh with which to align it.
+    settings : AlignmentSettings
+        Settings of the alignment.
+    fits : bool
+        Whether joints may be rotated and limbs resized.
+    progress : callable
+        Called with the fraction done and the name of the current step; may raise to cancel.
+
+    Raises
+    ------
+    RigError
+        As for ``align``.
+    """
+    plain = template.pose.copy()
+    plain.shape_weights = np.zeros(0)  # the shape is now part of the figure
+    figure = shaped(template.figure, template.pose.shape_weights)
+    found = align_posed(figure, plain, target, settings, fits, progress)
+    is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
+    is_fitted = is_other or bool(found.lines)
+    return Placing(
+        similarity=found.alignment.similarity,
+        alignment=found.alignment,
+        settings=settings,
+        fitted=replace(template, figure=found.figure, pose=found.pose) if is_fitted else None,
+        lines=found.lines,
+        meshes=(target, own.figure),
+        pose=pose_key(own.pose),
+    )
+
+
+def _with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
+    """Return a result whose report names the alignment method, if the alignment was given.
+
+    Parameters
+    ----------
+    rigged : Rigged
+        Result of the transfer.
+    placing : Placing or None
+        Placement that was passed to the transfer; None if there was none.
+    """
+    known = placing.alignment if placing is not None else None
+    if placing is None or known is None or rigged.alignment is None:
+        return rigged
+    if rigged.alignment.how != "given":
+        return rigged  # the transfer has aligned the template itself
+    known_alignment = replace(rigged.alignment, how=known.how)
+    rest = rigged.lines[len(alignment_lines(rigged.alignment)) :]
+    lines = (*alignment_lines(known_alignment), *placing.lines, *rest)
+    return replace(rigged, alignment=known_alignment, lines=lines)
+
+
+def _match_fields(
+    template: Template, similarity: Similarity, mesh: Mesh, settings: MatchSettings
+) -> tuple[tuple[VertexField, ...], float]:
+    """Find the vertices of a target that match an aligned template.
+
+    Parameters
+    ----------
+    template : Template
+        Template in its current pose.
+    similarity : Similarity
+        Transform from template to target.
+    mesh : Mesh
+        Mesh of the target.
+    settings : MatchSettings
+        Conditions for a match.
+
+    Returns
+    -------
+    fields : tuple of VertexField
+        Matched or not, distance, and angle in degrees, of each vertex.
+    fraction : float
+        Fraction of the vertices that match.
+    """
+    assert template.figure.mesh is not None  # templates have meshes
+    posed = similarity.apply(deform(template.figure, template.pose)[0])
+    welded = weld(mesh.positions, mesh.triangles)
+    size = box_size(bounding_box(mesh.positions))
+    surface = Surface(posed, template.figure.mesh.triangles)
+    found = match(surface, welded, size, settings)
+    matched, rows = found.matched[welded.vertices], welded.vertices
+    distances, angles = found.points.distances[rows], np.degrees(found.angles[rows])
+    # In the order of CONFIDENCE, so that matched vertices have the same colour in both maps.
+    classes = ("matched", "unmatched")
+    fields = (
+        VertexField("match", "Match with the template", (~matched).astype(float), names=classes),
+        VertexField("match distance", "Distance to the template", distances, "length"),
+        VertexField("match angle", "Angle to the template", angles, "degrees"),
+    )
+    return fields, float(matched.mean())
+
+
+def _match_settings(choices: RigChoices) -> MatchSettings:
+    """Return the conditions for a match that are set in the panel."""
+    angle, usual = math.radians(choices.max_angle), MatchSettings()
+    return MatchSettings(
+        max_distance=choices.max_distance, max_angle=angle, near_angle=max(angle, usual.near_angle)
+    )
+
+
+def _transfer_settings(
+    choices: RigChoices, method: str, placing: Placing | None
+) -> TransferSettings:
+    """Return the settings to transfer the rig of a template from its current placement.
+
+    Parameters
+    ----------
+    choices : RigChoices
+        Settings of the panel.
+    method : str
+        A key of ``METHODS``.
+    placing : Placing or None
+        Placement of the template; None for a method that needs none.
+    """
+    alignment = AlignmentSettings()
+    if placing is not None:
+        alignment = AlignmentSettings(matrix=placing.similarity.matrix)
+    return TransferSettings(
+        method=method,
+        alignment=alignment,
+        weights=WeightSettings(
+            match=_match_settings(choices),
+            smoothing_rounds=choices.smoothing,
+            max_influences=choices.max_influences or None,
+        ),
+        joints=choices.joints,
+        fits=False,  # the template was fitted during the alignment
+        correctives=choices.correctives,
+    )

@@ -1,0 +1,372 @@
+"""Decision whether the window may close, or files may replace the scene, or the user is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from imgui_bundle import imgui
+
+from viewer.app.core.edited_animations import Animations, edited_aside
+from viewer.app.core.jobs import Job
+from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button, explain, same_line_if_room
+from viewer.app.curves.clip_actions import ask_for_clip
+from viewer.app.files.motion_export import ask_for_motion
+from viewer.app.files.state import Files
+from viewer.app.playback.animations import choose_animation
+from viewer.app.posing.pose_actions import ask_for_pose, pose_of_file
+from viewer.app.retargeting.drive_changes import shown_drive
+from viewer.app.retargeting.match_actions import ask_where_to_save
+from viewer.app.rigging.results import shown_result
+from viewer.app.rigging.results_section import ask_where_to_save_rig
+from viewer.app.rigging.state import Rigging
+from viewer.data_classes import dataclass
+from viewer.formats import opened_text
+from viewer.phrases import printable
+from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.spring_motion import release_springs
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose, pose_of
+from viewer.rig.scene import Actor, figure_pose
+
+if TYPE_CHECKING:
+    pass
+
+
+_MOST_LISTED = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Question:
+    """A question with buttons.
+
+    Attributes
+    ----------
+    title : str
+        Title of its dialog.
+    lines : tuple of str
+        Its paragraphs.
+    answers : tuple of (str, str, callable)
+        Label, tooltip and action of each button.
+    """
+
+    title: str
+    lines: tuple[str, ...]
+    answers: tuple[tuple[str, str, Callable[[AppState], None]], ...]
+
+
+def request_quit(state: AppState) -> None:
+    """Quit as soon as nothing is lost without a question; further requests ask it again."""
+    closing, files = state.of(Closing), state.of(Files)
+    closing.is_requested, closing.waits = True, False
+    # An open dialog or message would cover the question.
+    files.dialog, state.error = None, ""
+    advance_closing(state)
+
+
+def advance_closing(state: AppState) -> None:
+    """Close the window after a request if nothing would be lost."""
+    closing = state.of(Closing)
+    if closing.is_requested and _job(state) is None and not _edits(state):
+        closing.is_over = True
+
+
+def may_replace_scene(state: AppState) -> bool:
+    """Return whether files that were read may replace the scene: nothing would be lost."""
+    return not _edits(state)
+
+
+def keep_open(state: AppState) -> None:
+    """Answer the question with Cancel: keep the window open, and the scene as it is."""
+    closing, files = state.of(Closing), state.of(Files)
+    if not closing.is_requested:
+        files.loader = None
+        state.say_status("Opening cancelled")
+    closing.withdraw()
+
+
+def question_of(state: AppState) -> _Question | None:
+    """Return the question to ask now; None while there is none, or a dialog answers it."""
+    closing, files = state.of(Closing), state.of(Files)
+    if state.error or files.dialog is not None or closing.is_over:
+        return None
+    job = _job(state)
+    if closing.is_requested and job is not None:
+        return None if closing.waits or job.is_cancelled else _about_job(job)
+    loader = files.loader
+    if closing.is_requested:
+        purpose = "quitting"
+    elif loader is not None and loader.is_done and loader.scene is not None and job is None:
+        purpose = f"opening {printable(opened_text(loader.paths[-1]), 60)}"
+    else:
+        return None
+    edits = _edits(state)
+    return _about_edits(edits, purpose) if edits else None
+
+
+def _job(state: AppState) -> Job | None:
+    """Return the running job if its output would be lost."""
+    job = state.job
+    return None if job is None or not job.output or job.is_done else job
+
+
+def _edits(state: AppState) -> list[_Unsaved]:
+    """Return the unsaved edits that the user has not agreed to lose."""
+    # Imports panels, which are otherwise loaded on first use.
+
+    # The edits of this frame count too.
+    state.history.observe(state.scene, state.options, busy=False)
+    return [] if state.of(Closing).discards else unsaved_edits(state)
+
+
+def _about_job(job: Job) -> _Question:
+    return _Question(
+        "Unfinished work",
+        (f"{job.title} is not finished yet.",),
+        (
+            ("Finish first", "the window closes when it is finished", _wait),
+            (f"Cancel {job.output} and quit", "existing files are kept", _cancel_job),
+            ("Keep working", "keep the window open", keep_open),
+        ),
+    )
+
+
+def _wait(state: AppState) -> None:
+    state.of(Closing).waits = True
+
+
+def _cancel_job(state: AppState) -> None:
+    if state.job is not None:
+        state.job.cancel()
+
+
+def _about_edits(edits: list[_Unsaved], purpose: str) -> _Question:
+    listed = [edit.text for edit in edits[:_MOST_LISTED]]
+    if len(edits) > _MOST_LISTED:
+        listed.append(f"and {len(edits) - _MOST_LISTED:,} more")
+
+    def save(state: AppState) -> None:
+        state.of(Closing).waits = state.of(Closing).is_requested  # for the job that writes it
+        edits[0].ask(state)
+
+    def discard(state: AppState) -> None:
+        state.of(Closing).discards = True
+
+    return _Question(
+        "Unsaved changes",
+        (f"Save changes before {purpose}?", *listed),
+        (
+            ("Save…", "choose a file for the first of these changes", save),
+            ("Discard", "lose these changes", discard),
+            ("Cancel##closing", "continue as before", keep_open),
+        ),
+    )
+
+
+_LONGEST = 40  # maximum length of a name in characters
+
+# Rounding of a clip that is evaluated for one actor or for many, in lengths and radians.
+_SAME = 1e-9
+_VALUES = (
+    "dofs",
+    "translations",
+    "rotations",
+    "scales",
+    "shape_weights",
+    "figure_scale",
+    "figure_translation",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unsaved:
+    """Edits that would be lost.
+
+    Attributes
+    ----------
+    text : str
+        Description of the edits.
+    ask : callable
+        Opens the dialog that saves them, given the state.
+    """
+
+    text: str
+    ask: Callable[[AppState], None]
+
+
+def unsaved_edits(state: AppState) -> list[_Unsaved]:
+    """Return the edits that no file contains; those that were undone are not listed."""
+    return [*_keys(state), *_poses(state), *_matches(state), *_rigs(state)]
+
+
+def _keys(state: AppState) -> list[_Unsaved]:
+    """Return the edited keys, including those of animations that are not being played."""
+    saved, found = state.of(SavedWork), list[_Unsaved]()
+    for row, actor in enumerate(state.scene.actors):
+        name, clip = printable(actor.name, _LONGEST), actor.clip
+        is_read = any(animation.plays(clip) for animation in actor.figure.animations)
+        if isinstance(clip, Clip | TransformClip) and clip not in saved and not is_read:
+            text = f"{name}: keys of {printable(clip.name, _LONGEST)}"
+            found.append(_Unsaved(text, partial(_ask_for_keys, row=row, index=-1)))
+        for index, aside in edited_aside(state.of(Animations), actor).items():
+            if aside not in saved:
+                text = f"{name}: keys of {printable(aside.name, _LONGEST)}"
+                found.append(_Unsaved(text, partial(_ask_for_keys, row=row, index=index)))
+    return found
+
+
+def _ask_for_keys(state: AppState, row: int, index: int) -> None:
+    """Ask where to save an actor's keys; ``index``: the animation to play first, -1 for none."""
+    state.choose_actor(row)
+    if index >= 0:
+        choose_animation(state, index)
+    if isinstance(state.actor.clip, Clip):
+        ask_for_clip(state)
+        return
+    # Only an export of the whole motion contains all keys.
+    state.clock.set_range(*state.clock.whole)
+    ask_for_motion(state, ".glb")
+
+
+def _poses(state: AppState) -> list[_Unsaved]:
+    """Return the poses and shapes that were made by hand."""
+    return [
+        _Unsaved(f"{printable(actor.name, _LONGEST)}: pose", partial(_ask_for_pose, row=row))
+        for row, actor in enumerate(state.scene.actors)
+        if _is_posed_by_hand(state, actor)
+    ]
+
+
+def _is_posed_by_hand(state: AppState, actor: Actor) -> bool:
+    """Return whether an actor's pose was edited, and is neither saved, reset nor that of its clip.
+
+    A clip overrides an edited pose when the time changes, but not the values that it does not
+    animate, such as the shape.
+    """
+    first = state.history.first_poses.get(actor)
+    if first is None or actor.pose is None:
+        return False
+    return not any(
+        _is_same(actor, pose)
+        or (actor.clip is not None and _is_same(actor, state.clock.posed(actor, pose)))
+        for key in (first, *state.of(SavedWork).poses_of(actor))
+        for pose in _with_resets(actor.figure, pose_of(key))
+    )
+
+
+def _with_resets(figure: Figure, pose: Pose) -> list[Pose]:
+    """Return a pose, and what it becomes when the pose, the shape or both are reset."""
+    poses = [pose, pose_of_file(figure, pose)]
+    shape = figure_pose(figure).shape_weights
+    return [*poses, *(replace(one, shape_weights=shape) for one in poses)]
+
+
+def _is_same(actor: Actor, pose: Pose) -> bool:
+    """Return whether an actor has a pose, apart from spring joints that swing."""
+    own, other = actor.copy(), actor.copy()
+    other.pose = pose.copy()
+    if actor.springs is not None:
+        release_springs(own)
+        release_springs(other)
+    return all(
+        np.allclose(getattr(own.pose, name), getattr(other.pose, name), rtol=_SAME, atol=_SAME)
+        for name in _VALUES
+    )
+
+
+def _ask_for_pose(state: AppState, row: int) -> None:
+    state.choose_actor(row)
+    ask_for_pose(state)
+
+
+def _matches(state: AppState) -> list[_Unsaved]:
+    """Return the joint matches chosen by hand; people of a capture have one in common."""
+    saved, found = state.of(SavedWork), dict[int, _Unsaved]()
+    for row, actor in enumerate(state.scene.actors):
+        drive = shown_drive(state, actor)
+        joint_map = None if drive is None else drive.joint_map
+        if joint_map is not None and joint_map not in saved:
+            text = f"{printable(actor.name, _LONGEST)}: joint match"
+            found.setdefault(id(joint_map), _Unsaved(text, partial(_ask_for_match, row=row)))
+    return [*found.values()]
+
+
+def _ask_for_match(state: AppState, row: int) -> None:
+    state.choose_actor(row)
+    ask_where_to_save(state)
+
+
+def _rigs(state: AppState) -> list[_Unsaved]:
+    """Return the rig that the Rig panel shows; the other method's is an alternative to it."""
+    if state.of(Rigging).scene is not state.scene:
+        return []
+    result = shown_result(state)
+    if result is None or result in state.of(SavedWork):
+        return []
+    text = f"{printable(result.target.name, _LONGEST)}: rig"
+    return [_Unsaved(text, lambda state: ask_where_to_save_rig(state, result))]
+
+
+_WIDTH = 28.0  # in font sizes
+
+
+def draw_question(state: AppState) -> None:
+    """Draw the question above everything else if there is one, and apply the answer."""
+    question = question_of(state)
+    if question is None:
+        return
+    title = f"{question.title}###closing"
+    imgui.open_popup(title)
+    viewport = imgui.get_main_viewport()
+    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, (0.5, 0.5))
+    width = min(_WIDTH * imgui.get_font_size(), 0.92 * viewport.size.x)
+    imgui.set_next_window_size((width, 0.0))
+    opened, stays = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
+    if not opened:
+        return
+    answer: Callable[[AppState], None] | None = None if stays else keep_open
+    for line in question.lines:
+        imgui.text_wrapped(printable(line, 1000))
+    for number, (label, effect, act) in enumerate(question.answers):
+        if number:
+            same_line_if_room(label)
+        if button(state, label):
+            answer = act
+        explain(effect)
+    if answer is not None:
+        imgui.close_current_popup()
+    imgui.end_popup()
+    if answer is not None:
+        answer(state)
+
+
+@dataclass(slots=True)
+class Closing:
+    """Progress of a request to quit; also used before files replace the scene.
+
+    Attributes
+    ----------
+    is_requested : bool
+        Whether the user asked to quit.
+    waits : bool
+        Whether the running job is finished first.
+    discards : bool
+        Whether the user agreed to lose the unsaved edits.
+    is_over : bool
+        Whether the window closes.
+    """
+
+    is_requested: bool = False
+    waits: bool = False
+    discards: bool = False
+    is_over: bool = False
+
+    def withdraw(self) -> None:
+        """Keep the window open until the user asks to quit again."""
+        self.is_requested = self.waits = self.discards = False

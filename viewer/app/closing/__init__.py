@@ -1,1 +1,0 @@
-"""Questions before running jobs or unsaved edits are lost."""

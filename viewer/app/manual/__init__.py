@@ -1,1 +1,0 @@
-"""Window with the pages of the manual."""
