@@ -413,3 +413,54 @@ def test_errors_in_json_name_the_line(changes: dict[str, Any], line: int, item: 
         open_results(Source("a.json", text.encode()))
     assert caught.value.diagnostic is not None
     assert (caught.value.diagnostic.line, caught.value.diagnostic.values["item"]) == (line, item)
+
+
+def arrays_of(n_people: int, n_frames: int, axis: int, **more: Any) -> dict[str, Any]:
+    """Return arrays of all people and frames; ``axis``: that of the people."""
+    people = [stacked([(frame, person) for frame in range(n_frames)]) for person in range(n_people)]
+    return {key: np.stack([one[key] for one in people], axis) for key in people[0]} | more
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("n_people", "n_frames"), [(2, 3), (3, 2)])
+@pytest.mark.parametrize("told", ["person_id", "genders", "betas", "frame_ids"])
+def test_axis_of_people_in_arrays_is_told_by_other_values(
+    told: str, n_people: int, n_frames: int, axis: int
+) -> None:
+    values = {"person_id": np.arange(n_people), "genders": ["m", "f", "m"][:n_people],
+              "betas": np.ones((n_people, 10)), "frame_ids": np.arange(n_frames)}  # fmt: skip
+    given = arrays_of(n_people, n_frames, axis, **{told: values[told]})
+    source = Source("a.pkl", joblib_file(given))
+    assert found_in(source)[0] == {person: [*range(n_frames)] for person in range(n_people)}
+    assert "F007.video-axes" not in [note.key for note in source.diagnostics]
+    if told == "genders":
+        assert facts_of(given)[0] == dict(enumerate(["male", "female", "male"][:n_people]))
+
+
+def test_axis_of_people_in_arrays_that_nothing_states_is_said() -> None:
+    source = Source("a.pkl", joblib_file(arrays_of(2, 3, 1)))
+    assert found_in(source)[0] == {0: [0, 1, 2], 1: [0, 1, 2]}
+    (note,) = [note for note in source.diagnostics if note.key == "F007.video-axes"]
+    assert note.values == {"people": 2, "frames": 3}
+
+
+def test_ids_of_each_person_and_frame_tell_the_axis_of_people() -> None:
+    for axis in (0, 1):
+        given = arrays_of(2, 3, axis)
+        ids = np.stack([np.full(3, 4), np.full(3, 7)], axis)
+        source = Source("a.pkl", joblib_file(given | {"track_ids": ids}))
+        assert found_in(source)[0] == {4: [0, 1, 2], 7: [0, 1, 2]}
+        assert "F007.video-axes" not in [note.key for note in source.diagnostics]
+
+
+def test_one_shape_as_long_as_the_frames_is_that_of_all_people() -> None:
+    source = Source("a.pkl", joblib_file(arrays_of(2, 10, 1, betas=np.ones(10))))
+    assert found_in(source)[0] == {0: [*range(10)], 1: [*range(10)]}
+
+
+def test_people_in_lists_of_arrays_are_read() -> None:
+    # As in 3DPW, also if people have different numbers of frames.
+    parts = [stacked(ALONE), stacked([(0, 1), (1, 1)])]
+    given = {key: [part[key] for part in parts] for key in parts[0]} | {"genders": ["m", "f"]}
+    assert found_in(Source("a.pkl", joblib_file(given)))[0] == {0: [0, 1, 2], 1: [0, 1]}
+    assert facts_of(given)[0] == {0: "male", 1: "female"}

@@ -109,6 +109,8 @@ MESSAGES = {
     "their order",
     "F007.video-lists": "lists in a list: {people} people in {frames:#frame} assumed, because no "
     "number tells the people apart; write one to each dict as person_id",
+    "F007.video-axes": "poses with two axes before the joints: {people} people in {frames:#frame} "
+    "assumed, the shorter axis; add person_id with a number for each person to tell which",
     "F007.video-same-frame": "{n:#row} ignored: the person is in an earlier row of the same frame",
     "F002.video-identity": "{item:text}: expected a number or a name for each person or frame, "
     "found {found}",

@@ -15,10 +15,11 @@
 Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
 except the poses may also stand in one of the dicts around them, once, or as a list or dict with one
 value for each dict. Gender, model and rate may also stand in a dict beside the parameters. Several
-rows with the same frame are several people. Poses may also be a list with the rows of each frame,
-one for each person; other lists and arrays of this length then belong to the frames too. In a list
-of frames, None, an empty list, no rows and a dict without poses are frames without people. AMASS
-files and single poses have other spellings and are read by ``amass.py`` and ``pose.py``.
+rows with the same frame are several people. Poses may also be a list with the rows of each frame or
+person, or an array with an axis more than usual; other lists and arrays of this length then belong
+to the frames or people too. In a list of frames, None, an empty list, no rows and a dict without
+poses are frames without people. AMASS files and single poses have other spellings and are read by
+``amass.py`` and ``pose.py``.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from viewer.formats._video_mocap.numbers import (
     rows,
 )
 from viewer.formats._video_mocap.results import Results, Track
-from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
+from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors, shape_form
 from viewer.phrases import counted, printable
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
@@ -92,6 +93,9 @@ _PEOPLE = (
     *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
     *("person_ids", "track_ids", "tracklet_ids", "pids", "ids"),
 )
+# Kinds of archives of the people in an array, whose axis other values tell, or nothing does.
+_OF_PEOPLE = _TOLD, _ASSUMED = "people", "assumed people"
+_EACH = (*_PEOPLE, *GENDERS, *_SHAPES)  # keys with one value for each person
 _NAMES = {len(names): names for names in members_by_numbers().values()}
 _LARGEST = 1 << 30  # maximum number of a frame or person
 _DEEPEST = 3  # maximum depth of dicts inside dicts; lists between them do not count
@@ -183,6 +187,8 @@ def read(source: Source, archive: Archive) -> Results:
     people, span = _people(source, found)
     is_camera = layout.place is not None and layout.place.key in _CAMERA
     space = "camera" if is_camera else "world"
+    if any(scope.kind == _ASSUMED for one in found for scope in one.around):
+        source.warn("F007.video-axes", people=len(found), frames=layout.count)
     if layout.place is None:
         source.warn("F007.motion-place")
     recognised = [
@@ -195,7 +201,7 @@ def read(source: Source, archive: Archive) -> Results:
         key for one in found for value in one.layout.others for key in (value.key, value.within)
     }
     scopes = [scope for scope in (found[0].archive, *found[0].around) if not scope.is_list]
-    ignored = [key for scope in scopes for key in scope.keys if key not in used]
+    ignored = [*dict.fromkeys(key for scope in scopes for key in scope.keys if key not in used)]
     rest = ", ".join(map(printable, ignored[:_LISTED]))
     source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
     n_joints = sum(form.n_joints for _, form in layout.poses)
@@ -464,12 +470,12 @@ def _found(
         if layout.count or not (around and around[-1].is_list):
             yield _Found(path, around, archive, layout)
         return
-    by_frame = None if archive.is_list else _by_frame(archive)
-    if by_frame is not None:
-        key, frames = by_frame
-        found = [*_found(frames, budget, (*around, archive), (*path, key))]
+    parts = None if archive.is_list else _parts(archive)
+    if parts is not None:
+        key, items = parts
+        found = [*_found(items, budget, (*around, archive), (*path, key))]
         known = {one.path[len(path) + 1] for one in found}
-        if found and all(name in known or frames.get(name) is None for name in frames.keys):
+        if found and all(name in known or items.get(name) is None for name in items.keys):
             yield from found
             return
     depth = sum(not scope.is_list for scope in around)
@@ -479,56 +485,109 @@ def _found(
             yield from _found(inner, budget, (*around, archive), (*path, key))
 
 
-def _by_frame(archive: Archive) -> tuple[str, Archive] | None:
-    """Return the key of poses that are a list of frames, and these frames as a list of dicts.
+def _parts(archive: Archive) -> tuple[str, Archive] | None:
+    """Return the key of poses with an axis more than usual, and their items as a list of dicts.
 
-    Each frame has its own rows, one for each person; it is None without any. None if there is no
-    such list.
+    The items of a list of arrays are the rows of frames or of people (3DPW), and so are those of an
+    array with IDs of each person and frame; ``_are_frames`` tells which. Of other arrays, they are
+    people: of the axis as long as their shapes, genders or IDs, or else of the shorter one, which a
+    note says. None if there are no such poses.
     """
-    names = (*_WHOLE, *_ROOTS)
-    key = next((key for key in names if archive.has(key) and len(_items(archive, key, 3))), None)
-    if key is None:
+    kinds = ((_WHOLE, tuple(_NAMES)), (_BODIES, (21, 23)))
+    candidates = ((key, joints) for keys, joints in kinds for key in keys if archive.has(key))
+    key, joints = next(candidates, ("", ()))
+    shape = archive.shape(key) if key else ()
+    axis, kind = 0, archive.kind
+    if shape:
+        is_usual = len(shape) < 3 or shape_form(shape, joints) is not None
+        if is_usual or shape[0] * shape[1] < 2 or shape_form(shape[1:], joints) is None:
+            return None
+        if not any(archive.shape(name) == shape[:2] for name in _PEOPLE):
+            told = _axis_of_people(archive, shape)
+            axis = int(shape[1] < shape[0]) if told is None else told
+            kind = _ASSUMED if told is None else _TOLD
+    poses = _along(archive, key, axis) if key else ()
+    shapes = [
+        Archive(archive.source, "item", (key,), {key: item}.__getitem__).shape(key)
+        for item in poses
+    ]
+    forms = [shape_form(one, joints) for one in shapes]
+    has_rows = [
+        bool(item.shape[:1] != (0,) if isinstance(item, Deferred) else item) for item in poses
+    ]
+    if not any(forms) or any(has and not form for has, form in zip(has_rows, forms, strict=True)):
         return None
-    poses = _items(archive, key, 3)
-    columns = {
-        name: items for name in archive.keys if len(items := _items(archive, name)) == len(poses)
-    }
 
-    def frame(index: str) -> Archive:
+    def column(name: str) -> Sequence[Value]:
+        own = archive.shape(name)
+        is_table = own[:2] == shape[:2] and (len(own) > 2 or name in (*_PEOPLE, *_FRAMES))
+        if kind in _OF_PEOPLE and not is_table and name not in _EACH and shape[0] == shape[1]:
+            return ()  # one for each frame, or one for each person
+        if name in _SHAPES and len(own) == 1:
+            return ()  # that of all
+        return _along(archive, name, axis if is_table else 0, len(poses))
+
+    found = {name: column(name) for name in archive.keys}
+    columns = {name: items for name, items in found.items() if items}
+    prefix = "person_" if kind in _OF_PEOPLE else ""
+    places = {f"{prefix}{index}": index for index in range(len(poses))}
+
+    def item(name: str) -> Archive:
         return Archive(
             archive.source,
             archive.kind,
             tuple(columns),
-            lambda name: columns[name][int(index)],
-            label=f"{archive.label}{index}.",
+            lambda key: columns[key][places[name]],
+            label=f"{archive.label}{name}.",
         )
-
-    def has_rows(pose: Value) -> bool:
-        return bool(pose.shape[:1] != (0,) if isinstance(pose, Deferred) else pose)
 
     return key, Archive(
         archive.source,
-        archive.kind,
-        tuple(map(str, range(len(poses)))),
-        lambda index: poses[int(index)] if has_rows(poses[int(index)]) else None,
-        frame,
+        kind,
+        tuple(places),
+        lambda name: poses[places[name]] if has_rows[places[name]] else None,
+        item,
         archive.label,
         is_list=True,
     )
 
 
-def _items(archive: Archive, key: str, n_axes: int = 1) -> Sequence[Value]:
-    """Return the items of a list, or those of an array of at least some axes; else none."""
+def _along(archive: Archive, key: str, axis: int, count: int | None = None) -> Sequence[Value]:
+    """Return the items of a list, or those of an array along an axis; none of other values.
+
+    ``count``: the number of items; none if there are more or fewer.
+    """
     value = archive.objects(key)
-    if isinstance(value, list | tuple):
-        return value
-    if not isinstance(value, Deferred) or len(value.shape) < n_axes:
+    if axis == 0 and isinstance(value, list | tuple):
+        return value if count in (None, len(value)) else ()
+    if axis > 0:
+        value = archive.array(key)
+    if not isinstance(value, Deferred) or len(value.shape) <= axis:
         return ()
-    return [_item(value, index) for index in range(value.shape[0])]
+    known = value.shape[axis]
+    return [_item(value, index, axis) for index in range(known)] if count in (None, known) else ()
 
 
-def _item(array: Deferred, index: int) -> Deferred:
-    return Deferred(array.shape[1:], array.dtype, lambda: np.array(array.values()[index]))
+def _item(array: Deferred, index: int, axis: int) -> Deferred:
+    shape = (*array.shape[:axis], *array.shape[axis + 1 :])
+    return Deferred(shape, array.dtype, lambda: np.asarray(array.values().take(index, axis)))
+
+
+def _axis_of_people(archive: Archive, shape: tuple[int, ...]) -> int | None:
+    """Return which of the first two axes of poses is as long as what each person has once."""
+    for key in filter(archive.has, _EACH):
+        texts = texts_in(archive.objects(key))
+        own = archive.shape(key) or ((len(texts),) if texts else ())
+        matches = [axis for axis in (0, 1) if own[:1] == shape[axis : axis + 1]]
+        if len(own) == 1 and key in _SHAPES:
+            continue  # the shape of all
+        if len(own) <= 2 and len(matches) == 1:
+            return matches[0]
+    for key in filter(archive.has, _FRAMES):
+        matches = [axis for axis in (0, 1) if archive.shape(key) == shape[axis : axis + 1]]
+        if len(matches) == 1:
+            return 1 - matches[0]
+    return None
 
 
 _Person = int | str | tuple[int, ...]
@@ -598,6 +657,8 @@ def _are_frames(found: list[_Found]) -> bool:
         return False
     if most == 1:
         return True
+    if any(scope.kind in _OF_PEOPLE for one in found for scope in one.around):
+        return False
     if any(one.layout.frames is not None for one in found):
         return False
     if all(one.layout.frame is not None for one in found):
