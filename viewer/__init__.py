@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from viewer.rig.figure import Figure
     from viewer.rig.material import Material, Texture
     from viewer.rig.mesh import Mesh
-    from viewer.rig.motion.clip import Channel, Clip
-    from viewer.rig.motion.clip_sampling import evaluate, sample
+    from viewer.rig.motion.clip import Channel, Clip, evaluate, sample
     from viewer.rig.motion.motion_arrays import MotionArrays, motion
     from viewer.rig.motion.onion import onion
     from viewer.rig.pose import Pose, rest_pose

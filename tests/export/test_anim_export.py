@@ -17,8 +17,7 @@ from viewer.errors import OutputError, RigError
 from viewer.export import MotionOptions, export_animation, motion_exporters
 from viewer.formats import Source, read
 from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.clip import Channel, Clip, evaluate_all
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing

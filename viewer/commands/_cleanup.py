@@ -11,8 +11,7 @@ from viewer.loading.cleaning_settings import CleanUp
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
-    from viewer.rig.cleanup.one_euro import OneEuro
-    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+    from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
 
 __all__ = ["add_cleanup_arguments", "clean_up_of"]
 
@@ -125,7 +124,7 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
 
 
 def _one_euro(values: dict[str, float]) -> OneEuro:
-    from viewer.rig.cleanup.one_euro import OneEuro
+    from viewer.rig.cleanup.smoothing import OneEuro
 
     found = OneEuro(**values)
     if min(found.cutoff, found.speed_cutoff) <= 0.0:
@@ -134,7 +133,7 @@ def _one_euro(values: dict[str, float]) -> OneEuro:
 
 
 def _savgol(values: dict[str, float]) -> SavitzkyGolay:
-    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+    from viewer.rig.cleanup.smoothing import SavitzkyGolay
 
     window, order = values.get("window", 0.0), values.get("order", 2.0)
     is_odd = window % 2 == 1 and 3 <= window <= _LONGEST_WINDOW

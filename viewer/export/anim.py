@@ -20,9 +20,8 @@ from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.clip import Clip, Tangent, is_course_rig
+from viewer.rig.motion.clip import Clip, Tangent, evaluate_all, is_course_rig
 from viewer.rig.motion.clip_edit import clip_from_frames
-from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.evaluation import Frames, frames_between, frames_of, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.scalars import length_text

@@ -37,8 +37,14 @@ from viewer.formats._anny.targets import (
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, regress_joints
-from viewer.rig.bodies.phenotypes import PHENOTYPES, TYPICAL, phenotype_range, target_masks
-from viewer.rig.bodies.target_space import TargetRows, TargetSpace
+from viewer.rig.bodies.phenotypes import (
+    PHENOTYPES,
+    TYPICAL,
+    TargetRows,
+    TargetSpace,
+    phenotype_range,
+    target_masks,
+)
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, vertex_normals

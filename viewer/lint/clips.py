@@ -13,8 +13,7 @@ from viewer.lint._track import Indices, Track
 from viewer.lint._tracks import frame_numbers, key_times, track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.clip import SHORTEST, Clip
-from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.clip import SHORTEST, Clip, evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.posing.dof_text import beyond_text

@@ -17,12 +17,10 @@ from viewer.rig.cleanup.displacement import joint_displacement, point_displaceme
 from viewer.rig.cleanup.foot_lock import legs_of, lock_feet
 from viewer.rig.cleanup.frame_rows import Captured
 from viewer.rig.cleanup.gap_filling import interpolate_gaps
-from viewer.rig.cleanup.one_euro import OneEuro
 from viewer.rig.cleanup.resampling import resampled
-from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
-from viewer.rig.cleanup.smoothing import run_lengths, smoothed
+from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
 from viewer.rig.cleanup.trimming import trimmed
-from viewer.rig.inspection.resting_height import resting_height
+from viewer.rig.inspection.ground_height import resting_height
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.upright import own_up

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from viewer.data_classes import dataclass
 
 if TYPE_CHECKING:
-    from viewer.rig.cleanup.one_euro import OneEuro
-    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+    from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
 
 __all__ = ["CleanUp"]
 

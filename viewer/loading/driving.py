@@ -235,7 +235,7 @@ def _drives_character(
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
     """Return the up axis estimated from the people, and record it if it is unusual."""
-    from viewer.rig.motion.up_axis import guess_up
+    from viewer.rig.motion.upright import guess_up
 
     up = guess_up(actors)
     if up != usual:

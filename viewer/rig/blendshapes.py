@@ -12,7 +12,7 @@ from viewer.rig.bodies.feature import Feature
 from viewer.rig.bodies.shape_space import ShapeSpace
 from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.expressions import ExpressionRules
-from viewer.rig.materials.material_binds import MaterialBinds
+from viewer.rig.material_binds import MaterialBinds
 
 __all__ = [
     "BlendShapes",

@@ -8,11 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bytes
-from viewer.rig.materials.texture import MINIFICATIONS, WRAPS, Texture, check_choice
-from viewer.rig.materials.toon import Outline, Rim
-
-__all__ = ["ALPHA_MODES", "MINIFICATIONS", "TEXTURES", "WRAPS", "Material", "Texture"]
+from viewer.rig.arrays import Bytes, Floats, frozen
 
 ALPHA_MODES = ("opaque", "mask", "blend")
 """Alpha is ignored; surfaces are cut out below the cutoff; or they are blended with the
@@ -100,7 +96,7 @@ class Material:
     extras: Any = None
 
     def __post_init__(self) -> None:
-        check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)
+        _check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)
         for name in ("metallic", "roughness", "occlusion_strength"):
             _check_numbers(name, (getattr(self, name),), 1.0)
         _check_numbers("alpha_cutoff", (self.alpha_cutoff,))
@@ -161,3 +157,161 @@ def _check_numbers(
         if not (0.0 <= value <= most and np.isfinite(value)):
             limits = "at least 0" if most == float("inf") else f"0 to {most:g}"
             raise RigError(f"{name}: expected {limits}, found {value}")
+
+
+_WRAPS = ("clamp", "repeat", "mirror")
+"""Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
+MINIFICATIONS = (
+    *("nearest", "linear", "nearest_mipmap_nearest"),
+    *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
+)
+"""Filters of minified images, with their names in OpenGL and glTF."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Texture:
+    """An image, and its placement and sampling.
+
+    Attributes
+    ----------
+    name : str
+        File name of the image, relative to the figure's folder.
+    image : (H, W, 4) uint8 or None
+        Pixels with alpha, first row at v = 1; sRGB in colour textures, linear in others;
+        None if it could not be read.
+    channel : int
+        Channel of ``image`` from which single-channel textures are read.
+    uv_set : int
+        0 for ``Mesh.uvs``, n for ``Mesh.other_uvs[n - 1]``.
+    transform : (2, 3)
+        Maps texture coordinates to image coordinates, whose v is 0 at the bottom row.
+    wrap : (str, str)
+        Entries of ``_WRAPS`` along u and v.
+    is_smooth : bool
+        Whether pixels are interpolated.
+    minification : str
+        Entry of ``MINIFICATIONS``; empty for mipmaps, interpolated if ``is_smooth``.
+    encoded : bytes or None
+        The PNG or JPEG file that ``image`` was decoded from, if it was part of another file.
+    """
+
+    name: str
+    image: Bytes | None = None
+    channel: int = 0
+    uv_set: int = 0
+    transform: Floats | None = None
+    wrap: tuple[str, str] = ("clamp", "clamp")
+    is_smooth: bool = True
+    minification: str = ""
+    encoded: bytes | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, values: object) -> None:
+            object.__setattr__(self, name, values)
+
+        if self.image is not None:
+            put("image", frozen("image", self.image, (None, None, 4), np.uint8))
+        placed = np.eye(2, 3) if self.transform is None else self.transform
+        put("transform", frozen("transform", placed, (2, 3)))
+        _check_choice("channel", self.channel, range(4))
+        _check_choice("minification", self.minification, ("", *MINIFICATIONS))
+        if self.uv_set < 0:
+            raise RigError(f"uv_set: expected at least 0, found {self.uv_set}")
+        for side in self.wrap:
+            _check_choice("wrap", side, _WRAPS)
+
+    @property
+    def matrix(self) -> Floats:
+        """``transform``, never None: (2, 3)."""
+        assert self.transform is not None  # set by __post_init__
+        return self.transform
+
+    @property
+    def is_placed_plainly(self) -> bool:
+        """Whether the image covers texture coordinates from 0 to 1."""
+        return np.array_equal(self.matrix, np.eye(2, 3))
+
+
+def _check_choice(name: str, value: object, choices: range | tuple[str, ...]) -> None:
+    """Raise RigError unless a value is one of the choices."""
+    if value not in choices:
+        raise RigError(f"{name}: expected one of {', '.join(map(str, choices))}, found {value}")
+
+
+_OUTLINE_MODES = ("world", "screen")
+"""Units of outline widths: lengths, or fractions of the image height."""
+Color = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rim:
+    """Light at the edges of a surface, added to its colour.
+
+    With the normal n and the direction v to the eye, the added light is (f m + c s) t, where m is
+    the matcap, s = clamp(1 - n . v + lift)^power, and t the texture.
+
+    Attributes
+    ----------
+    color : (r, g, b)
+        c, linear.
+    power, lift : float
+        Exponent, at least 0, and summand.
+    mix : float
+        0 to 1: degree to which the rim is multiplied by the light on the surface.
+    texture : Texture or None
+        t, sRGB.
+    matcap : Texture or None
+        m, an image of a lit sphere, sRGB.
+    matcap_factor : (r, g, b)
+        f, linear.
+    """
+
+    color: Color = (0.0, 0.0, 0.0)
+    power: float = 5.0
+    lift: float = 0.0
+    mix: float = 1.0
+    texture: Texture | None = None
+    matcap: Texture | None = None
+    matcap_factor: Color = (1.0, 1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        numbers = (*self.color, *self.matcap_factor, self.power, self.lift, self.mix)
+        if not np.isfinite(numbers).all() or self.power < 0.0:
+            raise RigError(f"rim: expected finite numbers and an exponent of at least 0: {numbers}")
+
+    @property
+    def has_effect(self) -> bool:
+        """Whether anything is added to the colour of the surface."""
+        return any(self.color) or (self.matcap is not None and any(self.matcap_factor))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outline:
+    """A line around a surface.
+
+    Attributes
+    ----------
+    width : float
+        At least 0, in the unit of the mode.
+    mode : str
+        Entry of ``_OUTLINE_MODES``.
+    color : (r, g, b)
+        Linear.
+    mix : float
+        0 to 1: how much the colour of the surface multiplies that of the line.
+    texture : Texture or None
+        Factor of the width, in the green channel.
+    """
+
+    width: float
+    mode: str = "world"
+    color: Color = (0.0, 0.0, 0.0)
+    mix: float = 1.0
+    texture: Texture | None = None
+
+    def __post_init__(self) -> None:
+        if self.mode not in _OUTLINE_MODES:
+            raise RigError(f"outline: expected {' or '.join(_OUTLINE_MODES)}, found {self.mode}")
+        numbers = (self.width, *self.color, self.mix)
+        if not np.isfinite(numbers).all() or self.width < 0.0:
+            raise RigError(f"outline: expected finite numbers and a width of at least 0: {numbers}")

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.app.curves.data import curves_of
 from viewer.app.curves.plot import unit_text, value_limits
 from viewer.app.curves.state import Curves
-from viewer.rig.motion.clip_sampling import evaluate
+from viewer.rig.motion.clip import evaluate
 
 
 def _chosen(hand):

@@ -24,7 +24,7 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.curves.state import Curves
 from viewer.app.playback.timeline_panel import set_rate
-from viewer.rig.motion.clip_sampling import evaluate
+from viewer.rig.motion.clip import evaluate
 from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene
 

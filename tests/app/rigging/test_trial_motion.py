@@ -7,7 +7,7 @@ from app.tiny import write_rig
 
 import viewer
 from viewer.app.rigging.results import trial_clip
-from viewer.rig.motion.clip_sampling import sample
+from viewer.rig.motion.clip import sample
 
 
 def test_joints_bend_one_after_another_and_return(tmp_path):

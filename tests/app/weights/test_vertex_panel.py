@@ -16,8 +16,7 @@ from viewer.app.weights.state import Weights
 from viewer.app.weights.vertex_panel import matrix_text
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
-from viewer.rig.inspection.explanation import explain
-from viewer.rig.inspection.explanation_text import explanation_text
+from viewer.rig.inspection.explanation import explain, explanation_text
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 

@@ -14,8 +14,7 @@ from viewer.commands._cleanup import clean_up_of
 from viewer.commands._gaps import add_gap_arguments
 from viewer.commands._usage import Parser
 from viewer.commands.convert import add_arguments
-from viewer.rig.cleanup.one_euro import OneEuro
-from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
 
 
 def parsed(*arguments):

@@ -13,8 +13,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import MotionOptions, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.clip_sampling import evaluate
+from viewer.rig.motion.clip import Channel, Clip, evaluate
 from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.scene import Actor
 from viewer.rig.skin import skin_from_lists

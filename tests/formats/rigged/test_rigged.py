@@ -18,8 +18,7 @@ from viewer.rig.annotations import VertexField
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
-from viewer.rig.material import Material, Texture
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import Material, Outline, Rim, Texture
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton

@@ -14,8 +14,8 @@ import viewer
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.pose import rest_pose
-from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.joint_names import joint_meanings
+from viewer.rig.retargeting.retarget import expression_weights
 from viewer.rig.shape import shaped
 
 BONES = {"hips": 0, "spine": 1, "chest": 2, "head": 3, "leftUpperArm": 4, "rightUpperArm": 5}

@@ -28,9 +28,8 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.expressions import ExpressionRules
 from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.materials.material_binds import MaterialBinds
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import Material, Outline, Rim
+from viewer.rig.material_binds import MaterialBinds
 from viewer.rig.scene import Actor, Scene, scene_box
 
 DARK = (0.0, 0.0, 0.0)

@@ -8,9 +8,7 @@ from numpy.testing import assert_allclose
 from turning import RATE, angles_of, turning
 
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.one_euro import OneEuro
-from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
-from viewer.rig.cleanup.smoothing import run_lengths, smoothed
+from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 
 FILTERS = [OneEuro(), SavitzkyGolay(), SavitzkyGolay(window=5, order=3)]

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from rig.hand_made import skeleton
 
 from viewer.errors import RigError
-from viewer.rig.comparison import compare, rotation_distance
+from viewer.rig.comparison import compare
+from viewer.rig.comparison.pairs import rotation_distance
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.mesh import Mesh

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.comparison import compare
-from viewer.rig.comparison.contents import content_notes
+from viewer.rig.comparison import compare, content_notes
 from viewer.rig.figure import Figure
-from viewer.rig.material import Material
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import Material, Outline, Rim
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from viewer.rig.geometry.axis_products import axis_products
 from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.pose import axis_products
 
 
 @pytest.mark.parametrize("shape", [(), (2, 3)])

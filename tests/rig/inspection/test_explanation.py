@@ -10,8 +10,7 @@ from rig.hand_made import matrix, mesh, skeleton, turn_z
 from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.explanation import explain
-from viewer.rig.inspection.explanation_text import explanation_text
+from viewer.rig.inspection.explanation import explain, explanation_text
 from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform

@@ -10,9 +10,8 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.formats._gltf_materials.textures import transform_matrix
-from viewer.rig.material import Material, Texture
-from viewer.rig.materials.material_binds import MaterialBinds
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import Material, Outline, Rim, Texture
+from viewer.rig.material_binds import MaterialBinds
 
 TOON = Material(
     base_color=(0.5, 0.5, 0.5, 1.0),

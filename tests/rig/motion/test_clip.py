@@ -16,11 +16,11 @@ from viewer.rig.motion.clip import (
     Channel,
     Clip,
     check_fit,
+    evaluate,
     is_course_rig,
     misfit,
     slopes,
 )
-from viewer.rig.motion.clip_sampling import evaluate
 from viewer.rig.skeleton import DOF_KINDS
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "cse169"

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rig import hand_made
 
 from viewer.errors import RigError
-from viewer.rig.motion.clip import Channel, Clip, slopes
+from viewer.rig.motion.clip import Channel, Clip, evaluate, evaluate_all, slopes
 from viewer.rig.motion.clip_edit import (
     add_key,
     clip_from_frames,
@@ -22,8 +22,6 @@ from viewer.rig.motion.clip_edit import (
     slope_at,
     with_channel,
 )
-from viewer.rig.motion.clip_sampling import evaluate
-from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.pose import rest_pose
 
 ROWS = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y")] + [(0, "z", 0.0, -1.0, 1.0)]

@@ -8,9 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from viewer.rig.motion.clip import EXTRAPOLATIONS, Channel, Clip
-from viewer.rig.motion.clip_sampling import evaluate
-from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.clip import EXTRAPOLATIONS, Channel, Clip, evaluate, evaluate_all
 
 RULES = ("flat", "linear", "smooth", 1.75)
 TANGENT_PAIRS = tuple(itertools.product(RULES, repeat=2))

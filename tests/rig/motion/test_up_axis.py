@@ -10,7 +10,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.up_axis import guess_up
+from viewer.rig.motion.upright import guess_up
 from viewer.rig.scene import Actor
 
 

@@ -8,18 +8,20 @@ from rig.animated import about, bow, channel, clip_of, leg, wave
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor
-from viewer.rig.transforms.channel_edit import added_key, value_at, with_interpolation
-from viewer.rig.transforms.edit import (
+from viewer.rig.transform_keys.edit import (
     add_transform_key,
+    added_key,
     delete_transform_keys,
     move_transform_keys,
     set_clip_interpolation,
     set_transform_key,
     set_transform_slope,
+    value_at,
+    with_interpolation,
 )
-from viewer.rig.transforms.keying import key_transform_pose
-from viewer.rig.transforms.rows import row_values, rows_of
-from viewer.rig.transforms.sampling import sample_transforms
+from viewer.rig.transform_keys.keying import key_transform_pose
+from viewer.rig.transform_keys.rows import row_values, rows_of
+from viewer.rig.transform_keys.sampling import sample_transforms
 
 SKELETON = leg().require_skeleton()
 GAP = 1e-3

@@ -10,8 +10,8 @@ from rig.animated import HALF, about, channel, clip_of, plain_value
 from viewer.errors import RigError
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.transforms.rate import is_regular, key_rate
-from viewer.rig.transforms.sampling import sample_transforms
+from viewer.rig.transform_keys.rate import is_regular, key_rate
+from viewer.rig.transform_keys.sampling import sample_transforms
 
 EXACT = 1e-14  # a few rounding errors of numbers near 1
 

@@ -13,13 +13,12 @@ from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.memo import Memo
-from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.clip import Channel, Clip, evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton, joint_labels, shown_joints
-from viewer.rig.transforms.rows import rows_of
+from viewer.rig.transform_keys.rows import rows_of
 
 __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 

@@ -28,7 +28,7 @@ from viewer.rig.motion.clip_edit import (
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
 from viewer.rig.scene import Actor, Motion
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transforms.edit import (
+from viewer.rig.transform_keys.edit import (
     add_transform_key,
     delete_transform_keys,
     move_transform_keys,
@@ -37,8 +37,8 @@ from viewer.rig.transforms.edit import (
     set_transform_key,
     set_transform_slope,
 )
-from viewer.rig.transforms.keying import joint_values, key_transform_pose
-from viewer.rig.transforms.rows import TransformRow, key_values, row_values, rows_of
+from viewer.rig.transform_keys.keying import joint_values, key_transform_pose
+from viewer.rig.transform_keys.rows import TransformRow, key_values, row_values, rows_of
 
 _GAP = 1e-3  # minimum distance between dragged keys, seconds
 

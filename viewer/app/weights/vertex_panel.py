@@ -18,8 +18,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
-from viewer.rig.inspection.explanation import DualTerms, Explanation
-from viewer.rig.inspection.explanation_text import explanation_text
+from viewer.rig.inspection.explanation import DualTerms, Explanation, explanation_text
 from viewer.rig.number_text import number_text
 from viewer.rig.skinning import METHODS
 

@@ -16,7 +16,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Motion
-from viewer.rig.transforms.rate import is_regular, key_rate
+from viewer.rig.transform_keys.rate import is_regular, key_rate
 
 _SHOWN_GAPS = 6
 _MILLISECOND = 0.001

@@ -15,7 +15,7 @@ from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.reading import Placed
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
-from viewer.rig.transforms.sampling import sample_transforms
+from viewer.rig.transform_keys.sampling import sample_transforms
 
 __all__ = ["Clips", "first_time"]
 

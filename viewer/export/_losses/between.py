@@ -19,7 +19,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skinning import Skinning
-from viewer.rig.transforms.rate import is_regular
+from viewer.rig.transform_keys.rate import is_regular
 
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
 

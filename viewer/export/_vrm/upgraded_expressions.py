@@ -15,7 +15,7 @@ from viewer.formats._vrm.material_values import old_binds
 from viewer.formats._vrm.numbers import value_of
 from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.file_record import VrmRecord
-from viewer.rig.materials.material_binds import TRANSFORM
+from viewer.rig.material_binds import TRANSFORM
 
 __all__ = ["upgraded_expressions"]
 

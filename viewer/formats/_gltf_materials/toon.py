@@ -28,7 +28,7 @@ from viewer.formats._vrm.json_parts import part
 from viewer.formats._vrm.numbers import rows_of, value_of
 from viewer.formats._vrm.old_core import overridden
 from viewer.formats._vrm.old_toon import modern_toon
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import Outline, Rim
 
 __all__ = ["MTOON", "Toon", "read_toon"]
 

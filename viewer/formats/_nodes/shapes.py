@@ -22,7 +22,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.bodies.deferred_offsets import DeferredOffsets
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
-from viewer.rig.materials.material_binds import MaterialBinds
+from viewer.rig.material_binds import MaterialBinds
 
 __all__ = ["blend_shapes_of", "shape_columns"]
 

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from viewer.errors import RigError
 from viewer.formats._archive.values import Archive
 from viewer.rig.arrays import Bytes
-from viewer.rig.material import TEXTURES, Material, Texture
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import TEXTURES, Material, Outline, Rim, Texture
 from viewer.rig.mesh import Mesh
 
 __all__ = ["material_arrays", "read_materials", "texts"]

@@ -30,7 +30,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing, frame_at, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.transforms.rate import is_regular, key_rate
+from viewer.rig.transform_keys.rate import is_regular, key_rate
 
 __all__ = ["EXTENSION", "read_motion"]
 

@@ -20,7 +20,7 @@ import numpy as np
 from viewer.formats._vrm.json_parts import is_index, listed, part
 from viewer.formats._vrm.numbers import rows_of
 from viewer.rig.arrays import Floats
-from viewer.rig.materials.material_binds import COLOR_KINDS, TRANSFORM
+from viewer.rig.material_binds import COLOR_KINDS, TRANSFORM
 from viewer.rig.srgb import decode_srgb
 
 __all__ = ["Bind", "main_transform", "modern_binds", "old_binds"]

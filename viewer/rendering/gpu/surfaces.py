@@ -14,8 +14,7 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import picture_texture
 from viewer.rig.arrays import Bytes
-from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Texture
-from viewer.rig.materials.toon import Outline, Rim
+from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Outline, Rim, Texture
 from viewer.rig.mesh import Mesh
 
 SAMPLERS = {

@@ -22,8 +22,7 @@ from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
-from viewer.rig.material import TEXTURES
-from viewer.rig.materials.toon import Outline
+from viewer.rig.material import TEXTURES, Outline
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.units import METRES
 

@@ -15,8 +15,8 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import local_matrices, rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
-from viewer.rig.transforms.posing import apply_transforms
-from viewer.rig.transforms.sampling import sample_transforms
+from viewer.rig.transform_keys.posing import apply_transforms
+from viewer.rig.transform_keys.sampling import sample_transforms
 
 __all__ = ["carrier_of", "moving_alone", "played_with", "view_in"]
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
-from viewer.rig.geometry.quaternion import between, multiply
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.cleanup.easing import EASE
+from viewer.rig.geometry.quaternion import between, conjugate, multiply
+from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.geometry.vectors import unit
-
-__all__ = ["Leg", "bend", "reach"]
 
 # Forward bias of the direction of the knee, relative to the leg's length: 80 mm for a person. The
 # direction of a nearly straight knee is only noise.
@@ -82,3 +84,152 @@ def bend(
 
 def _dot(a: Floats, b: Floats) -> Floats:
     return np.einsum("fa,fa->f", a, b)
+
+
+# Sine of the bend at which a leg and ``across`` determine the axis of its knee equally.
+_FLEXED = np.sin(np.radians(15.0))
+
+
+def leg_rotations(
+    rotations: Floats,
+    world: Floats,
+    parents: Ints,
+    legs: Sequence[Leg],
+    drop: Floats,
+    shifts: Sequence[Floats],
+) -> Floats:
+    """Return local rotations that bring the ankles of all legs to their targets.
+
+    Feet keep their orientation in the world.
+
+    Parameters
+    ----------
+    rotations : (N, J, 4)
+        Local rotations, unit quaternions.
+    world : (N, J, 4, 4)
+        World matrices of the same poses.
+    parents : (J,)
+        -1 for a root.
+    legs : sequence of Leg
+        The legs, from left to right.
+    drop : (N, 3)
+        Translation of the whole body.
+    shifts : sequence of (N, 3)
+        Translation of each leg's ankle, instead of ``drop``.
+    """
+    result = rotations.copy()
+    across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
+    old = matrix_to_quaternion(_unscaled(world[..., :3, :3]))
+    for leg, shift in zip(legs, shifts, strict=True):
+        _reach_for(result, world, old, parents, leg, drop, shift, across)
+    return result
+
+
+def _reach_for(
+    rotations: Floats,
+    world: Floats,
+    old: Floats,
+    parents: Ints,
+    leg: Leg,
+    drop: Floats,
+    shift: Floats,
+    across: Floats,
+) -> None:
+    """Rotate a leg in place so that its ankle is at its previous position plus a shift."""
+    hips, knees, ankles = (world[:, j, :3, 3] + drop for j in (leg.hip, leg.knee, leg.ankle))
+    moves = (shift - drop).any(axis=1)
+    if not moves.any():
+        return
+    axis = hinges(_unscaled(world[:, leg.hip, :3, :3]), (hips, knees, ankles), across)
+    thigh, shin = bend(hips, knees, ankles, ankles - drop + shift, axis)
+    above = int(parents[leg.hip])
+    parent = old[:, above] if above >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
+    new_hip = multiply(thigh, old[:, leg.hip])
+    under_knee = multiply(thigh, old[:, int(parents[leg.knee])])
+    under_ankle = multiply(shin, old[:, int(parents[leg.ankle])])
+    for joint, outer, inner in (
+        (leg.hip, parent, new_hip),
+        (leg.knee, under_knee, multiply(shin, old[:, leg.knee])),
+        (leg.ankle, under_ankle, old[:, leg.ankle]),
+    ):
+        local = multiply(conjugate(np.broadcast_to(outer, inner.shape)), inner)
+        rotations[moves, joint] = local[moves]
+
+
+def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats) -> Floats:
+    """Return the axis of a knee in every frame, a unit vector fixed to the thigh: (N, 3).
+
+    This is the mean normal of the leg's plane, thigh x shin, weighted by the fourth power of the
+    sine of the bend; ``across`` has the weight of a bend of 15 degrees.
+
+    Parameters
+    ----------
+    thighs : (N, 3, 3)
+        World rotations of the thigh.
+    points : ((N, 3), (N, 3), (N, 3))
+        World positions of hip, knee and ankle.
+    across : (N, 3)
+        Directions from right to left: the axis of a knee that hardly bends.
+    """
+    hips, knees, ankles = points
+    upper, lower = knees - hips, ankles - knees
+    bones = np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
+    normals = np.cross(upper, lower) / np.maximum(bones, 1e-30)[:, None]
+    sines = np.linalg.norm(normals, axis=1, keepdims=True)
+    found = np.einsum("nba,nb->a", thighs, sines**3 * normals + _FLEXED**4 * unit(across))
+    return thighs @ unit(found)
+
+
+def _unscaled(linear: Floats) -> Floats:
+    return linear / np.maximum(np.linalg.norm(linear, axis=-2, keepdims=True), 1e-30)
+
+
+def lowering(
+    points: Floats,
+    legs: Sequence[Leg],
+    shifts: Sequence[Floats],
+    rate: float,
+    up: Floats,
+    extended: float = 1.0,
+) -> Floats:
+    """Return how far the body must be lowered so that all ankle targets are in reach.
+
+    Parameters
+    ----------
+    points : (N, J, 3)
+        World positions of the joints.
+    legs : sequence of Leg
+        The legs.
+    shifts : sequence of (N, 3)
+        Translation of each leg's ankle.
+    rate : float
+        Frames per second.
+    up : (3,)
+        The up axis.
+    extended : float
+        Legs extend up to this fraction of their full length, or up to their previous extension.
+
+    Returns
+    -------
+    (N,)
+        Distances along the up axis, smooth over time.
+    """
+    needed = np.zeros(len(points))
+    for leg, shift in zip(legs, shifts, strict=True):
+        hips, knees, ankles = (points[:, joint] for joint in (leg.hip, leg.knee, leg.ankle))
+        longest = reach(hips, knees, ankles)
+        old = np.linalg.norm(ankles - hips, axis=1)
+        length = np.minimum(longest, np.maximum(old, extended * longest))
+        away = ankles + shift - hips
+        height = away @ up
+        flat = np.einsum("fa,fa->f", away, away) - height**2
+        depth = np.sqrt(np.maximum(length**2 - flat, 0.0))
+        is_far = (np.linalg.norm(away, axis=1) > length) & shift.any(axis=1)
+        needed = np.maximum(needed, np.where(is_far, -height - depth, 0.0))
+    if not needed.any():
+        return needed
+    width = 2 * max(1, round(EASE * rate)) + 1
+    padded = np.pad(needed, width - 1, mode="edge")
+    highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
+    # The moving average of moving maxima is never below the values themselves.
+    return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)

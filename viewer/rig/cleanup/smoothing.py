@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from viewer.rig.arrays import Bools, Floats
+from viewer.data_classes import dataclass
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frame_rows import Captured, in_frame_order, runs_of
-
-__all__ = ["Filter", "run_lengths", "smoothed"]
+from viewer.rig.geometry.quaternion import (
+    align_signs,
+    conjugate,
+    multiply,
+    rotation_vector_to_quaternion,
+)
 
 
 class Filter(Protocol):
@@ -103,3 +109,230 @@ def _points(
             seen = part[start:stop, numbers, :3]
             part[start:stop, numbers, :3] = chosen.positions(seen, rate, metres)
     return result
+
+
+_SETTLED = 1e-4  # weight below which the first value is negligible
+_LONGEST = 1000  # maximum number of frames added at each end
+
+
+@dataclass(frozen=True, slots=True)
+class OneEuro:
+    """One Euro filter, applied forwards and then backwards, so that the delays cancel.
+
+    First, the motion is extended beyond both ends by point reflection, far enough for a pass to
+    settle: uniform motion is unchanged up to its ends, and the end values are preserved.
+
+    Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff
+    is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
+    rotations, x - x' is the rotation vector from x' to x. At constant cutoff, both passes together
+    scale a frequency of w radians per frame by a^2 / (1 - 2 (1 - a) cos w + (1 - a)^2).
+
+    Attributes
+    ----------
+    cutoff : float
+        Cutoff frequency at rest, Hz.
+    beta : float
+        Hz per radian per second for rotations, per metre per second for positions.
+    speed_cutoff : float
+        Cutoff frequency of the speed, Hz.
+    """
+
+    cutoff: float = 3.0
+    beta: float = 2.0
+    speed_cutoff: float = 1.0
+
+    def rotations(self, quaternions: Floats, rate: float) -> Floats:
+        """Return filtered unit quaternions (N, ..., 4) of frames at ``rate`` per second."""
+        count = self._settling(rate)
+        longer, inner = _continued(_continuous(quaternions), count, _opposite_rotations)
+        once = self._turned(longer, rate)
+        return self._turned(once[::-1], rate)[::-1][inner]
+
+    def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
+        """Return filtered positions (N, ..., 3); ``metres`` is the length of their unit."""
+        longer, inner = _continued(positions, self._settling(rate), _opposite_positions)
+        once = self._shifted(longer, rate, metres)
+        return self._shifted(once[::-1], rate, metres)[::-1][inner]
+
+    def _settling(self, rate: float) -> int:
+        """Return the number of frames after which the initial value of a pass is negligible."""
+        slowest = float(_factor(min(self.cutoff, self.speed_cutoff), rate))
+        return min(int(np.ceil(np.log(_SETTLED) / np.log1p(-slowest))), _LONGEST)
+
+    def _turned(self, quaternions: Floats, rate: float) -> Floats:
+        found = quaternions.copy()
+        steps = _relative_vectors(quaternions[:-1], quaternions[1:])
+        speed = np.zeros((*quaternions.shape[1:-1], 3))
+        for frame in range(1, len(found)):
+            speed, factor = self._adapted(speed, steps[frame - 1] * rate, rate)
+            toward = _relative_vectors(found[frame - 1], quaternions[frame])
+            found[frame] = moved(found[frame - 1], factor * toward)
+        return found
+
+    def _shifted(self, positions: Floats, rate: float, metres: float) -> Floats:
+        found = positions.copy()
+        speed = np.zeros(positions.shape[1:])
+        steps = np.diff(positions, axis=0) * (rate * metres)
+        for frame in range(1, len(found)):
+            speed, factor = self._adapted(speed, steps[frame - 1], rate)
+            found[frame] = found[frame - 1] + factor * (positions[frame] - found[frame - 1])
+        return found
+
+    def _adapted(self, speed: Floats, measured: Floats, rate: float) -> tuple[Floats, Floats]:
+        """Return the filtered speed (..., 3), and the factor a of this frame (..., 1)."""
+        speed = speed + _factor(self.speed_cutoff, rate) * (measured - speed)
+        size = np.linalg.norm(speed, axis=-1, keepdims=True)
+        return speed, _factor(self.cutoff + self.beta * size, rate)
+
+
+def _continued(
+    values: Floats, count: int, opposite: Callable[[Floats, Floats], Floats]
+) -> tuple[Floats, slice]:
+    """Return frames (N, ...) extended beyond both ends, and the range of the original ones.
+
+    ``count`` is the number of frames to add at each end; ``opposite`` reflects values about a
+    value.
+    """
+    total = len(values)
+    added = 0
+    while added < count and len(values) > 1:
+        step = min(count - added, len(values) - 1)
+        before = opposite(values[0], values[step:0:-1])
+        after = opposite(values[-1], values[-2 : -step - 2 : -1])
+        values = np.concatenate([before, values, after])
+        added += step
+    return values, slice(added, added + total)
+
+
+def _opposite_rotations(middle: Floats, quaternions: Floats) -> Floats:
+    """Return rotations by the opposite angle from the middle: b exp(-v) of b exp(v)."""
+    return moved(middle, -_relative_vectors(middle, quaternions))
+
+
+def _opposite_positions(middle: Floats, positions: Floats) -> Floats:
+    return 2.0 * middle - positions
+
+
+def _factor(cutoff: Floats | float, rate: float) -> Floats:
+    """Return a = 1 / (1 + r / (2 pi f)) for a cutoff frequency f at r frames per second."""
+    turns = 2.0 * np.pi * np.asarray(cutoff, dtype=np.float64)
+    return turns / (turns + rate)
+
+
+_SECONDS = 0.2  # default length of the window, seconds
+_PASSES = 2  # the second pass fits relative to the result of the first, which is less noisy
+
+
+@dataclass(frozen=True, slots=True)
+class SavitzkyGolay:
+    """Least-squares fit of a polynomial to a window of frames, evaluated at its middle.
+
+    Near the ends of a motion, the window stays within the motion, and the polynomial is evaluated
+    away from the middle of the window. Rotations are fitted as rotation vectors relative to the
+    rotation of the frame, so constant and uniform rotations are unchanged.
+
+    Attributes
+    ----------
+    window : int
+        Odd number of frames; 0 for 0.2 seconds.
+    order : int
+        Degree of the polynomial, less than the window.
+    """
+
+    window: int = 0
+    order: int = 2
+
+    def frames(self, rate: float) -> int:
+        """Return the length of the window at a frame rate, frames."""
+        if self.window:
+            return self.window
+        half = max(round(0.5 * _SECONDS * rate), (self.order + 1) // 2)
+        return 2 * half + 1
+
+    def used_frames(self, count: int, rate: float) -> int:
+        """Return the window used for a run of frames, 0 if it is too short to be filtered."""
+        window = min(self.frames(rate), count - 1 + count % 2)
+        return window if window > self.order else 0
+
+    def rotations(self, quaternions: Floats, rate: float) -> Floats:
+        """Return filtered unit quaternions (N, ..., 4) of frames at ``rate`` per second."""
+        known = _continuous(quaternions)
+        found = known
+        for _ in range(_PASSES):
+            vectors = self._fitted(len(known), rate, _relative_to(found, known))
+            found = moved(found, vectors) if vectors is not None else found
+        return found
+
+    def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
+        """Return filtered positions (N, ..., 3); the unit of lengths has no effect."""
+        found = self._fitted(len(positions), rate, lambda rows: positions[rows] - positions)
+        return positions if found is None else positions + found
+
+    def _fitted(self, count: int, rate: float, at: Callable[[Ints], Floats]) -> Floats | None:
+        """Return the fitted values of all frames; None if there are too few to fit.
+
+        ``at`` returns the values at one frame of each window, relative to the frame to be filtered.
+        """
+        window = self.used_frames(count, rate)
+        if not window:
+            return None
+        start = np.clip(np.arange(count) - window // 2, 0, count - window)
+        weights = _smoothing_matrix(window, self.order)[np.arange(count) - start]
+        total: Floats | None = None
+        for place in range(window):
+            values = at((start + place).astype(np.int32))
+            part = weights[:, place].reshape(-1, *[1] * (values.ndim - 1)) * values
+            total = part if total is None else total + part
+        return total
+
+
+def _relative_to(found: Floats, known: Floats) -> Callable[[Ints], Floats]:
+    return lambda rows: _relative_vectors(found, known[rows])
+
+
+def _smoothing_matrix(window: int, order: int) -> Floats:
+    """Return H = A (A^T A)^-1 A^T of polynomials: row i yields the fitted value at frame i."""
+    place = np.linspace(-1.0, 1.0, window)
+    basis, _ = np.linalg.qr(np.vander(place, order + 1))
+    return basis @ basis.T
+
+
+def _continuous(quaternions: Floats) -> Floats:
+    """Return quaternions (N, ..., 4) with signs such that consecutive ones are nearest."""
+    result = quaternions.copy()
+    align_signs(result)
+    return result
+
+
+def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
+    """Return the rotation vectors v with q = b exp(v), for rotations by less than 2 pi.
+
+    The sign of a quaternion matters: a negative real part means a rotation by more than pi.
+
+    Parameters
+    ----------
+    base, quaternions : (..., 4)
+        Unit quaternions b and q.
+
+    Returns
+    -------
+    (..., 3)
+        Radians, in the space of ``base``.
+
+    >>> half_turn = np.array([0.0, 0.0, 1.0, 0.0])
+    >>> relative_vectors(np.array([0.0, 0.0, 0.0, 1.0]), half_turn).round(6).tolist()
+    [0.0, 0.0, 3.141593]
+    """
+    found = multiply(conjugate(base), quaternions)
+    sine = np.linalg.norm(found[..., :3], axis=-1)
+    angle = 2.0 * np.arctan2(sine, found[..., 3])
+    # A rotation by nearly 0 has the factor angle / sin(angle / 2) = 2.
+    is_tiny = sine < np.finfo(float).tiny ** 0.5
+    factor = np.divide(angle, sine, out=np.full(sine.shape, 2.0), where=~is_tiny)
+    return factor[..., None] * found[..., :3]
+
+
+def moved(base: Floats, vectors: Floats) -> Floats:
+    """Return b exp(v) of unit quaternions (..., 4) and rotation vectors (..., 3), normalised."""
+    found = multiply(base, rotation_vector_to_quaternion(vectors))
+    return found / np.linalg.norm(found, axis=-1, keepdims=True)

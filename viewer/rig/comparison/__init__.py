@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
-from viewer.rig.comparison.contents import content_notes
-from viewer.rig.comparison.difference import Difference, Measure, Tally
 from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
 from viewer.rig.comparison.steps import FrameRange, Steps, steps_of
 from viewer.rig.comparison.weights import row_distances, skin_at
+from viewer.rig.figure import Figure
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints
 from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.kinematics import world_matrices
+from viewer.rig.material import Material, Outline, Rim, Texture
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor, actor_points
 from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skinning import Skinning, deform
 from viewer.rig.units import METRES, UNIT_NAMES
-
-__all__ = ["Difference", "Measure", "compare", "rotation_distance"]
 
 # A closest-point search takes about a second, so at most this many steps run it.
 _MOST_SEARCHES = 32
@@ -77,7 +77,7 @@ class _Comparison:
     def __init__(self, first: Actor, second: Actor, skinning: Skinning, steps: Steps) -> None:
         self.first, self.second, self.skinning, self.steps = first, second, skinning, steps
         self.mismatches, self.notes = list(steps.mismatches), list(steps.notes)
-        self.tallies: list[Tally] = []
+        self.tallies: list[_Tally] = []
         self.numbers: dict[str, int] = {}  # step numbers, by name of the step
         self._pair_skeletons()
         self._pair_meshes()
@@ -147,8 +147,8 @@ class _Comparison:
             side = "first" if second is None else "second"
             self.mismatches.append(Diagnostic(key, values={"side": side}))
 
-    def _tally(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> Tally:
-        self.tallies.append(Tally(name, kind, count, items))
+    def _tally(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> _Tally:
+        self.tallies.append(_Tally(name, kind, count, items))
         return self.tallies[-1]
 
     def run(self, report: Callable[[int, int], None] | None) -> Difference:
@@ -290,3 +290,243 @@ def _size(actor: Actor) -> float:
     mesh = actor.figure.mesh
     points = actor_points(actor) if mesh is None else mesh.positions
     return box_size(bounding_box(points))
+
+
+_ROUNDING = 1e-5  # relative tolerance for numbers that were written as text or as float32
+_WORDS = {"is_physical": "surface model", "double_sided": "sidedness", "unlit": "lighting"}
+
+
+def content_notes(first: Figure, second: Figure) -> list[Diagnostic]:
+    """Return notes about materials, parts, blend shapes and animations that differ.
+
+    Parameters
+    ----------
+    first, second : Figure
+        The figures. Kinds of content that only one figure has are not reported: few formats store
+        them.
+    """
+    notes = []
+    for what, names in (
+        ("parts", _parts),
+        ("blend shapes", _shapes),
+        ("animations", _animations),
+    ):
+        notes += _lone(what, names(first), names(second))
+    return notes + _materials(first, second)
+
+
+def _parts(figure: Figure) -> Sequence[str]:
+    return () if figure.mesh is None else figure.mesh.parts
+
+
+def _shapes(figure: Figure) -> Sequence[str]:
+    return () if figure.blend_shapes is None else figure.blend_shapes.names
+
+
+def _animations(figure: Figure) -> Sequence[str]:
+    return [animation.name for animation in figure.animations]
+
+
+def _lone(what: str, first: Sequence[str], second: Sequence[str]) -> list[Diagnostic]:
+    """Return notes about names that only one of two lists has."""
+    if not first or not second:
+        return []
+    notes = []
+    for side, names, others in (("first", first, second), ("second", second, first)):
+        lone = sorted(set(names) - set(others))
+        if lone:
+            values = {"what": what, "side": side, "names": lone}
+            notes.append(Diagnostic("D002.only", values=values))
+    return notes
+
+
+def _materials(first: Figure, second: Figure) -> list[Diagnostic]:
+    """Return notes about materials, matched by name, or by index if unnamed."""
+    if first.mesh is None or second.mesh is None:
+        return []
+    one, other = _named(first.mesh.materials), _named(second.mesh.materials)
+    notes = _lone("materials", list(one), list(other))
+    for name in one.keys() & other.keys():
+        properties = _different(one[name], other[name])
+        if properties:
+            values = {"name": name, "properties": properties}
+            notes.append(Diagnostic("D002.material", values=values))
+    return sorted(notes, key=lambda note: str(note.values.get("name", "")))
+
+
+def _named(materials: Sequence[Material]) -> dict[str, Material]:
+    """Return materials by name; those without a name, or with one already used, by index."""
+    result: dict[str, Material] = {}
+    for index, material in enumerate(materials):
+        is_own = material.name and material.name not in result
+        result[material.name if is_own else f"#{index}"] = material
+    return result
+
+
+def _different(one: Material, other: Material) -> list[str]:
+    """Return the names of the properties in which two materials differ."""
+    names = [each.name for each in fields(Material) if each.name != "name"]
+    return [
+        _WORDS.get(name, name.replace("_", " "))
+        for name in names
+        if not _equal(getattr(one, name), getattr(other, name))
+    ]
+
+
+def _equal(one: object, other: object) -> bool:
+    if isinstance(one, Texture) and isinstance(other, Texture):
+        return _same_texture(one, other)
+    if isinstance(one, Rim | Outline) and type(one) is type(other):
+        return all(_equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, float | tuple) and isinstance(other, float | tuple):
+        first, second = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+        return first.shape == second.shape and np.allclose(first, second, atol=_ROUNDING)
+    return one == other
+
+
+def _same_texture(one: Texture, other: Texture) -> bool:
+    """Return whether two textures look the same: their names are file names."""
+    placed = (one.channel, one.uv_set, one.wrap) == (other.channel, other.uv_set, other.wrap)
+    if not placed or not _same_transform(one, other):
+        return False
+    if one.image is None or other.image is None:
+        return one.image is other.image
+    return one.image is other.image or np.array_equal(one.image, other.image)
+
+
+def _same_transform(one: Texture, other: Texture) -> bool:
+    if one.transform is None or other.transform is None:
+        return one.transform is other.transform
+    return np.allclose(one.transform, other.transform, atol=_ROUNDING)
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """The difference of one property.
+
+    Attributes
+    ----------
+    name : str
+        ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
+    kind : "length", "angle" or "weight"
+        Lengths are in the first figure's unit, angles in radians; weights are dimensionless.
+    maximum, mean : float
+        Maximum and mean over all compared items and steps.
+    step, item : str
+        Location of the maximum: a frame or test pose, and a joint or vertex. The step is empty for
+        weights, which do not depend on the pose.
+    items : tuple of str
+        Names of the entries of ``item_maxima``; empty for vertices, which have indices.
+    item_maxima : (N,)
+        Largest value of each joint or vertex over all steps; 0 where nothing was compared.
+    n_compared : int
+        Number of values in the mean.
+    """
+
+    name: str
+    kind: str
+    maximum: float
+    mean: float
+    step: str
+    item: str
+    items: tuple[str, ...]
+    item_maxima: Floats
+    n_compared: int
+
+    def relative(self, size: float) -> float:
+        """Return the value that a tolerance applies to: lengths as a fraction of the size."""
+        return self.maximum / size if self.kind == "length" and size > 0.0 else self.maximum
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The differences of two figures or motions.
+
+    Attributes
+    ----------
+    measures : tuple of Measure
+        One for each property that both figures have.
+    mismatches : tuple of Diagnostic
+        Items that only one figure has, such as joints or frames; no tolerance applies to them.
+    notes : tuple of Diagnostic
+        Notes on the method of comparison.
+    size : float
+        Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
+    unit : str
+        Unit of the first figure, as in ``Figure.unit``.
+    """
+
+    measures: tuple[Measure, ...]
+    mismatches: tuple[Diagnostic, ...]
+    notes: tuple[Diagnostic, ...]
+    size: float
+    unit: str
+
+    def exceeds(self, tolerance: float) -> bool:
+        """Return whether any difference exceeds a tolerance.
+
+        Parameters
+        ----------
+        tolerance : float
+            Limit for lengths as fractions of the size, angles in radians, and weights.
+        """
+        # Written as "not within" rather than "more than", so that NaN exceeds any tolerance.
+        within = all(measure.relative(self.size) <= tolerance for measure in self.measures)
+        return bool(self.mismatches) or not within or not self.measures
+
+
+class _Tally:
+    """Accumulator of a measure over all steps.
+
+    Parameters
+    ----------
+    name, kind : str
+        As in ``Measure``.
+    count : int
+        Number of joints or vertices.
+    items : tuple of str
+        Names of the joints; empty for vertices, which have indices.
+
+    Attributes
+    ----------
+    worst : float
+        Largest value so far, negative before the first.
+    step : str
+        Step of the largest value.
+    """
+
+    def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:
+        self.name, self.kind, self.items = name, kind, items
+        self._maxima = np.zeros(count)
+        self._sum, self._count = 0.0, 0
+        self.worst, self.step, self._item = -1.0, "", -1
+
+    def add(self, step: str, values: Floats) -> None:
+        """Add the values of one step, NaN for items that cannot be compared."""
+        known = ~np.isnan(values)
+        if not known.any():
+            return
+        filled = np.where(known, values, 0.0)
+        np.maximum(self._maxima, filled, out=self._maxima)
+        self._sum += float(filled.sum())
+        self._count += int(known.sum())
+        item = int(filled.argmax())
+        if filled[item] > self.worst:
+            self.worst, self.step, self._item = float(filled[item]), step, item
+
+    def result(self) -> Measure | None:
+        """Return the measure; None if nothing was compared."""
+        if self._count == 0:
+            return None
+        item = self.items[self._item] if self.items else f"vertex {self._item}"
+        return Measure(
+            name=self.name,
+            kind=self.kind,
+            maximum=self.worst,
+            mean=self._sum / self._count,
+            step=self.step,
+            item=item,
+            items=self.items,
+            item_maxima=self._maxima,
+            n_compared=self._count,
+        )

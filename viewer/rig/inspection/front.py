@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -9,27 +10,15 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.points import PointClip, sample_points
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.inspection.front_evidence import (
-    from_ends,
-    from_face,
-    from_sides,
-    from_soles,
-    from_toes,
-    from_travel,
-)
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.retargeting.joint_names import joint_meanings
+from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
 
-__all__ = ["FRONTS", "Front", "front_axes", "guess_front", "usual_front"]
-
 Front: TypeAlias = str
 """A signed axis, such as ``"+z"``; never the up axis."""
-
 FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """All signed axes; the two along a scene's up axis do not apply to it."""
-
 _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
 _N_TIMES = 9  # number of sampled frames of a motion
 _SURE = 0.5  # minimum component of a vote along an axis; smaller ones are inconclusive
@@ -92,14 +81,14 @@ def _vote(actor: Actor, up: Floats) -> Floats:
         way = np.zeros(3)
         if mesh is not None and actor.figure.skeleton is None:
             some = mesh.positions[:: max(mesh.n_vertices // _MOST_VERTICES, 1)]
-            way = from_soles(apply_transform(actor.placement, some), up)
+            way = _from_soles(apply_transform(actor.placement, some), up)
         return _unit(way, _SURE)
     found = {
-        "sides": from_sides(names, places, up),
-        "toes": from_toes(names, parents, places, up),
-        "face": from_face(names, parents, places, up),
-        "ends": from_ends(names, places, up),
-        "travel": from_travel(_path(actor), box_size(bounding_box(places)), up),
+        "sides": _from_sides(names, places, up),
+        "toes": _from_toes(names, parents, places, up),
+        "face": _from_face(names, parents, places, up),
+        "ends": _from_ends(names, places, up),
+        "travel": _from_travel(_path(actor), box_size(bounding_box(places)), up),
     }
     total = sum(weight for kind, weight in _WEIGHTS.items() if found[kind].any())
     vote = sum((_WEIGHTS[kind] * way for kind, way in found.items()), np.zeros(3))
@@ -149,3 +138,197 @@ def _path(actor: Actor) -> Floats:
         frames = frames_between(frames, np.flatnonzero(frames.present))
         places = world_frames(actor.figure, frames)[..., :3, 3].mean(axis=1)
     return apply_transform(actor.placement, places.reshape(-1, 3))
+
+
+# Evidence of a figure's facing direction: sides, toes, faces, heads and tails, soles, travel.
+#
+# Each kind yields a horizontal vector towards the front. Its length is the confidence: 1 for
+# complete and consistent evidence, 0 for none.
+
+# Minimum length of offsets with a reliable direction, as a fraction of the figure's size.
+_LEAST = 0.01
+
+# Minimum distance from the centre, as a fraction of the figure's size, of a head in front of the
+# body.
+_CLEAR = 0.2
+_TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
+
+# Height of the soles and range of the ankles, as fractions of the figure's height.
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)
+
+# Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
+_MIRRORED = 0.98
+_LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
+
+
+def _from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
+    """Return evidence from left and right: the front is left x up.
+
+    Parameters
+    ----------
+    names : sequence of J str
+        Names of joints or keypoints.
+    places : (J, 3)
+        Their positions.
+    up : (3,)
+        Unit vector.
+
+    Returns
+    -------
+    (3,)
+        Mean of the unit vectors of all pairs.
+    """
+    found: dict[str, dict[str, list[Floats]]] = {}
+    for (side, word), place in zip(sided_words(names), places, strict=True):
+        if side:
+            found.setdefault(word, {"left": [], "right": []})[side].append(place)
+    pairs = [
+        np.mean(pair["left"], axis=0) - np.mean(pair["right"], axis=0)
+        for pair in found.values()
+        if pair["left"] and pair["right"]
+    ]
+    across = _horizontal(np.array(pairs).reshape(-1, 3), up)
+    return _agreement(np.cross(across, up), _size(places))
+
+
+def _from_toes(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
+    """Return evidence from the feet: toes are in front of their parent joints."""
+    return _by_word(_TOES, names, parents, places, up)
+
+
+def _from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
+    """Return evidence from the face: eyes and jaws are in front of the head joint."""
+    return _by_word(_FACE, names, parents, places, up)
+
+
+def _from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
+    """Return evidence from the ends of an animal: the head is in front, the tail behind.
+
+    A head directly above the centre, as in people, is no evidence.
+    """
+    words = [word for _, word in sided_words(names)]
+    heads = [j for j, word in enumerate(words) if word.startswith("head")]
+    tails = [j for j, word in enumerate(words) if word.startswith("tail")]
+    size = _size(places)
+    if not size or not (heads or tails):
+        return np.zeros(3)
+    others = [j for j in range(len(words)) if j not in heads and j not in tails]
+    middle = places[others or slice(None)].mean(axis=0)
+    ahead = places[heads].mean(axis=0) - middle if heads else np.zeros(3)
+    behind = places[tails].mean(axis=0) - middle if tails else np.zeros(3)
+    way = _horizontal(ahead - behind, up) / (_CLEAR * size)
+    return way / max(float(np.linalg.norm(way)), 1.0)
+
+
+def _from_travel(places: Floats, size: float, up: Floats) -> Floats:
+    """Return evidence from a motion: figures usually move forwards.
+
+    Parameters
+    ----------
+    places : (F, 3)
+        Positions of the figure, in time order.
+    size : float
+        Size of the figure.
+    up : (3,)
+        Unit vector.
+
+    Returns
+    -------
+    (3,)
+        Total displacement divided by path length; shorter if the path is shorter than the figure.
+    """
+    steps = _horizontal(np.diff(places, axis=0), up)
+    path = float(np.linalg.norm(steps, axis=1).sum())
+    return steps.sum(axis=0) / max(path, size) if size > 0.0 else np.zeros(3)
+
+
+def _from_soles(positions: Floats, up: Floats) -> Floats:
+    """Return evidence from a mesh alone: two symmetric soles that extend in front of the ankles.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Rest vertices.
+    up : (3,)
+        The unit vector of an axis.
+
+    Returns
+    -------
+    (3,)
+        0 unless the mesh has exactly one mirror plane and stands on feet on both sides of the
+        plane.
+    """
+    height = positions @ up
+    low, tall = float(height.min()), float(np.ptp(height))
+    planes = [
+        axis
+        for axis in range(3)
+        if up[axis] == 0.0 and tall > 0.0 and _is_symmetric(positions, axis)
+    ]
+    if len(planes) != 1:
+        return np.zeros(3)
+    box = bounding_box(positions)
+    beside = positions[:, planes[0]] - box.mean(axis=0)[planes[0]]
+    soles = height < low + _SLAB * tall
+    ankles = (height > low + _ABOVE[0] * tall) & (height < low + _ABOVE[1] * tall)
+    is_apart = (np.abs(beside[soles]) > _LEAST * tall).all()
+    if not ankles.any() or not is_apart:
+        return np.zeros(3)
+    way = positions[soles].mean(axis=0) - positions[ankles].mean(axis=0)
+    way[planes[0]] = 0.0
+    # Soles that extend in front of the ankles by at least 2 % of the height are full evidence.
+    way = _horizontal(way, up) / (2.0 * _LEAST * tall)
+    return way / max(float(np.linalg.norm(way)), 1.0)
+
+
+def _is_symmetric(positions: Floats, axis: int) -> bool:
+    """Return whether a mesh is nearly symmetric about a plane through its centre."""
+    size = _LEAST * _size(positions)
+    mirrored = positions[:: max(len(positions) // _LOOKED_AT, 1)].copy()
+    middle = bounding_box(positions).mean(axis=0)[axis]
+    mirrored[:, axis] = 2.0 * middle - mirrored[:, axis]
+    low = positions.min(axis=0)
+    # Vertices that are no farther apart than the cell size lie in the same or in adjacent cells, so
+    # 27 look-ups find them without a search tree.
+    known = np.unique(_cells((positions - low) / size))
+    found = np.zeros(len(mirrored), dtype=bool)
+    for step in np.ndindex(3, 3, 3):
+        cells = _cells((mirrored - low) / size + step - 1.0)
+        found |= known[np.minimum(np.searchsorted(known, cells), len(known) - 1)] == cells
+    return bool(found.mean() > _MIRRORED)
+
+
+def _cells(places: Floats) -> Ints:
+    """Return the index of the unit cell that contains each position: (N,)."""
+    x, y, z = np.floor(places).astype(np.int64).T + 2
+    return np.asarray((x * 1000 + y) * 1000 + z)
+
+
+def _by_word(
+    words: tuple[str, ...], names: Sequence[str], parents: Ints, places: Floats, up: Floats
+) -> Floats:
+    """Return the mean direction from parents to joints whose names contain a word."""
+    chosen = [
+        joint
+        for joint, (_, word) in enumerate(sided_words(names))
+        if parents[joint] >= 0 and any(part in word for part in words)
+    ]
+    ways = places[chosen] - places[parents[chosen]]
+    return _agreement(_horizontal(ways, up), _size(places))
+
+
+def _agreement(ways: Floats, size: float) -> Floats:
+    """Normalise the vectors that are long enough, and return their mean."""
+    lengths = np.linalg.norm(ways, axis=1)
+    clear = lengths > _LEAST * size
+    if not clear.any():
+        return np.zeros(3)
+    return np.asarray((ways[clear] / lengths[clear, None]).mean(axis=0))
+
+
+def _horizontal(vectors: Floats, up: Floats) -> Floats:
+    return np.asarray(vectors - (vectors @ up)[..., None] * up)
+
+
+def _size(places: Floats) -> float:
+    return box_size(bounding_box(places)) if len(places) else 0.0

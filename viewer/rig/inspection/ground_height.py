@@ -8,10 +8,13 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.inspection.soles import extent, soles_of
+from viewer.rig.motion.evaluation import JointMotion, frame_rate, frames_of, world_frames
+from viewer.rig.motion.timing import frame_times
+from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped
 
-__all__ = ["Ground", "ground_of", "resting_frames"]
-
-Level = tuple[float, int]  # a height, and the number of frames in which feet rest at it
+_Level = tuple[float, int]  # a height, and the number of frames in which feet rest at it
 
 # Lengths are relative to the figure's height at rest: 0.01 is 17 mm for a person.
 _ALIKE = 0.005  # maximum distance of heights of one level: about half the tolerance for sunk feet
@@ -26,6 +29,7 @@ _FRACTION = 0.1  # minimum fraction of the frames at rest for a level
 _TIE = 0.5  # fraction of the longest level's frames above which a likely level is chosen
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
 _ROLLS = 0.02  # minimum distance from the longest level, as rolling feet create closer levels
+
 # Maximum distance of the ground below the longest level, which may be a step or a seat.
 _STEP = 0.06
 
@@ -44,7 +48,7 @@ class Ground:
     """
 
     height: float | None
-    levels: tuple[Level, ...] = ()
+    levels: tuple[_Level, ...] = ()
 
     @property
     def is_guess(self) -> bool:
@@ -98,14 +102,14 @@ def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None
     return next(iter(near), None)
 
 
-def _level_at(rests: Floats, height: float, size: float) -> list[Level]:
+def _level_at(rests: Floats, height: float, size: float) -> list[_Level]:
     """Return the level nearest to a height, if feet rest close to it."""
     near = rests[np.abs(rests - height) <= _CUSTOM * size]
     levels = _levels(near, size) if len(near) >= _FRACTION * len(rests) else ()
     return sorted(levels, key=lambda level: abs(level[0] - height))[:1]
 
 
-def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -> bool:
+def _has_rival(levels: Sequence[_Level], customs: Sequence[_Level], size: float) -> bool:
     """Return whether a level other than the longest may be the ground.
 
     A likely level with few frames just below the longest is not a rival, because feet have sunk
@@ -145,10 +149,10 @@ def resting_frames(
     return rests
 
 
-def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
+def _levels(heights: Floats, size: float) -> tuple[_Level, ...]:
     """Return the most frequent heights and their numbers of frames, in decreasing order."""
     left = np.sort(heights)
-    levels: list[Level] = []
+    levels: list[_Level] = []
     while len(left) and len(left) >= _FRACTION * len(heights):
         ends = np.searchsorted(left, left + 2.0 * _ALIKE * size, side="right")
         counts = ends - np.arange(len(left))
@@ -161,3 +165,51 @@ def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
     # Of levels with the same number of frames, the upper one is first: at the lower one, feet have
     # sunk into the ground.
     return tuple(sorted(levels, key=lambda level: (-level[1], -level[0])))
+
+
+_MOST_FRAMES = 4000  # maximum number of evaluated frames
+_LOW = 0.02  # quantile of the heights, for feet that never rest
+
+
+@dataclass(frozen=True, slots=True)
+class _RestingHeight:
+    """Height of the ground under an actor.
+
+    Attributes
+    ----------
+    height : float
+        Along the scene's up axis, scene units.
+    is_clear : bool
+        Whether feet rest at this height; otherwise it is the height of the lowest positions.
+    """
+
+    height: float
+    is_clear: bool
+
+
+def resting_height(actor: Actor, up: str) -> _RestingHeight | None:
+    """Return the height at which an actor's feet rest; None unless two feet are found by name.
+
+    Parameters
+    ----------
+    actor : Actor
+        Placed actor with a motion of joints.
+    up : "y" or "z"
+        Up axis of the scene.
+    """
+    figure, motion = actor.figure, actor.clip
+    if figure.skeleton is None or not isinstance(motion, JointMotion):
+        return None
+    rate = frame_rate(motion)
+    times = frame_times(motion.start, motion.end, rate)[:_MOST_FRAMES]
+    frames = frames_of(figure, motion, times, actor.pose)
+    soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)
+    if soles is None or not frames.present.any():
+        return None
+    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
+    axis = actor.placement[2 if up == "z" else 1]
+    heights = soles.heights(world_frames(figure, frames), axis, scale).min(axis=1)
+    found = ground_of(heights, frames.present, 1.0 / rate, scale * extent(figure)[1])
+    if found.height is not None and not found.is_guess:
+        return _RestingHeight(found.height, True)
+    return _RestingHeight(float(np.quantile(heights[frames.present], _LOW)), False)

@@ -19,10 +19,10 @@ from viewer.rig.motion.clip import (
     Clip,
     Extrapolation,
     Tangent,
+    evaluate,
+    evaluate_all,
     slopes,
 )
-from viewer.rig.motion.clip_sampling import evaluate
-from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 

@@ -18,9 +18,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.clip_sampling import sample
-from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.clip import Clip, evaluate_all, sample
 from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
 from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.motion.transform_clip import TransformClip
@@ -29,9 +27,9 @@ from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Motion, figure_pose
 from viewer.rig.shape import joint_shifts, moved_rest_translations, rest_joints
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
-from viewer.rig.transforms.posing import apply_transforms
-from viewer.rig.transforms.rate import key_rate
-from viewer.rig.transforms.sampling import sample_transforms
+from viewer.rig.transform_keys.posing import apply_transforms
+from viewer.rig.transform_keys.rate import key_rate
+from viewer.rig.transform_keys.sampling import sample_transforms
 
 __all__ = [
     "Frames",

@@ -19,8 +19,7 @@ from viewer.rig.kinematics import (
     posed_skeleton,
     skinning_matrices,
 )
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.clip_table import evaluate_all
+from viewer.rig.motion.clip import Clip, evaluate_all
 from viewer.rig.motion.evaluation import place_pose, pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.motion.transform_clip import TransformClip
@@ -30,8 +29,8 @@ from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
-from viewer.rig.transforms.posing import apply_placements, apply_transforms
-from viewer.rig.transforms.sampling import sample_transforms
+from viewer.rig.transform_keys.posing import apply_placements, apply_transforms
+from viewer.rig.transform_keys.sampling import sample_transforms
 
 __all__ = [
     "local_rotations",

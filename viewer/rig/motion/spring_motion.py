@@ -27,9 +27,8 @@ from viewer.rig.pose import Pose, PoseKey, pose_key
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.springs.simulation import STEPS_PER_SECOND
+from viewer.rig.springs.simulation import STEPS_PER_SECOND, PosedJoints, SpringTrack
 from viewer.rig.springs.springs import Springs
-from viewer.rig.springs.track import PosedJoints, SpringTrack
 
 __all__ = [
     "SpringMotion",

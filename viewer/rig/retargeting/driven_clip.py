@@ -13,13 +13,11 @@ from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.feet_notes import feet_notes
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
-from viewer.rig.retargeting.planted_feet import plant_feet
-from viewer.rig.retargeting.retarget import retargeted
-
-__all__ = ["driven_clip", "full_map", "matches_of"]
+from viewer.rig.retargeting.planted_feet import PlantedFeet, plant_feet
+from viewer.rig.retargeting.retarget import Retargeted, retargeted
+from viewer.rig.scalars import length_text
 
 _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
@@ -50,7 +48,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     clip, notes = found.clip, found.notes
     if drive.plants_feet:
         clip, changes = plant_feet(found, figure, drive.hangs)
-        notes = notes + feet_notes(changes, found, figure)
+        notes = notes + _feet_notes(changes, found, figure)
     up = drive.motion.figure.up
     if not drive.keeps_up or up == figure.up:
         return clip, notes
@@ -100,3 +98,48 @@ def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip
         translations=shifts if shifts.any() else None,
         figure_translations=place,
     )
+
+
+_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
+
+
+def _feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
+    """Return messages about the changes made by planting the feet.
+
+    Parameters
+    ----------
+    changes : PlantedFeet or None
+        The changes.
+    found : Retargeted
+        The retargeting.
+    figure : Figure
+        The driven figure.
+    """
+    if changes is None:
+        return []
+    called = {"motion": found.source.figure.name, "figure": figure.name}
+    if not changes.is_better:
+        key = "F007.feet-kept" if changes.n_contacts else "F007.feet-no-contacts"
+        return [Diagnostic(key, values=called)]
+
+    def text(length: float) -> str:
+        return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
+
+    values = {
+        **called,
+        "n": changes.n_contacts,
+        "source": text(changes.source),
+        "before": text(changes.before),
+        "after": text(changes.after),
+    }
+    notes = [Diagnostic("F007.feet-planted", values=values)]
+    own = {"figure": figure.name}
+    gaps = own | {"gap_before": text(changes.gap_before), "gap": text(changes.gap_after)}
+    notes.append(Diagnostic("F007.feet-gap", values=gaps))
+    if changes.lowered > _ROUNDING * changes.size:
+        length = text(changes.lowered)
+        notes.append(Diagnostic("F007.feet-lowered", values=own | {"length": length}))
+    if changes.ground_speed:
+        speed = f"{text(changes.ground_speed)}/s"
+        notes.append(Diagnostic("F007.feet-ground", values=own | {"speed": speed}))
+    return notes

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.foot_lock import legs_of
 from viewer.rig.cleanup.frame_rows import runs_of
 from viewer.rig.cleanup.leg_ik import Leg, reach
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.inspection.soles import Soles, extent, soles_of_feet
+from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.chain_worlds import Chains, chain_worlds, chains_to
 from viewer.rig.retargeting.leg_chains import animal_legs
 from viewer.rig.retargeting.rest_poses import rest_of
 from viewer.rig.retargeting.retarget import Retargeted
 from viewer.rig.retargeting.source_contacts import FootPath
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import shaped
-
-__all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
+from viewer.rig.skeleton import Skeleton
 
 _ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
 _UNEVEN = 1e-3  # maximum relative difference of a joint's scale factors
@@ -33,7 +34,7 @@ _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 
 
 @dataclass(frozen=True, slots=True)
-class LegPair:
+class _LegPair:
     """A leg of the figure, and the joints of the source's foot that drives it.
 
     Attributes
@@ -83,7 +84,7 @@ class DrivenLegs:
         Translation relative to moving ground in each row; None if the ground does not move.
     """
 
-    chains: Chains
+    chains: _Chains
     legs: tuple[Leg, ...]
     soles: Soles
     heels: Floats
@@ -97,7 +98,7 @@ class DrivenLegs:
 
     def worlds(self, clip: SampledClip) -> Floats:
         """Return the world matrices of the chains, moved by the travel: (N, K, 4, 4)."""
-        found = chain_worlds(clip, self.chains, *self.rests)
+        found = _chain_worlds(clip, self.chains, *self.rests)
         if self.travel is not None:
             found[..., :3, 3] += self.travel[:, None]
         return found
@@ -138,7 +139,7 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
     return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
 
 
-def leg_pairs(found: Retargeted, figure: Figure) -> list[LegPair]:
+def leg_pairs(found: Retargeted, figure: Figure) -> list[_LegPair]:
     """Return the legs of the figure whose hips and ankles are driven, left before right."""
     source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
     partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
@@ -150,7 +151,7 @@ def leg_pairs(found: Retargeted, figure: Figure) -> list[LegPair]:
         if min(hip, ankle) < 0:
             continue
         chosen = (toe if toe >= 0 else ankle) if animal else toes.get(ankle, ankle)
-        pairs.append(LegPair(leg, hip, ankle, chosen, bool(animal)))
+        pairs.append(_LegPair(leg, hip, ankle, chosen, bool(animal)))
     return pairs
 
 
@@ -176,13 +177,13 @@ def driven_legs(
         weights = clip.shape_weights[0]
     body = shaped(figure, weights)
     soles = soles_of_feet(body, [[leg.toe, leg.ankle] for leg in legs], figure.is_attached)
-    chains = chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
+    chains = _chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
     constrained = [each.joint for each in skeleton.constraints]
     if (chains.place[constrained] >= 0).any():
         return None
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
     still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
-    world = chain_worlds(still, chains, *rests)[0]
+    world = _chain_worlds(still, chains, *rests)[0]
     if not _is_solvable(world[:, :3, :3]):
         return None
     place = chains.place
@@ -235,7 +236,7 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
 
 
 def has_source_proportions(
-    found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
+    found: Retargeted, figure: Figure, pairs: list[_LegPair], size: float
 ) -> bool:
     """Return whether the legs of a figure are as long as the scaled legs of the source.
 
@@ -268,7 +269,7 @@ def has_source_proportions(
 def foot_paths(
     found: Retargeted,
     clip: SampledClip,
-    pairs: list[LegPair],
+    pairs: list[_LegPair],
     vectors: list[tuple[Floats, Floats]],
     up: Floats,
 ) -> list[FootPath]:
@@ -289,13 +290,13 @@ def foot_paths(
         The up axis.
     """
     skeleton = found.source.figure.require_skeleton()
-    chains = chains_to(
+    chains = _chains_to(
         skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
     )
     rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
     still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
-    rest = chain_worlds(still, chains, *rests)[0]
-    world = chain_worlds(clip, chains, *rests)
+    rest = _chain_worlds(still, chains, *rests)[0]
+    world = _chain_worlds(clip, chains, *rests)
     axes, result = found.scale * found.to_target, []
     for pair, own in zip(pairs, vectors, strict=True):
         ends = (pair.hip, pair.ankle, pair.toe)
@@ -316,3 +317,70 @@ def foot_paths(
         heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
         result.append(FootPath(ball, heel @ axes.T, above))
     return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Chains:
+    """Some joints of a skeleton and all their ancestors, renumbered.
+
+    Attributes
+    ----------
+    joints : (K,) int32
+        Indices of the joints in the skeleton, parents before children.
+    parents : (K,) int32
+        Parents as indices into ``joints``; -1 for a root.
+    place : (J,) int32
+        Index into ``joints`` of each joint of the skeleton, -1 if it is not included.
+    """
+
+    joints: Ints
+    parents: Ints
+    place: Ints
+
+
+def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> _Chains:
+    """Return the given joints of a skeleton and all their ancestors."""
+    parents = skeleton.parents
+    chosen = np.zeros(skeleton.n_joints, dtype=np.bool_)
+    for end in ends:
+        joint = int(end)
+        while joint >= 0 and not chosen[joint]:
+            chosen[joint] = True
+            joint = int(parents[joint])
+    joints = np.flatnonzero(chosen).astype(np.int32)
+    place = np.full(skeleton.n_joints, -1, dtype=np.int32)
+    place[joints] = np.arange(len(joints))
+    above = np.where(parents[joints] >= 0, place[parents[joints]], -1).astype(np.int32)
+    return _Chains(joints, above, place)
+
+
+def _chain_worlds(
+    clip: SampledClip, chains: _Chains, translations: Floats, scales: Floats
+) -> Floats:
+    """Return the world matrices of some joints in every row of a clip: (N, K, 4, 4).
+
+    Parameters
+    ----------
+    clip : SampledClip
+        Motion of the whole skeleton.
+    chains : Chains
+        The joints.
+    translations, scales : (J, 3)
+        Rest translations and local scale factors of all joints; the clip's scales precede these.
+    """
+    joints = chains.joints
+    local = np.zeros((len(joints), clip.n_rows, 4, 4))
+    local[..., 3, 3] = 1.0
+    factors = scales[None, joints] if clip.scales is None else clip.scales[:, joints]
+    linear = quaternion_to_matrix(clip.rotations[:, joints]) * factors[:, :, None, :]
+    local[..., :3, :3] = np.swapaxes(linear, 0, 1)
+    offsets = translations[joints]
+    if clip.translations is not None:
+        offsets = offsets + clip.translations[:, joints]
+    local[..., :3, 3] = np.swapaxes(np.broadcast_to(offsets, (clip.n_rows, len(joints), 3)), 0, 1)
+    world = np.swapaxes(forward_kinematics(chains.parents, local), 0, 1).copy()
+    if clip.figure_scales is not None:
+        world[..., :3, :] *= clip.figure_scales[:, None, None, None]
+    if clip.figure_translations is not None:
+        world[..., :3, 3] += clip.figure_translations[:, None]
+    return world

@@ -14,26 +14,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.expression_weights import expression_weights
-from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.retargeting.path_scale import path_scale
 from viewer.rig.retargeting.rest_poses import (
     RestPose,
     alignment,
@@ -42,12 +40,12 @@ from viewer.rig.retargeting.rest_poses import (
     up_rotation,
 )
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
+from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton, joint_label, joint_labels
-
-__all__ = ["Retargeted", "retarget", "retargeted", "scaled_motion"]
 
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 _SIDES = ("left", "right")
+
 # Largest rotation of a joint that never moves, and least one of a joint that moves, in radians.
 _NEVER, _MOVING = np.radians(0.01), np.radians(5.0)
 _STILL = 1e-6  # minimum motion of used position channels, as a fraction of the skeleton's size
@@ -198,7 +196,7 @@ def retargeted(
         job = _job(motion, motion.figure.skeleton or source, (target, figure.up), matches)
     worlds = _source_rotations(job)
     rotations = _target_rotations(job, worlds)
-    scale, by = path_scale(*job.rests, job.matches)
+    scale, by = _path_scale(*job.rests, job.matches)
     shifts, notes = _shifts(job, worlds, rotations, scale)
     roots = np.flatnonzero(target.parents < 0)
     place: Floats | None = None
@@ -464,3 +462,149 @@ def _extent(rotations: Floats) -> tuple[Bools, Bools]:
         np.linalg.norm(rotations - first, axis=2), np.linalg.norm(rotations + first, axis=2)
     ).max(axis=0)
     return chords < 0.5 * _NEVER, chords > 0.5 * _MOVING
+
+
+def expression_weights(
+    expressions: Mapping[str, Floats], figure: Figure
+) -> tuple[Floats | None, list[Diagnostic]]:
+    """Return a figure's blend shape weights over time; other shapes keep their rest weights.
+
+    Parameters
+    ----------
+    expressions : mapping of str to (N,)
+        Weights by the names of VRM 1.0.
+    figure : Figure
+        Its blend shapes may have the names of VRM 0.x.
+
+    Returns
+    -------
+    weights : (N, S) or None
+        None if no expression moves a shape of the figure.
+    notes : list of Diagnostic
+        The expressions that the figure does not have.
+    """
+    shapes = figure.blend_shapes
+    names = () if shapes is None else shapes.names
+    # Expressions come after the morph targets, whose names they may share.
+    columns = {_plain(name): column for column, name in enumerate(names)}
+    rules = None if shapes is None else shapes.rules
+    for row, preset in zip(rules.rows, rules.presets, strict=False) if rules is not None else ():
+        if preset:
+            columns[_plain(preset)] = int(row)
+    found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
+    missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
+    notes = [Diagnostic("F007.expressions-unmatched", values={"names": missing})] if missing else []
+    if not found:
+        return None, notes
+    count = len(next(iter(expressions.values())))
+    weights = np.tile(figure_pose(figure).shape_weights, (count, 1))
+    for name, column in found.items():
+        weights[:, column] = expressions[name]
+    return weights, notes
+
+
+def _plain(name: str) -> str:
+    lower = name.lower()
+    return OLD_PRESETS.get(lower, lower).lower()
+
+
+_FEET = ("left_foot", "right_foot", "left_ankle", "right_ankle")
+
+# Cosine of the maximum angle between the up axis and the legs of a standing person, from the pelvis
+# to the feet. The legs of some files, such as those of CMU, are 20 degrees apart in the zero pose.
+_UPRIGHT = np.cos(np.radians(40.0))
+
+
+def ground_offset(
+    source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
+) -> Floats:
+    """Return the offset that moves the target's feet to the feet of the scaled source.
+
+    The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
+    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
+
+    Parameters
+    ----------
+    source, target : (J', 3), (J, 3)
+        Joints of both skeletons in the source's rest pose, in common axes.
+    matches : Matches
+        Joints of the source for joints of the target.
+    up : (3,)
+        The up axis.
+    scale : float
+        Scale of the path.
+
+    Returns
+    -------
+    (3,)
+        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
+        source does not stand in its rest pose.
+    """
+    place = {
+        name: joint for joint, name in enumerate(matches.names) if matches.partners[joint] >= 0
+    }
+    feet = [place[name] for name in _FEET if name in place]
+    if "pelvis" not in place or not feet:
+        return 0.0 * up
+    pelvis, partners = place["pelvis"], matches.partners
+    legs = source[partners[pelvis]] - source[partners[feet]]
+    theirs = (legs @ up).max()
+    if theirs < _UPRIGHT * np.linalg.norm(legs, axis=1).max():
+        return 0.0 * up
+    mine = ((target[pelvis] - target[feet]) @ up).max()
+    return (mine - scale * theirs) * up
+
+
+_ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
+_LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
+_ARMS = (
+    ("left_shoulder", "left_elbow", "left_wrist"),
+    ("right_shoulder", "right_elbow", "right_wrist"),
+)
+
+
+def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[float, Phrase]:
+    """Return the ratio of the target's lengths to the source's, and the kind of lengths compared.
+
+    Legs are compared if both have them, otherwise arms, otherwise all matched joints.
+
+    Parameters
+    ----------
+    source, target : RestPose
+        Rest poses in common axes.
+    matches : Matches
+        Joints of the source for joints of the target.
+    """
+    partners, names = matches.partners, matches.names
+    place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
+
+    def length(pairs: list[tuple[int, int]]) -> tuple[float, float]:
+        ends = np.array(pairs, dtype=np.int32).reshape(-1, 2).T
+        mine = target.points[ends[1]] - target.points[ends[0]]
+        theirs = source.points[partners[ends[1]]] - source.points[partners[ends[0]]]
+        return float(np.linalg.norm(mine, axis=1).sum()), float(
+            np.linalg.norm(theirs, axis=1).sum()
+        )
+
+    matched = np.flatnonzero(partners >= 0)
+    bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
+    choices = [
+        ("ratio-of-legs", _pairs(_LEGS, place)),
+        ("ratio-of-arms", _pairs(_ARMS, place)),
+        ("ratio-of-bones", bones),
+    ]
+    for what, pairs in choices:
+        mine, theirs = length(pairs)
+        if mine > 0.0 and theirs > 0.0:
+            ratio = mine / theirs
+            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), Phrase(what)
+    return 1.0, Phrase("ratio-of-nothing")
+
+
+def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tuple[int, int]]:
+    return [
+        (place[start], place[end])
+        for limb in limbs
+        for start, end in pairwise(limb)
+        if start in place and end in place
+    ]

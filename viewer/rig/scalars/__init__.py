@@ -6,6 +6,7 @@ A quantity is named by its key, followed by its joint or field if it has one: ``
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from keyword import iskeyword
 
@@ -14,45 +15,22 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
+from viewer.phrases import rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose
-from viewer.rig.scalars._asked import Asked, influences_kept
-from viewer.rig.scalars._fields import field_of
-from viewer.rig.scalars._joints import joint_of, joint_text
-from viewer.rig.scalars._lengths import length_text, length_unit
-from viewer.rig.scalars._start import informative_quantity, joint_influences, most_influential
-from viewer.rig.skeleton import joint_labels
+from viewer.rig.scalars._asked import Asked, field_of, influences_kept
+from viewer.rig.skeleton import find_joint, joint_label, joint_labels
 from viewer.rig.skinning import METHODS, PURE, Skinning
-
-__all__ = [
-    "SCALARS",
-    "Quantity",
-    "categories",
-    "compute",
-    "find_quantity",
-    "informative_quantity",
-    "joint_influences",
-    "joint_of",
-    "joint_text",
-    "length_text",
-    "length_unit",
-    "menu_title",
-    "missing_part",
-    "most_influential",
-    "quantity_title",
-    "shown_unit",
-    "split_name",
-    "strongest",
-]
+from viewer.rig.units import METRES
 
 # Smaller values are 0; relative to the figure's size for lengths, otherwise absolute.
 _NOISE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class _Quantity:
     """A scalar quantity.
 
     Attributes
@@ -111,9 +89,8 @@ class Quantity:
 
 
 _FIRST, *_OTHERS = (METHODS[name].short for name in PURE)
-
 SCALARS = {
-    "weight": Quantity(
+    "weight": _Quantity(
         "Weight of a joint",
         "weights",
         "weights",
@@ -123,25 +100,27 @@ SCALARS = {
         isolines=True,
         least=1.0,
     ),
-    "dominant": Quantity("Dominant joint", "weights", "weights", "categorical", "", moves=False),
-    "influences": Quantity(
+    "dominant": _Quantity("Dominant joint", "weights", "weights", "categorical", "", moves=False),
+    "influences": _Quantity(
         "Number of influences", "weights", "weights", "discrete", "", moves=False
     ),
-    "sums": Quantity("|sum of weights - 1|", "weights", "weights", unit="", moves=False),
-    "entropy": Quantity("Entropy of weights", "weights", "weights", unit="bits", moves=False),
-    "stretch": Quantity("Edge stretch, largest", "strain", "a skin", "diverging", "%", robust=True),
-    "stretch-mean": Quantity(
+    "sums": _Quantity("|sum of weights - 1|", "weights", "weights", unit="", moves=False),
+    "entropy": _Quantity("Entropy of weights", "weights", "weights", unit="bits", moves=False),
+    "stretch": _Quantity(
+        "Edge stretch, largest", "strain", "a skin", "diverging", "%", robust=True
+    ),
+    "stretch-mean": _Quantity(
         "Edge stretch, mean", "strain", "a skin", "diverging", "%", robust=True
     ),
-    "area": Quantity("Area change", "strain", "a skin", "diverging", "%", robust=True),
-    "methods": Quantity(f"Distance {_FIRST} to {' or '.join(_OTHERS)}", "distances", "a skin"),
-    "pruning": Quantity("Distance to few influences", "distances", "a skin"),
-    "normalized": Quantity("Effect of normalising weights", "distances", "a skin"),
-    "correctives": Quantity("Effect of pose correctives", "distances", "pose correctives"),
-    "asymmetry": Quantity("Asymmetry", "distances", "a symmetry map"),
-    "parts": Quantity("Body parts", "parts", "body parts", "categorical", "", moves=False),
-    "field": Quantity("Field", "fields", "fields", unit="", moves=False, about="field"),
-    "class": Quantity(
+    "area": _Quantity("Area change", "strain", "a skin", "diverging", "%", robust=True),
+    "methods": _Quantity(f"Distance {_FIRST} to {' or '.join(_OTHERS)}", "distances", "a skin"),
+    "pruning": _Quantity("Distance to few influences", "distances", "a skin"),
+    "normalized": _Quantity("Effect of normalising weights", "distances", "a skin"),
+    "correctives": _Quantity("Effect of pose correctives", "distances", "pose correctives"),
+    "asymmetry": _Quantity("Asymmetry", "distances", "a symmetry map"),
+    "parts": _Quantity("Body parts", "parts", "body parts", "categorical", "", moves=False),
+    "field": _Quantity("Field", "fields", "fields", unit="", moves=False, about="field"),
+    "class": _Quantity(
         "Classes", "fields", "classes", "categorical", "", moves=False, about="field"
     ),
 }
@@ -169,7 +148,7 @@ def split_name(name: str) -> tuple[str, str]:
     return key, about
 
 
-def find_quantity(name: str) -> Quantity:
+def find_quantity(name: str) -> _Quantity:
     """Return the quantity with a name, which may include a joint or field.
 
     Raises
@@ -333,3 +312,94 @@ def _missing(needs: str, figure: Figure) -> str:
 def strongest(figure: Figure) -> int:
     """Return the maximum number of influences of a vertex."""
     return 0 if figure.skin is None else int(np.diff(figure.skin.starts).max(initial=0))
+
+
+def joint_influences(figure: Figure) -> Floats:
+    """Return the sum of the absolute weights of each joint: (J,)."""
+    skin = figure.skin
+    if skin is None:
+        return np.zeros(0)
+    sums = np.bincount(skin.joints, np.abs(skin.weights), skin.n_joints)
+    return sums.astype(np.float64, copy=False)
+
+
+def most_influential(figure: Figure) -> int:
+    """Return the joint with the largest sum of weights, or -1 if no joint has influence."""
+    sums = joint_influences(figure)
+    return int(sums.argmax()) if sums.any() else -1
+
+
+def _informative_field(figure: Figure) -> str:
+    """Return the name of the first numeric field that is not 0 everywhere, or an empty string."""
+    fields = [field for field in figure.fields if not field.names]
+    return next((field.name for field in fields if field.values.any()), "")
+
+
+def informative_quantity(key: str, figures: Iterable[Figure]) -> str:
+    """Return the name of a quantity with the first joint or field that is not 0 everywhere.
+
+    For quantities without a joint or field, the key is already the name.
+    """
+    for figure in figures:
+        if key == "weight" and (joint := most_influential(figure)) >= 0:
+            return f"weight:{joint_text(figure, joint)}"
+        if key == "field" and (field := _informative_field(figure)):
+            return f"field:{field}"
+    return key
+
+
+def joint_of(figure: Figure, text: str) -> int:
+    """Return the joint of a case-insensitive name, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
+
+    Without a skeleton, the joints of a skin have indices only. Raises RigError if there is no such
+    joint, with suggestions, or if several joints have that name.
+    """
+    skeleton = figure.skeleton
+    count = 0 if figure.skin is None else figure.skin.n_joints
+    index = text.removeprefix("#")
+    is_index = index.isascii() and index.isdecimal() and len(index) < 10 and int(index) < count
+    if skeleton is None:
+        if is_index:
+            return int(index)
+        raise RigError(f'no joint "{text}"; without a skeleton, joints are #0 to #{count - 1}')
+    names = {name.lower() for name in skeleton.names}
+    if is_index and text not in names:
+        return int(index)
+    if text.lower() not in names and "#" not in text:
+        hint = name_hint(text, joint_labels(skeleton))
+        raise RigError(f'no joint is called "{text}"; {hint}')
+    return find_joint(skeleton, text)
+
+
+def joint_text(figure: Figure, joint: int) -> str:
+    """Return the label of a joint, such as ``"#4"`` if it has no name."""
+    return f"#{joint}" if figure.skeleton is None else joint_label(figure.skeleton, joint)
+
+
+_METRE = 999.5  # millimetres that would be rounded to 1000 mm
+_LEAST = (
+    0.001  # smallest length that matters, in millimetres or percent; shorter ones are shown as it
+)
+_ZERO = 1e-6  # rounding errors below this are 0
+
+
+def length_unit(figure: Figure) -> tuple[float, str]:
+    """Return the factor and unit of small lengths: millimetres if the figure's unit is known."""
+    if figure.unit in METRES:
+        return 1000.0 * METRES[figure.unit], "mm"
+    size = 0.0 if figure.mesh is None else box_size(bounding_box(figure.mesh.positions))
+    return (100.0 / size, "% of the size") if size > 0.0 else (1.0, "units")
+
+
+def length_text(figure: Figure, length: float) -> str:
+    """Format a length with three digits: ``"12.3 mm"``, ``"2.31 m"`` or ``"1.5 % of the size"``.
+
+    Rounding errors are 0, and other lengths are at least 0.001 mm, or 0.001 % of the size.
+    """
+    factor, unit = length_unit(figure)
+    number = factor * length
+    if unit == "mm" and number >= _METRE:
+        number, unit = 0.001 * number, "m"
+    elif unit != "units" and number < _LEAST:
+        number = 0.0 if number < _ZERO else _LEAST
+    return f"{rounded(number)} {unit}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass
 from viewer.rig.figure import Figure
@@ -10,6 +11,9 @@ from viewer.rig.pose import Pose
 from viewer.rig.skeleton import shown_joint_of
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
+
+if TYPE_CHECKING:
+    from viewer.rig.annotations import VertexField
 
 _FOUR = 4  # maximum number of influences per vertex in most engines
 
@@ -53,3 +57,10 @@ class Asked:
 def influences_kept(skinning: Skinning) -> int:
     """Return the number of influences for the comparison: the chosen limit, or four."""
     return skinning.max_influences or _FOUR
+
+
+def field_of(figure: Figure, name: str, is_class: bool) -> VertexField | None:
+    """Return a figure's field or class by its case-insensitive name; if empty, the first one."""
+    suited = [field for field in figure.fields if bool(field.names) == is_class]
+    named = [field for field in suited if not name or field.name.lower() == name.lower()]
+    return named[0] if named else None

@@ -5,8 +5,7 @@ from __future__ import annotations
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
-from viewer.rig.scalars._asked import Asked
-from viewer.rig.scalars._fields import field_of
+from viewer.rig.scalars._asked import Asked, field_of
 
 __all__ = ["class_", "field"]
 

@@ -1,4 +1,4 @@
-"""Arrays of all keys of a transform clip, laid out for evaluation without loops over channels."""
+"""Evaluation of transform clips: slerp, linear, step and cubic interpolation (glTF 2.0)."""
 
 from __future__ import annotations
 
@@ -9,15 +9,147 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformChannel, TransformPath
+from viewer.rig.memo import Memo
+from viewer.rig.motion.transform_clip import (
+    TRANSFORM_PATHS,
+    TransformChannel,
+    TransformClip,
+    TransformPath,
+)
 
-__all__ = ["Arcs", "Curves", "Targets", "Timelines", "TransformTable", "transform_table"]
+_tables: Memo[TransformClip, _TransformTable] = Memo(kept=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TransformSamples:
+    """Values of all channels of a clip at T times.
+
+    Attributes
+    ----------
+    rotated, translated, scaled : (R,), (N,), (M,) int32
+        Joints with channels.
+    weighted : (W,) int32
+        Blend shapes with channels.
+    rotations : (T, R, 4)
+        Relative to the parent joint, rest rotation included: unit quaternions (x, y, z, w).
+    translations : (T, N, 3)
+        Relative to the parent joint, rest translation included.
+    scales : (T, M, 3)
+        Factors.
+    weights : (T, W)
+        Weights of the shapes ``weighted``.
+    """
+
+    rotated: Ints
+    translated: Ints
+    scaled: Ints
+    weighted: Ints
+    rotations: Floats
+    translations: Floats
+    scales: Floats
+    weights: Floats
+
+
+def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
+    """Return the values of all channels at given times.
+
+    Linear: p0 + u (p1 - p0); for rotations, spherical along the shorter arc. Step: p0. Cubic, over
+    a span of h seconds (glTF 2.0, appendix C):
+    (2 u^3 - 3 u^2 + 1) p0 + h (u^3 - 2 u^2 + u) b0 + (3 u^2 - 2 u^3) p1 + h (u^3 - u^2) a1, with
+    incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
+    first key and after its last key, a channel has the value of that key.
+
+    Parameters
+    ----------
+    clip : TransformClip
+        With any number of channels.
+    times : (T,)
+        Seconds.
+
+    Returns
+    -------
+    TransformSamples
+        At the time of a key, exactly the key's value; rotations are normalised.
+    """
+    table = _tables.get(clip, (), lambda: _transform_table(clip.channels))
+    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    spans, fractions = _places(table.timelines, times)
+    arcs = _arcs(table.arcs, spans, fractions)
+    lines = _lines(table.lines, spans, fractions)
+    cubics = np.zeros((len(times), 0))
+    if len(table.cubics.timelines):
+        cubics = _cubics(table.cubics, table.timelines, spans, fractions)
+
+    def part(path: TransformPath, width: int) -> Floats:
+        targets, count = table.targets[path], len(times)
+        plain = arcs if path == "rotation" else lines[:, targets.lines].reshape(count, -1, width)
+        curved = cubics[:, targets.cubics].reshape(count, -1, width)
+        if path == "rotation" and curved.shape[1]:
+            curved = _normalised(curved)
+        return np.concatenate([plain, curved], axis=1) if curved.shape[1] else plain
+
+    indices = {path: targets.indices for path, targets in table.targets.items()}
+    return TransformSamples(
+        indices["rotation"], indices["translation"], indices["scale"], indices["weights"],
+        part("rotation", 4), part("translation", 3), part("scale", 3), part("weights", 1)[..., 0],
+    )  # fmt: skip
+
+
+def _places(timelines: _Timelines, times: Floats) -> tuple[Ints, Floats]:
+    """Return the key before each time, and the fraction of the span elapsed since: (T, U)."""
+    passed = np.searchsorted(timelines.union, times, side="right")
+    keys = np.searchsorted(timelines.ranks, timelines.ends + passed[:, None], side="right") - 1
+    keys = np.maximum(keys, timelines.first)
+    spans = keys - timelines.first
+    fractions = (times[:, None] - timelines.times.take(keys)) / timelines.durations.take(keys)
+    # Before the first key the difference is negative; after the last one the duration is infinite.
+    return spans, np.maximum(fractions, 0.0)
+
+
+def _arcs(arcs: _Arcs, spans: Ints, fractions: Floats) -> Floats:
+    """Return rotations by (sin((1 - u) t) q0 + sin(u t) q1) / sin(t): (T, R, 4)."""
+    rows = arcs.bases + spans.take(arcs.timelines, axis=1)
+    angles, sines = arcs.angles.take(rows), arcs.sines.take(rows)
+    after = fractions.take(arcs.timelines, axis=1) * arcs.slopes * angles
+    first, second = np.sin(angles - after) / sines, np.sin(after) / sines
+    before, following = arcs.keys.take(rows, axis=0), arcs.keys.take(rows + 1, axis=0)
+    return first[..., None] * before + second[..., None] * following
+
+
+def _lines(curves: Curves, spans: Ints, fractions: Floats) -> Floats:
+    """Return linear and step interpolation: (T, C)."""
+    rows = curves.bases + spans.take(curves.timelines, axis=1) * curves.strides
+    start = curves.values.take(rows)
+    rise = curves.values.take(rows + curves.strides) - start
+    return start + fractions.take(curves.timelines, axis=1) * curves.slopes * rise
+
+
+def _cubics(curves: Curves, timelines: _Timelines, spans: Ints, fractions: Floats) -> Floats:
+    """Return cubic Hermite splines: (T, C)."""
+    durations = timelines.durations[timelines.first + spans]
+    durations = np.where(np.isfinite(durations), durations, 0.0)[:, curves.timelines]
+    rows = curves.bases + spans.take(curves.timelines, axis=1) * curves.strides
+    following = rows + curves.strides
+    u, start = fractions.take(curves.timelines, axis=1), curves.values.take(rows)
+    rise = curves.values.take(following) - start
+    leaving, arriving = curves.outgoing.take(rows), curves.incoming.take(following)
+    # The basis functions of both values sum to 1, so this form gives exactly p0 at u = 0.
+    bend = (u - 1.0) * (u - 1.0) * leaving + u * (u - 1.0) * arriving
+    return start + u * u * (3.0 - 2.0 * u) * rise + durations * u * bend
+
+
+def _normalised(quaternions: Floats) -> Floats:
+    """Return unit quaternions; if a spline passes through 0, the rotation is arbitrary."""
+    lengths = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    still = np.array([0.0, 0.0, 0.0, 1.0])
+    return np.where(lengths > 0.0, quaternions / np.where(lengths > 0.0, lengths, 1.0), still)
+
 
 _SMALLEST = 1e-9  # angle in radians below which slerp equals linear interpolation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Timelines:
+class _Timelines:
     """U distinct lists of key times; most channels of a file share one.
 
     Attributes
@@ -46,7 +178,7 @@ class Timelines:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arcs:
+class _Arcs:
     """R rotations that follow arcs between their keys, or stay at the earlier key.
 
     Attributes
@@ -100,7 +232,7 @@ class Curves:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Targets:
+class _Targets:
     """Joints or shapes animated by one path, in the order of the samples.
 
     Attributes
@@ -117,17 +249,17 @@ class Targets:
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
-class TransformTable:
+class _TransformTable:
     """All keys of a clip, and the targets of each path."""
 
-    timelines: Timelines
-    arcs: Arcs
+    timelines: _Timelines
+    arcs: _Arcs
     lines: Curves
     cubics: Curves
-    targets: dict[TransformPath, Targets]
+    targets: dict[TransformPath, _Targets]
 
 
-def transform_table(channels: Sequence[TransformChannel]) -> TransformTable:
+def _transform_table(channels: Sequence[TransformChannel]) -> _TransformTable:
     """Lay out the keys of channels: arcs of rotations, then lines and splines by path."""
     timelines, of_channel = _timelines([channel.times for channel in channels])
     numbered = list(zip(channels, of_channel, strict=True))
@@ -145,10 +277,10 @@ def transform_table(channels: Sequence[TransformChannel]) -> TransformTable:
                        [one for one, _ in cubics])
         for path in TRANSFORM_PATHS
     }  # fmt: skip
-    return TransformTable(timelines, _arcs(arcs), _curves(lines), _curves(cubics), targets)
+    return _TransformTable(timelines, _arc_table(arcs), _curves(lines), _curves(cubics), targets)
 
 
-def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
+def _timelines(every: Sequence[Floats]) -> tuple[_Timelines, list[int]]:
     """Return the distinct lists of times, and each channel's index into them."""
     known: dict[bytes, int] = {}
     of_channel = [known.setdefault(times.tobytes(), len(known)) for times in every]
@@ -162,11 +294,11 @@ def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
     union = np.unique(times)
     ends = np.arange(len(parts), dtype=np.int64) * (len(union) + 1)
     ranks = np.repeat(ends, counts) + np.searchsorted(union, times, side="right")
-    timelines = Timelines(times, first.astype(np.int32), durations, union, ends, ranks)
+    timelines = _Timelines(times, first.astype(np.int32), durations, union, ends, ranks)
     return timelines, of_channel
 
 
-def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
+def _arc_table(channels: list[tuple[TransformChannel, int]]) -> _Arcs:
     parts = [part for one, _ in channels for part in (one.values, one.values[-1:])]
     keys: Floats = np.concatenate([np.zeros((0, 4)), *parts])
     keys /= np.linalg.norm(keys, axis=1, keepdims=True)
@@ -185,7 +317,7 @@ def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
     chords[:-1] = np.where(is_first[1:], 0.0, np.linalg.norm(np.diff(keys, axis=0), axis=1))
     # The chord is accurate at small angles, whereas the arccosine loses half the digits.
     angles = np.maximum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0)), _SMALLEST)
-    return Arcs(
+    return _Arcs(
         np.array([timeline for _, timeline in channels], dtype=np.int32),
         bases.astype(np.int32),
         np.array([float(one.interpolation != "step") for one, _ in channels]),
@@ -219,7 +351,7 @@ def _targets(
     arcs: list[TransformChannel],
     lines: list[TransformChannel],
     cubics: list[TransformChannel],
-) -> Targets:
+) -> _Targets:
     """Return the targets of a path: targets of arcs or lines first, then of cubic curves."""
     plain = arcs if path == "rotation" else lines
     indices = [np.zeros(0, dtype=np.int32)]
@@ -227,7 +359,7 @@ def _targets(
         if channel.path == path:
             own = np.array([channel.joint]) if channel.shapes is None else channel.shapes
             indices.append(own.astype(np.int32))
-    return Targets(
+    return _Targets(
         np.concatenate(indices),
         slice(0, 0) if path == "rotation" else _components(path, lines),
         _components(path, cubics),

@@ -11,19 +11,14 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
-from viewer.rig.material import TEXTURES, Material, Texture
-from viewer.rig.materials.toon import Rim
-
-__all__ = ["COLOR_KINDS", "TRANSFORM", "MaterialBinds"]
+from viewer.rig.material import TEXTURES, Material, Rim, Texture
 
 COLOR_KINDS = (
     *("color", "emissionColor", "shadeColor", "rimColor", "matcapColor", "outlineColor"),
 )
 """Colours that expressions change, by their names in VRM 1.0."""
-
 TRANSFORM = "transform"
 """Kind of the placement of all textures of a material, except its matcap."""
-
 _STRAIGHT = 1e-9  # sine of the largest angle of a transform without rotation
 
 

@@ -11,8 +11,6 @@ from viewer.rig.memo import Memo
 from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.motion.transform_clip import TransformClip
 
-__all__ = ["is_regular", "key_rate"]
-
 # Usual rates, the most likely first: few keys lie on the frames of several.
 _RATES = (DEFAULT_RATE, 24.0, 25.0, 60.0, 120.0, 50.0, 100.0, 48.0, 90.0, 240.0)
 _BROADCAST = tuple(1000.0 * rate / 1001.0 for rate in (30.0, 24.0, 60.0, 120.0))
@@ -20,7 +18,6 @@ _ON_FRAME = 1e-3  # tolerance in frames
 _SINGLE = 2.0**-24  # relative rounding error of times, which files store in single precision
 _FASTEST = 1000.0  # keys that are closer are at irregular times
 _SLOWEST = 24.0  # keys that are further apart have frames between them
-
 _known: Memo[TransformClip, float] = Memo()
 
 

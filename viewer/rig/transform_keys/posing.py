@@ -9,9 +9,7 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
-from viewer.rig.transforms.sampling import TransformSamples
-
-__all__ = ["apply_placements", "apply_transforms", "set_joint_translations"]
+from viewer.rig.transform_keys.sampling import TransformSamples
 
 
 def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:

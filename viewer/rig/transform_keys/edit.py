@@ -19,31 +19,15 @@ from viewer.rig.motion.clip import Channel
 from viewer.rig.motion.clip_edit import move_keys, set_key
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transforms.channel_edit import (
-    added_key,
-    with_interpolation,
-    without_keys,
-)
-from viewer.rig.transforms.rows import TransformRow, angles_of, from_angles, rows_of
+from viewer.rig.transform_keys.rows import TransformRow, angles_of, from_angles, rows_of
+from viewer.rig.transform_keys.sampling import sample_transforms
 
-__all__ = [
-    "add_transform_key",
-    "delete_transform_keys",
-    "move_transform_keys",
-    "set_clip_interpolation",
-    "set_clip_range",
-    "set_transform_key",
-    "set_transform_slope",
-    "with_transform_channel",
-]
-
-Place = tuple[int, int]
+_Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""
-
 _STEEPEST = math.radians(90.0)  # limit of the middle angle, beyond which angles are ambiguous
 
 
-def with_transform_channel(
+def _with_transform_channel(
     clip: TransformClip, index: int, channel: TransformChannel | None
 ) -> TransformClip:
     """Return a clip with one channel replaced, removed (None), or added (index -1)."""
@@ -58,7 +42,7 @@ def with_transform_channel(
 def move_transform_keys(
     clip: TransformClip,
     skeleton: Skeleton,
-    places: Iterable[Place],
+    places: Iterable[_Place],
     dt: float,
     dv: float,
     gap: float,
@@ -87,14 +71,14 @@ def move_transform_keys(
             wanted = {component: float(now[component]) + dv for component in components}
             channel = _with_value(channel, skeleton, key, wanted)
         times = move_keys(_line(channel), chosen, dt, 0.0, gap).times
-        clip = with_transform_channel(clip, index, replace(channel, times=times))
+        clip = _with_transform_channel(clip, index, replace(channel, times=times))
     return clip
 
 
 def set_transform_key(
     clip: TransformClip,
     skeleton: Skeleton,
-    place: Place,
+    place: _Place,
     time: float | None = None,
     value: float | None = None,
     gap: float = 1e-3,
@@ -106,7 +90,7 @@ def set_transform_key(
         channel = _with_value(channel, skeleton, key, {row.component: value})
     if time is not None:
         channel = replace(channel, times=set_key(_line(channel), key, time, gap=gap).times)
-    return with_transform_channel(clip, row.channel, channel)
+    return _with_transform_channel(clip, row.channel, channel)
 
 
 def add_transform_key(
@@ -128,20 +112,20 @@ def add_transform_key(
     """
     if row.channel >= 0:
         channel = added_key(clip.channels[row.channel], time, value)[0]
-        return with_transform_channel(clip, row.channel, channel)
+        return _with_transform_channel(clip, row.channel, channel)
     if value is None:
         return clip
     new = TransformChannel(row.joint, row.path, np.array([time]), value[None])
-    return with_transform_channel(clip, -1, new)
+    return _with_transform_channel(clip, -1, new)
 
 
 def delete_transform_keys(
-    clip: TransformClip, skeleton: Skeleton, places: Iterable[Place]
+    clip: TransformClip, skeleton: Skeleton, places: Iterable[_Place]
 ) -> TransformClip:
     """Return a clip without some keys; channels without keys are removed."""
     chosen = _by_channel(clip, skeleton, places)
     channels = [
-        without_keys(channel, chosen[index]) if index in chosen else channel
+        _without_keys(channel, chosen[index]) if index in chosen else channel
         for index, channel in enumerate(clip.channels)
     ]
     return replace(clip, channels=tuple(channel for channel in channels if channel is not None))
@@ -156,7 +140,7 @@ def set_transform_slope(
         return clip
     tangents = channel.tangents.copy()
     tangents[key, side, row.component] = slope
-    return with_transform_channel(clip, row.channel, replace(channel, tangents=tangents))
+    return _with_transform_channel(clip, row.channel, replace(channel, tangents=tangents))
 
 
 def set_clip_interpolation(
@@ -164,7 +148,7 @@ def set_clip_interpolation(
 ) -> TransformClip:
     """Return a clip with the interpolation of some channels changed."""
     for index in channels:
-        clip = with_transform_channel(clip, index, with_interpolation(clip.channels[index], mode))
+        clip = _with_transform_channel(clip, index, with_interpolation(clip.channels[index], mode))
     return clip
 
 
@@ -174,7 +158,7 @@ def set_clip_range(clip: TransformClip, start: float, end: float) -> TransformCl
 
 
 def _by_channel(
-    clip: TransformClip, skeleton: Skeleton, places: Iterable[Place]
+    clip: TransformClip, skeleton: Skeleton, places: Iterable[_Place]
 ) -> dict[int, dict[int, set[int]]]:
     """Return the selected components by channel and key."""
     rows, found = rows_of(clip, skeleton), dict[int, dict[int, set[int]]]()
@@ -219,3 +203,131 @@ def _with_value(
     turn = multiply(new, conjugate(old)) / (old @ old)
     tangents[key] = multiply(turn, tangents[key])
     return replace(channel, values=values, tangents=tangents)
+
+
+# Tolerances of times: seconds, and the relative rounding error of single precision in files.
+_SAME, _SINGLE = 1e-6, 2.0**-22
+
+
+def _key_at(channel: TransformChannel, time: float) -> int:
+    """Return the key at a time, within the rounding errors of files; -1 if there is none."""
+    near = int(np.abs(channel.times - time).argmin())
+    is_same = abs(channel.times[near] - time) <= max(_SAME, _SINGLE * abs(time))
+    return near if is_same else -1
+
+
+def value_at(channel: TransformChannel, time: float) -> Floats:
+    """Return a channel's value at a time: (C,)."""
+    alone = TransformClip("", (channel,), 0.0, 0.0)
+    found = sample_transforms(alone, np.array([time]))
+    if channel.path == "weights":
+        return found.weights[0]
+    return {
+        "rotation": found.rotations,
+        "translation": found.translations,
+        "scale": found.scales,
+    }[channel.path][0, 0]
+
+
+def added_key(
+    channel: TransformChannel, time: float, value: Floats | None = None
+) -> tuple[TransformChannel, int]:
+    """Return a channel with one more key, and its index.
+
+    Parameters
+    ----------
+    channel : TransformChannel
+        With any interpolation.
+    time : float
+        Seconds. An existing key at this time is changed instead.
+    value : (C,), optional
+        Its value; by default the shape of the curve is unchanged. A cubic key with a value gets the
+        slope between its neighbours.
+    """
+    there = _key_at(channel, time)
+    if there >= 0:
+        return (channel if value is None else _with_key_value(channel, there, value)), there
+    key = int(np.searchsorted(channel.times, time))
+    tangent = np.zeros(channel.n_components)
+    given = value
+    if value is None and channel.tangents is None:
+        given = value_at(channel, time)
+    elif value is None:
+        given, tangent = _spline(channel, time)
+    assert given is not None  # given, or computed above
+    tangents = channel.tangents
+    if tangents is not None:
+        tangents = np.insert(tangents, key, np.stack([tangent, tangent]), axis=0)
+    added = replace(
+        channel,
+        times=np.insert(channel.times, key, time),
+        values=np.insert(channel.values, key, given, axis=0),
+        tangents=tangents,
+    )
+    return (added if value is None else _with_key_value(added, key, value)), key
+
+
+def _with_key_value(channel: TransformChannel, key: int, value: Floats) -> TransformChannel:
+    """Return a channel with the value of one key changed, and a smooth slope there."""
+    values = channel.values.copy()
+    values[key] = value
+    if channel.path == "rotation" and len(values) > 1:
+        # Choose the sign of the quaternion nearer to a neighbour, as cubic interpolation does not.
+        neighbour = values[key - 1 if key else 1]
+        values[key] *= -1.0 if values[key] @ neighbour < 0.0 else 1.0
+    if channel.tangents is None:
+        return replace(channel, values=values)
+    tangents = channel.tangents.copy()
+    tangents[key] = _smooth(channel.times, values)[key]
+    return replace(channel, values=values, tangents=tangents)
+
+
+def _smooth(times: Floats, values: Floats) -> Floats:
+    """Return the slopes between each key's neighbours, 0 at both ends: (N, C)."""
+    slopes = np.zeros(values.shape)
+    if len(times) > 2:
+        slopes[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])[:, None]
+    return slopes
+
+
+def _spline(channel: TransformChannel, time: float) -> tuple[Floats, Floats]:
+    """Return the value and slope of a cubic channel, before normalisation of rotations: (C,)."""
+    times, values = channel.times, channel.values
+    assert channel.tangents is not None  # the caller has checked for cubic interpolation
+    if not times[0] < time < times[-1]:
+        return values[0 if time <= times[0] else -1], np.zeros(channel.n_components)
+    key = int(np.searchsorted(times, time, side="right")) - 1
+    h = float(times[key + 1] - times[key])
+    u = (time - float(times[key])) / h
+    p0, p1 = values[key], values[key + 1]
+    m0, m1 = h * channel.tangents[key, 1], h * channel.tangents[key + 1, 0]
+    a, b = 2.0 * p0 - 2.0 * p1 + m0 + m1, -3.0 * p0 + 3.0 * p1 - 2.0 * m0 - m1
+    return ((a * u + b) * u + m0) * u + p0, ((3.0 * a * u + 2.0 * b) * u + m0) / h
+
+
+def _without_keys(channel: TransformChannel, keys: Iterable[int]) -> TransformChannel | None:
+    """Return a channel without some keys; None if no key remains."""
+    stays = np.ones(len(channel.times), dtype=np.bool_)
+    stays[list(keys)] = False
+    if not stays.any():
+        return None
+    tangents = None if channel.tangents is None else channel.tangents[stays]
+    return replace(
+        channel, times=channel.times[stays], values=channel.values[stays], tangents=tangents
+    )
+
+
+def with_interpolation(channel: TransformChannel, mode: Interpolation) -> TransformChannel:
+    """Return a channel with another interpolation; cubic keys get smooth slopes."""
+    if mode == channel.interpolation:
+        return channel
+    if mode != "cubic":
+        return replace(channel, interpolation=mode, tangents=None)
+    values = channel.values
+    if channel.path == "rotation":
+        values = values / np.linalg.norm(values, axis=1, keepdims=True)
+        far = np.einsum("na,na->n", values[1:], values[:-1]) < 0.0
+        values[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
+    slopes = _smooth(channel.times, values)
+    tangents = np.stack([slopes, slopes], axis=1)
+    return replace(channel, values=values, interpolation=mode, tangents=tangents)

@@ -13,11 +13,10 @@ from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, Tr
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transforms.channel_edit import added_key, value_at
-
-__all__ = ["joint_values", "key_transform_pose"]
+from viewer.rig.transform_keys.edit import added_key, value_at
 
 _UNCHANGED = 1e-9  # tolerance within which lengths, factors and weights equal their curves
+
 # Tolerance of the difference of unit quaternions, about half the angle in radians.
 _SAME_ROTATION = 1e-9
 

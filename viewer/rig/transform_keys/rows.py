@@ -22,9 +22,7 @@ from viewer.rig.geometry.rotation import (
 from viewer.rig.memo import Memo
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, TransformPath
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transforms.sampling import TransformSamples, sample_transforms
-
-__all__ = ["TransformRow", "angles_of", "from_angles", "key_values", "row_values", "rows_of"]
+from viewer.rig.transform_keys.sampling import TransformSamples, sample_transforms
 
 _rows: Memo[TransformClip, tuple[TransformRow, ...]] = Memo(kept=1)
 _parts: Memo[TransformClip, TransformClip] = Memo(kept=2)

@@ -1,1 +1,0 @@
-"""Textures, toon shading, and changes of materials by expressions."""
