@@ -22,9 +22,9 @@ from hypothesis import strategies as st
 from plain_bvh import about
 
 import viewer
-from viewer.export._bvh.angles import euler_angles, unrolled
-from viewer.export._bvh.text import safe_names
 from viewer.export._options import ROTATION_ORDERS
+from viewer.export.bvh.angles import euler_angles, unrolled
+from viewer.export.bvh.text import safe_names
 from viewer.formats import Source, bvh
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure

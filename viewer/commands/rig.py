@@ -30,7 +30,7 @@ from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export import check_figure, exporter_for
 from viewer.export._rigged_files import files_of, write_rigged
-from viewer.export._vrm.meta import checked_meta
+from viewer.export.vrm.meta import checked_meta
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import named_files, resolve

@@ -13,8 +13,8 @@ from viewer.autorig.rigged import Rigged
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export import VrmMeta, export, files_written
-from viewer.export._course_rig import course_pose, course_skeleton
 from viewer.export._losses.posed import PoseLosses
+from viewer.export.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.export._family_frames import (
+from viewer.export._family import (
     FamilyFrames,
     check_unit,
     family_frames,
     member_of_figure,
+    read_frames,
     up_axis,
 )
-from viewer.export._family_reading import read_frames
 from viewer.export._gaps import filled, gaps_note, runs
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
@@ -39,11 +39,8 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
-__all__ = ["export_animation", "padded", "write_layout"]
-
 Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
 """Returns the arrays of a range of rows, given the frame rate and the up axis."""
-
 _FEWEST = 16  # minimum number of shape coefficients, as readers of AMASS require
 _CLOSED = {
     "hold": "pose-held-and-marked",

@@ -9,13 +9,13 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
-from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import between_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
+from viewer.export.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -26,14 +26,15 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError, RigError
-from viewer.export._family_frames import (
+from viewer.export._family import (
     FamilyFrames,
+    Records,
     check_unit,
     family_frames,
     member_of_figure,
+    read_frames,
     up_axis,
 )
-from viewer.export._family_reading import Records, read_frames
 from viewer.export._gaps import kept_gaps, kept_note
 from viewer.export._losses.between import rate_note, resampling_losses
 from viewer.export._losses.lines import frames_losses

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
-from viewer.export._family_frames import FamilyFrames, member_of_figure
+from viewer.export._family import FamilyFrames, member_of_figure
 from viewer.export._options import MotionOptions
 from viewer.export.amass import padded, write_layout
 from viewer.rig.figure import Figure

@@ -18,12 +18,12 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note
-from viewer.export._gltf.document import Document, text_of
 from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
 from viewer.export._options import MotionOptions
-from viewer.export._vrm.humanoid import bone_above, human_bones
-from viewer.export._vrm.made import PRESETS
-from viewer.export._vrm.standing import in_t_pose, standing, unit_rotation, vrm_axes
+from viewer.export.gltf.document import Document, text_of
+from viewer.export.vrm.humanoid import bone_above, human_bones
+from viewer.export.vrm.made import PRESETS
+from viewer.export.vrm.standing import in_t_pose, standing, unit_rotation, vrm_axes
 from viewer.formats import Source, read, save_bytes
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

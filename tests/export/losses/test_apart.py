@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_less
 
-from viewer.export._losses.apart import apart
-from viewer.export._losses.bounds import Bounds
-from viewer.export._losses.estimates import Estimator
+from viewer.export._losses.apart import Bounds, Estimator, apart
 from viewer.export._losses.skinned import Body, Poses, Side, poses_of
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.skin import skin_from_entries

@@ -19,7 +19,7 @@ import viewer
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.export import VrmMeta, export
-from viewer.export._vrm.humanoid import human_bones
+from viewer.export.vrm.humanoid import human_bones
 from viewer.loading import load
 from viewer.rig.figure import Figure
 from viewer.rig.humanoid import Humanoid

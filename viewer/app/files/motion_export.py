@@ -29,10 +29,10 @@ from viewer.export import (
     export_figures,
     suited_exporter,
 )
-from viewer.export._gltf.sampled import placed_actor
 from viewer.export._motion_paths import is_together, motion_paths
 from viewer.export._options import SAFE_NAMES
-from viewer.export._vrm.humanoid import is_humanoid
+from viewer.export.gltf.sampled import placed_actor
+from viewer.export.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import printable
 from viewer.progress import receiving

@@ -66,7 +66,7 @@ def convert_streamed(
     """
     if not _is_streamable(arguments, output):
         return None
-    from viewer.export._bvh.streaming import Parts, export_parts
+    from viewer.export.bvh.streaming import Parts, export_parts
     from viewer.formats._bvh.streaming import Irregular
 
     try:

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.apart import with_values
+from viewer.export._losses.apart import apart, negligible, with_values
 from viewer.export._losses.lines import frames_losses
-from viewer.export._losses.worst_times import Sampler, key_times, worst_times
+from viewer.export._losses.skinned import (
+    Body,
+    Rows,
+    Side,
+    body_rows,
+    changing,
+    figure_side,
+    linear_as_opened,
+    vertices,
+)
 from viewer.rig.arrays import Floats
-from viewer.rig.motion.clip import Clip
+from viewer.rig.figure import Figure
+from viewer.rig.motion.clip import SHORTEST, Channel, Clip
 from viewer.rig.motion.evaluation import Frames, frame_rate, frames_of
 from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -64,7 +77,7 @@ def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
 def between_losses(
     path: Path,
     animation: SampledAnimation,
-    found: Sampler,
+    found: _Sampler,
     how: Skinning,
     also: Floats | None = None,
 ) -> list[Diagnostic]:
@@ -85,7 +98,7 @@ def between_losses(
             animation.frames.times,
             key_times(animation.motion, *animation.frames.times[[0, -1]].tolist()),
         )
-        worst = worst_times(
+        worst = _worst_times(
             animation.figure,
             lambda times: frames_at(animation, times),
             found,
@@ -115,3 +128,199 @@ def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
     place = (own - animation.frames.times[0]) * animation.frame_rate
     is_between = np.abs(place - np.round(place)) > _ON_FRAME
     return own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]
+
+
+# Search for the times at which two motions of one figure differ most, given as curves.
+#
+# Curves are smooth between their keys, so the difference is sampled there, and the highest
+# samples are refined.
+
+_Sampler = Callable[[Floats], Frames]
+_MOST = 8192  # total number of samples before refinement
+_STEPS = 16  # maximum number of samples between two keys or frames
+_FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
+_LIKELY = 256  # number of likely spans, for joints and vertices each
+_INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
+_SHORT = 1e-6  # spans shorter than this, in frames, are ignored
+_BLOCK = 1024  # poses per block
+_NAMING = 1024  # approximate number of times at which all vertices are compared
+_GROUPS = 32  # time intervals, each of which contributes its farthest vertex
+_PEAKS = 64  # maximum number of refined peaks
+_HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
+_PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
+_ROUNDS = 4  # number of rounds of refinement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _WorstTimes:
+    """Candidate times of the largest distance.
+
+    Attributes
+    ----------
+    times : (T,)
+        Candidate times, seconds.
+    looked : int
+        Number of sampled times.
+    is_estimate : bool
+        Whether there were too few samples to be certain.
+    """
+
+    times: Floats
+    looked: int
+    is_estimate: bool
+
+
+def key_times(clip: Clip | TransformClip, start: float, stop: float) -> Floats:
+    """Return the times of all keys within a range, including repetitions of curves, seconds."""
+    if isinstance(clip, Clip):
+        every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
+    else:
+        every = [channel.times for channel in clip.channels]
+    times = np.unique(np.concatenate([np.zeros(0), *every]))
+    return times[(times > start) & (times < stop)]
+
+
+def _repeated(channel: Channel, start: float, stop: float) -> Floats:
+    times = channel.times
+    first, span = times[0], times[-1] - times[0]
+    if span <= SHORTEST or (stop - start) / span > _MOST:
+        return times
+    rounds = np.arange(np.floor((start - first) / span), np.ceil((stop - first) / span))
+    before, after = (mode not in ("constant", "linear") for mode in channel.extrapolation)
+    rounds = rounds[((rounds >= 0) | before) & ((rounds <= 0) | after)]
+    is_back = (rounds % 2 == 1) & np.where(
+        rounds < 0, channel.extrapolation[0] == "bounce", channel.extrapolation[1] == "bounce"
+    )
+    within = np.where(is_back[:, None], times[-1] - times, times - first)
+    again = first + rounds[:, None] * span + within
+    return np.concatenate([times, again.ravel()])
+
+
+def _worst_times(
+    figure: Figure, one: _Sampler, other: _Sampler, edges: Floats, rate: float, how: Skinning
+) -> _WorstTimes:
+    """Return candidate times of the largest distance between two motions.
+
+    ``figure``: figure without its shape applied.
+    ``one``, ``other``: functions from seconds (T,) to poses of the figure, none of them missing.
+    ``edges`` (E,): ascending times between which both are smooth, seconds.
+    ``rate``: frames per second; defines the shortest relevant span.
+    ``how``: skinning of the mesh; LBS replaces its method.
+    """
+    spans = _spans(edges, _SHORT / rate)
+    if len(spans) == 0:
+        return _WorstTimes(np.zeros(0), 0, False)
+    pair, looked = _Pair(figure, one, other, linear_as_opened(how)), 0
+    is_estimate = len(spans) * _FEWEST > _MOST
+    if is_estimate:
+        looked = min(len(spans), _MOST)
+        spans = _likely(pair, spans)
+    steps = min(_STEPS, _MOST // len(spans))
+    times = _within(spans, np.linspace(_INSET, 1.0 - _INSET, steps + 1))
+    pair = pair.watching(times)
+    heights = pair.heights(times)
+    looked += len(times)
+    found = []
+    for kind in range(len(heights)):
+        peaks = _peaks(heights[kind])
+        found.append(_refined(pair, kind, times, peaks))
+        looked += _ROUNDS * (_PARTS + 1) * len(peaks)
+    return _WorstTimes(np.unique(np.concatenate(found)), looked, is_estimate)
+
+
+def _spans(edges: Floats, short: float) -> Floats:
+    """Return the start and end of each span between edges: (N, 2)."""
+    spans = np.column_stack([edges[:-1], edges[1:]])
+    return spans[spans[:, 1] - spans[:, 0] > short]
+
+
+def _within(spans: Floats, places: Floats) -> Floats:
+    """Return times at relative positions, 0 to 1, within all spans."""
+    return np.asarray(spans[:, :1] + np.diff(spans, axis=1) * places).ravel()
+
+
+def _likely(pair: _Pair, spans: Floats) -> Floats:
+    """Return the spans with the largest distances at their centres, in time order."""
+    if len(spans) > _MOST:
+        spans = spans[np.linspace(0, len(spans) - 1, _MOST).astype(int)]
+    middles = _within(spans, np.array([0.5]))
+    order = np.argsort(-pair.watching(middles).heights(middles), axis=1, kind="stable")
+    return spans[np.unique(order[:, :_LIKELY])]
+
+
+def _peaks(heights: Floats) -> Rows:
+    """Return the indices of the highest local maxima among the samples."""
+    padded = np.concatenate([[-np.inf], heights, [-np.inf]])
+    is_peak = (heights >= padded[:-2]) & (heights >= padded[2:]) & (heights > 0.0)
+    rows = np.flatnonzero(is_peak & (heights >= _HOPEFUL * heights.max(initial=0.0)))
+    return rows[np.argsort(-heights[rows], kind="stable")[:_PEAKS]]
+
+
+def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
+    """Return refined times of peaks of the distance of joints (0) or vertices (1)."""
+    best = times[peaks, None]
+    low = times[np.maximum(peaks - 1, 0), None]
+    high = times[np.minimum(peaks + 1, len(times) - 1), None]
+    reach = np.maximum(best - low, high - best)
+    for _ in range(_ROUNDS):
+        near = np.clip(best + reach * np.linspace(-1.0, 1.0, _PARTS + 1), low, high)
+        top = pair.heights(near.ravel())[kind].reshape(near.shape).argmax(axis=1)
+        best = np.take_along_axis(near, top[:, None], axis=1)
+        reach = reach * 2.0 / _PARTS
+    return best.ravel()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Two motions of a figure, and the few compared vertices."""
+
+    figure: Figure
+    one: _Sampler
+    other: _Sampler
+    how: Skinning
+    body: tuple[Body, Body] | None = None
+
+    def _sides(self, times: Floats) -> tuple[Side, Side, Frames]:
+        first, second = self.one(times), self.other(times)
+        still = second.shape_weights[0]
+        columns = np.union1d(changing(first, still), changing(second, still))
+        sides = [
+            figure_side(self.figure, frames, self.how, still, columns) for frames in (first, second)
+        ]
+        return sides[0], sides[1], first
+
+    def watching(self, times: Floats) -> _Pair:
+        """Return the pair restricted to the vertices that are farthest apart at some times."""
+        if self.figure.mesh is None:
+            return self
+        times = times[:: max(1, len(times) // _NAMING)]
+        first, second, frames = self._sides(times)
+        assert first.body is not None and second.body is not None  # both sides have the mesh
+        every = np.arange(len(times))
+        least = negligible(self.figure, frames, every)
+        found = set()
+        for rows in np.array_split(every, min(_GROUPS, len(every))):
+            worst = apart(first, second, rows, least).vertices
+            if worst is not None:
+                found.add(worst.index)
+        chosen = np.array(sorted(found), dtype=np.int32)
+        bodies = body_rows(first.body, chosen), body_rows(second.body, chosen)
+        return replace(self, body=bodies)
+
+    def heights(self, times: Floats) -> NDArray[np.float64]:
+        """Return the largest distances of joints and, if any, vertices: (1 or 2, T)."""
+        blocks = [times[start : start + _BLOCK] for start in range(0, len(times), _BLOCK)]
+        return np.concatenate([np.zeros((self._kinds, 0)), *map(self._block, blocks)], axis=1)
+
+    @property
+    def _kinds(self) -> int:
+        return 1 if self.body is None or len(self.body[0].positions) == 0 else 2
+
+    def _block(self, times: Floats) -> Floats:
+        first, second, _ = self._sides(times)
+        rows = np.arange(len(times))
+        one, other = first.poses(rows), second.poses(rows)
+        off = [one.places - other.places]
+        if self.body is not None and self._kinds == 2:
+            off.append(vertices(self.body[0], one) - vertices(self.body[1], other))
+        return np.stack([np.linalg.norm(each, axis=2).max(axis=1, initial=0.0) for each in off])

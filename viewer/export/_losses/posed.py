@@ -8,13 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.apart import (
-    Apart,
-    Farthest,
-    apart_notes,
-    negligible,
-    with_values,
-)
+from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible, with_values
 from viewer.formats import Source, read
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure

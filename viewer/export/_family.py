@@ -1,0 +1,304 @@
+"""Conversion of animations to the parameters of the SMPL family."""
+
+from __future__ import annotations
+
+import json
+from array import array
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.template import rendered
+from viewer.errors import RigError
+from viewer.export._left_out import joint_scales_note
+from viewer.export._options import MotionOptions
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
+from viewer.rig.motion.evaluation import Frames, frames_of, rest_translations_of
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.timing import Timing
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.smpl_family import FAMILY, Member, ShapeSpace
+from viewer.rig.units import METRES, UNIT_NAMES
+
+_OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's blend shapes are numbered
+_NEGLIGIBLE = 1e-6  # in metres; also the relative deviation of a scale from 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FamilyFrames:
+    """Poses of one body, V = R (X - J0) + J0 + t.
+
+    Attributes
+    ----------
+    member : Member
+        Model of the family.
+    vectors : (F, J, 3)
+        Rotation vectors in the member's own joint order, with angles up to pi.
+    translations : (F, 3)
+        t, metres.
+    roots : (F, 3) or (1, 3)
+        J0, the rest position of the root, metres.
+    shape, expression : (F, S) or (1, S)
+        Coefficients; one row if they are constant.
+    present : (F,) bool
+        Whether the person is present; the other arrays are filled elsewhere.
+    gender : str
+        Gender of the body.
+    """
+
+    member: Member
+    vectors: Floats
+    translations: Floats
+    roots: Floats
+    shape: Floats
+    expression: Floats
+    present: Bools
+    gender: str
+
+    @property
+    def has_expression(self) -> bool:
+        """Whether any expression coefficient is nonzero."""
+        return bool(self.expression.any())
+
+    def about_origin(self) -> Floats:
+        """Return T of V = R X + T: T = t + J0 - R J0, (F, 3)."""
+        rotated_root = np.einsum(
+            "fab,fb->fa",
+            rotation_vector_to_matrix(self.vectors[:, 0]),
+            self.roots + 0.0 * self.translations,
+        )
+        return self.translations + self.roots - rotated_root
+
+
+def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Member:
+    """Return the member of the family that has the same joints as a figure.
+
+    ``figure``: figure with a skeleton.
+    ``what``: name of the output, for the message.
+    ``roots``: allowed names of the root: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
+    Raises RigError if no member has these joints, or if the figure's unit is unknown.
+    """
+    names = () if figure.skeleton is None else figure.skeleton.names
+    member = FAMILY.get(len(names))
+    if member is None or set(member.names) != set(names) or member.names[0] not in roots:
+        titles = [kind.title for kind in FAMILY.values() if kind.names[0] in roots]
+        raise RigError(
+            f"{figure.name} cannot be written as {what}: expected the joints of "
+            f"{', '.join(titles[:-1])} or {titles[-1]}, found different ones"
+        )
+    if figure.unit not in METRES:
+        raise RigError(
+            f"{figure.name} cannot be written as {what}, which is in metres: its unit is unknown"
+            + rendered("{window:?| (for a BVH, --unit sets it)}", {})
+        )
+    return member
+
+
+def check_unit(options: MotionOptions, title: str) -> None:
+    """Check the requested unit.
+
+    Raises RigError for units other than metres.
+    """
+    if options.unit not in ("", "m"):
+        raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
+
+
+def up_axis(options: MotionOptions) -> str:
+    """Return the up axis of the file, by default that of the scene.
+
+    Raises RigError if the requested axis is neither y nor z; the scene's axis may be negative.
+    """
+    if options.up not in ("", "y", "z"):
+        raise RigError(f'up axis: expected y or z, found "{options.up}"')
+    up = options.up or options.world_up
+    if up not in ("y", "z", "-y", "-z"):
+        raise RigError(f'up axis: expected y or z, found "{up}"')
+    return up
+
+
+def family_frames(
+    animation: SampledAnimation,
+    frames: Frames,
+    member: Member,
+    options: MotionOptions,
+    model: str = "",
+) -> tuple[FamilyFrames, list[Diagnostic]]:
+    """Return an animation as parameters of the family.
+
+    The root joint is at t + J0, so t is its displacement from the rest position. For a different up
+    axis, the world is rotated by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
+
+    ``animation``: an animation of a figure whose unit is known.
+    ``frames``: its frames; rows of missing frames are undefined.
+    ``member``: from ``member_of_figure``.
+    ``options``: only the up axes are used.
+    ``model``: title of the model in whose space coefficients are written; the member's if empty.
+    Returns ``frames``: one row per frame.
+    Returns ``notes``: notes about data without a parameter in the family, with its size.
+    Raises RigError if a value of a present frame is not finite.
+    """
+    figure, skeleton = animation.figure, animation.figure.require_skeleton()
+    numbers = {name: joint for joint, name in enumerate(skeleton.names)}
+    order = [numbers[name] for name in member.names]
+    rotations = frames.rotations[:, order]
+    metres = METRES[figure.unit]
+    moved = metres * frames.translations[:, order]
+    translations = metres * frames.figure_translations + moved[:, 0]
+    roots = metres * root_positions(figure, frames.shape_weights)
+    if up_axis(options) != options.world_up:
+        angle = np.pi / 2 if up_axis(options) == "z" else -np.pi / 2
+        rotation = np.array([angle, 0.0, 0.0])
+        rotations = rotations.copy()
+        rotations[:, 0] = multiply(rotation_vector_to_quaternion(rotation), rotations[:, 0])
+        matrix = np.round(
+            rotation_vector_to_matrix(rotation)
+        )  # a rotation by 90 degrees has integer entries
+        translations = (translations + roots) @ matrix.T - roots
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    columns = {
+        kind: [index for index, group in enumerate(groups) if group == kind]
+        for kind in ("shape", "expression")
+    }
+    coefficients = {kind: frames.shape_weights[:, listed] for kind, listed in columns.items()}
+    notes: list[Diagnostic] = []
+    space = ShapeSpace(model or member.title)
+    if not space.shares_coefficients(figure.shape_space):
+        if any(rows.any() for rows in coefficients.values()):
+            values = {"own": figure.shape_space.model, "other": space.model}
+            notes.append(Diagnostic("X003.other-shape-space", values=values))
+        coefficients = {kind: np.zeros((1, rows.shape[1])) for kind, rows in coefficients.items()}
+    present = animation.frames.present
+    found = FamilyFrames(
+        member,
+        _vectors(rotations),
+        translations,
+        roots,
+        coefficients["shape"],
+        coefficients["expression"],
+        present,
+        animation.gender or "neutral",
+    )
+    parts = (found.vectors, found.translations)
+    if not all(np.isfinite(part[present]).all() for part in parts):
+        raise RigError(f"{animation.name}: expected finite numbers in every frame")
+    notes += _losses(frames, skeleton, moved[:, 1:]) + _own_shapes(figure)
+    return found, notes + _bare_skeleton(figure, roots[0])
+
+
+def _vectors(quaternions: Floats) -> Floats:
+    """Return rotation vectors with angles from 0 to pi of unit quaternions: (..., 3)."""
+    halves = np.where(quaternions[..., 3:] < 0.0, -quaternions, quaternions)
+    sines = np.linalg.norm(halves[..., :3], axis=-1, keepdims=True)
+    angles = 2.0 * np.arctan2(sines, halves[..., 3:])
+    is_zero = sines == 0.0
+    return np.asarray(
+        halves[..., :3] * np.where(is_zero, 2.0, angles / np.where(is_zero, 1.0, sines))
+    )
+
+
+def _own_shapes(figure: Figure) -> list[Diagnostic]:
+    """Return a note if the figure is the bundled body, which is not an SMPL model."""
+    if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
+        return []
+    return [Diagnostic("X005.own-shape", values={"figure": figure.name})]
+
+
+def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
+    """Return notes about a skeleton's unit, and about a root with a different rest position."""
+    notes = []
+    if figure.unit != "m":
+        unit = UNIT_NAMES[figure.unit]
+        notes.append(Diagnostic("X005.unit-converted", values={"unit": unit}))
+    if figure.mesh is None:
+        place = dict(zip("xyz", root.tolist(), strict=True))
+        notes.append(Diagnostic("X005.own-root", values=place))
+    return notes
+
+
+def _losses(frames: Frames, skeleton: Skeleton, moved: Floats) -> list[Diagnostic]:
+    notes = []
+    present = frames.present
+    farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
+    if farthest > _NEGLIGIBLE:
+        notes.append(Diagnostic("X003.body-translations", values={"distance": float(farthest)}))
+    scales = frames.figure_scales[present]
+    if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
+        values = {"low": float(scales.min()), "high": float(scales.max())}
+        notes.append(Diagnostic("X003.body-scale", values=values))
+    notes += joint_scales_note(frames, skeleton, "X003.body-joint-scales")
+    return notes
+
+
+def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
+    """Return the poses in a file for an animation's figure, in the animation's world and unit.
+
+    ``motion``: the read motion, in metres.
+    ``animation``: the written animation.
+    ``options``: options with the up axes of the animation and the file.
+    """
+    figure, count = animation.figure, motion.timing.n_frames
+    timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
+    moved = motion.translations / METRES[figure.unit]
+    # Coefficients were written as they are, so they are read as those of the figure.
+    motion = replace(motion, timing=timing, translations=moved, shape_space=figure.shape_space)
+    clip, _ = body_clip(motion, figure)
+    found = frames_of(figure, clip, np.arange(count) / timing.frame_rate)
+    if up_axis(options) == options.world_up:
+        return found
+    angle = -np.pi / 2 if up_axis(options) == "z" else np.pi / 2
+    return _rotated(found, animation, np.array([angle, 0.0, 0.0]))
+
+
+def _rotated(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
+    """Return frames in a rotated world: R' = Q R, T' = Q (p + T) - p; p is the root at rest."""
+    rotations = frames.rotations.copy()
+    rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
+    root = rest_translations_of(animation.figure, frames.shape_weights)[:, 0]
+    rotation = np.round(
+        rotation_vector_to_matrix(vector)
+    )  # a rotation by 90 degrees has integer entries
+    places = (root + frames.figure_translations) @ rotation.T - root
+    return replace(frames, rotations=rotations, figure_translations=places)
+
+
+class Records:
+    """The records of one person in EasyMocap's frames, parsed from their text.
+
+    ``member``: the body model.
+    """
+
+    def __init__(self, member: Member) -> None:
+        self._member = member
+        self._rows: list[dict[str, array[float]]] = []
+
+    def motion(self, rate: float) -> BodyMotion:
+        """Return the motion of all added frames."""
+        rotation = self._array("poses").reshape(len(self._rows), -1, 3)
+        rotation[:, 0] = self._array("Rh")
+        has_expression = "expression" in self._rows[0]
+        return BodyMotion(
+            "again",
+            Timing(rate, np.arange(len(self._rows), dtype=np.int32)),
+            self._member.names,
+            rotation,
+            self._array("Th"),
+            about_origin=True,
+            shape=self._array("shapes"),
+            expression=self._array("expression") if has_expression else None,
+        )
+
+    def add(self, text: str) -> None:
+        """Add the record of the next frame."""
+        # Arrays take a quarter of the memory of lists.
+        record = json.loads(text)
+        record.pop("id", None)
+        self._rows.append({key: array("d", row) for key, (row,) in record.items()})
+
+    def _array(self, key: str) -> Floats:
+        return np.array([record[key] for record in self._rows], dtype=np.float64)

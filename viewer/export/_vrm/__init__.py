@@ -1,1 +1,0 @@
-"""Extensions of VRM characters in glTF files."""

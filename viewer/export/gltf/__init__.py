@@ -1,0 +1,521 @@
+"""Exporter for glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
+
+It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are in
+metres, y is up. Data is not converted: a node above the figure rotates it if z is up, and scales
+it if it is in another unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.export._gaps import frames_phrase, runs
+from viewer.export._left_out import other_animations_note
+from viewer.export._losses.between import rate_note, resampling_losses
+from viewer.export._motion_paths import split_paths
+from viewer.export._options import MotionOptions
+from viewer.export.gltf.body import Body, Built
+from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.figures import Added, add_figure, figure_losses, place_figures
+from viewer.export.gltf.keyed import Clips
+from viewer.export.gltf.losses import Written, not_held
+from viewer.export.gltf.materials import material_losses
+from viewer.export.gltf.nodes import Tree, to_metres
+from viewer.export.gltf.reading import GltfFile, parsed
+from viewer.export.gltf.sampled import (
+    PlacedMotion,
+    add_sampled,
+    common_name,
+    motion_remarks,
+    placed_actor,
+    sampled_losses,
+    sampled_of,
+    written_part,
+)
+from viewer.formats import all_or_none, save_bytes
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_view import CameraPath, CameraView
+from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.scalars import length_text
+from viewer.rig.scene import Actor, Scene, scene_unit
+from viewer.rig.skinning import Skinning
+from viewer.rig.units import METRES, UNIT_NAMES
+
+_Extend = Callable[[Document, Body, Built], list[Diagnostic]]
+
+
+def export(
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    optimizes: bool = False,
+    extend: _Extend | None = None,
+) -> list[Diagnostic]:
+    """Write a figure in its current pose; see ``viewer.export.export``.
+
+    ``extend`` adds the extensions of a VRM character, and returns notes about them.
+    """
+    return export_figures([actor], path, skinning, [None], optimizes=optimizes, extend=extend)
+
+
+def export_clips(
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    clips: Sequence[TransformClip],
+    optimizes: bool = False,
+) -> list[Diagnostic]:
+    """Write a figure at rest with its animations; see ``viewer.export.export_clips``."""
+    return export_figures([actor], path, skinning, [clips], optimizes=optimizes)
+
+
+def export_figures(
+    actors: Sequence[Actor],
+    path: Path,
+    skinning: Skinning,
+    clips: Sequence[Sequence[TransformClip] | None],
+    scene: Scene | None = None,
+    optimizes: bool = False,
+    extend: _Extend | None = None,
+) -> list[Diagnostic]:
+    """Write figures and cameras to one file; see ``viewer.export.export_figures``.
+
+    Several figures are placed as in their scene; the placement of a single figure is omitted.
+    ``extend``: as for ``export``.
+    """
+    document = Document(actors[0].figure.name)
+    together = Clips(document)
+    added = [
+        add_figure(document, actor, skinning, own, together, optimizes)
+        for actor, own in zip(actors, clips, strict=True)
+    ]
+    first, views = actors[0], [] if scene is None else [*scene.views]
+    if scene is None or len(actors) == 1:
+        own = to_metres(first.figure.up, first.figure.unit)
+        to_file = own @ np.linalg.inv(first.placement)
+    else:
+        to_file = to_metres(scene.up, scene_unit(scene))
+    built = [each.built for each in added]
+    placing = place_figures(document, actors, built, to_file) if len(actors) > 1 else []
+    alone = [] if scene is None else moving_alone(scene)
+    if scene is not None and not any(clips):
+        views = [view_in(view, scene) if view.mount and view.mount.path else view for view in views]
+    pairs = [*zip(actors, built, strict=True)]
+    lenses = _add_cameras(document, views, to_file, pairs, together, clips, alone)
+    extensions = [] if extend is None else extend(document, added[0].body, added[0].built)
+    (data,) = _files([(path, document)])
+    notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]
+    notes += _beside(data, path, document)
+    file = _unplaced(data, placing)
+    for actor, each in zip(actors, added, strict=True):
+        own_notes = _figure_notes(path, actor, each, file, skinning, extend is not None)
+        several = len(actors) > 1
+        notes += [_of_figure(actor, note) for note in own_notes] if several else own_notes
+    return notes + lenses
+
+
+def _written(
+    path: Path, actors: Sequence[Actor], added: Sequence[Added], n_views: int, size: int
+) -> Diagnostic:
+    """Return the note about a written file."""
+    animations = {index for each in added for index in each.kept}
+    values: dict[str, Any] = {"size": size, "n": len(animations)}
+    cameras = [Phrase("written-cameras", n=n_views)] if n_views else []
+    if len(actors) > 1:
+        values |= {"figures": [actor.name for actor in actors], "n_figures": len(actors)}
+        if animations:
+            cameras.append(Phrase("written-animations", n=len(animations)))
+        return Diagnostic("X001.gltf-figures", path, values={**values, "others": cameras})
+    key = "X001.gltf" if added[0].clips is None else "X001.gltf-animations"
+    return Diagnostic(key, path, values={**values, "counts": added[0].built.counts + cameras})
+
+
+def _of_figure(actor: Actor, note: Diagnostic) -> Diagnostic:
+    values = {"figure": actor.name, "remark": replace(note, path=None)}
+    return Diagnostic(f"{note.code}.of-figure", note.path, values=values)
+
+
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
+    """Write a figure at rest and its motion; see ``viewer.export.export_animation``.
+
+    A changing shape that must be baked into the mesh is taken from the first present frame.
+
+    Parameters
+    ----------
+    animation : SampledAnimation
+        A figure in many poses.
+    path : Path
+        The file; ``gaps="split"`` writes ``name-1.glb``, ``name-2.glb`` … if there are gaps.
+    options : MotionOptions
+        Handling of gaps, skinning, and up axis of the world.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot store, with errors.
+
+    Raises
+    ------
+    RigError
+        If no frame is present, numbers are not finite, or an option is unknown.
+    OutputError
+        If a file cannot be written.
+    """
+    sampled = sampled_of(animation, options)
+    present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
+    if options.closing == "split" and not present.all():
+        spans = runs(present)
+    paths = split_paths(path, len(spans))
+    documents, built = [], []
+    for span in spans:
+        document = Document(animation.name)
+        built.append(add_sampled(document, sampled, options, span)[0])
+        documents.append(document)
+    notes, lost = list[Diagnostic](), list[Diagnostic]()
+    saved = _files(list(zip(paths, documents, strict=True)))
+    rows = zip(paths, spans, saved, built, documents, strict=True)
+    for file, span, data, made, document in rows:
+        values = {
+            "counts": made.counts,
+            "frames": frames_phrase(animation.first_frame + span[0], span[1] - span[0]),
+            "rate": animation.frame_rate,
+            "size": len(data[file]),
+        }
+        notes += [
+            Diagnostic("X001.gltf-motion", file, values=values),
+            *_beside(data, file, document),
+        ]
+        notes += _quantization(file, made, animation.figure)
+        written = Written(file, parsed([*data.values()]), made.tree, made.meshes, span[0])
+        lost += sampled_losses(written, sampled, options, span)
+    notes += _remarks(sampled.body, sampled.up) + motion_remarks(sampled, options)
+    lost += resampling_losses(path, animation, options.skinning)
+    return notes + lost + not_held(animation.figure, sampled.body.shape)
+
+
+def export_animations(
+    motions: Sequence[tuple[Actor, SampledAnimation, str]],
+    path: Path,
+    options: MotionOptions,
+    scene: Scene,
+    still: Sequence[Actor] = (),
+) -> list[Diagnostic]:
+    """Write figures to one file, placed as in their scene, with one animation that moves them all.
+
+    Frames of different figures keep their relative times; the earliest frame is at 0.
+
+    Parameters
+    ----------
+    motions : sequence of (Actor, SampledAnimation, str)
+        The moving figures, and what ``animation_for`` returns for each: frames, at least one of
+        which is present, and their up axis.
+    path : Path
+        The file.
+    options : MotionOptions
+        Skinning, and handling of gaps except ``split``.
+    scene : Scene
+        Provides the up axis of the placements, and cameras.
+    still : sequence of Actor
+        Further figures, written in their current pose.
+
+    Returns
+    -------
+    list of Diagnostic
+        As for ``export_animation``, each with its figure.
+
+    Raises
+    ------
+    RigError, OutputError
+        As for ``export_animation``.
+    """
+    parts = [PlacedMotion(placed_actor(scene, who), each, up) for who, each, up in motions]
+    others = [placed_actor(scene, actor) for actor in still]
+    document, actors = Document(path.stem), [*(part.actor for part in parts), *others]
+    found = [
+        sampled_of(each.animation, replace(options, world_up=each.up), each.actor.color)
+        for each in parts
+    ]
+    begin, name, index = min(each.start for each in parts), common_name(parts, path.stem), -1
+    built = []
+    for part, sampled in zip(parts, found, strict=True):
+        delay = part.start - begin
+        made, index = add_sampled(document, sampled, options, None, delay, name, index)
+        built.append(made)
+    together, how = Clips(document), options.skinning
+    added = [
+        add_figure(document, actor, how, None, together, options.optimizes) for actor in others
+    ]
+    to_file = to_metres(scene.up, scene_unit(scene))
+    built += [each.built for each in added]
+    placing = place_figures(document, actors, built, to_file)
+    lenses = _add_cameras(document, scene.views, to_file, [*zip(actors, built, strict=True)])
+    (data,) = _files([(path, document)])
+    seconds = max(each.start + each.seconds for each in parts) - begin
+    notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
+    notes += _beside(data, path, document)
+    file = _unplaced(data, placing)
+    for part, sampled, made in zip(parts, found, built, strict=False):
+        own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
+        own += motion_remarks(sampled, options)
+        own += sampled_losses(written_part(path, file, made), sampled, options)
+        own += resampling_losses(path, sampled.animation, how) + rate_note(sampled.animation)
+        own += not_held(sampled.animation.figure, sampled.body.shape)
+        own += other_animations_note(part.animation.figure, part.animation.motion)
+        notes += [_of_figure(part.actor, note) for note in own]
+    for actor, each in zip(others, added, strict=True):
+        notes += [_of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]
+    return notes + lenses
+
+
+def _motions_written(
+    path: Path, actors: Sequence[Actor], seconds: float, n_views: int, size: int
+) -> Diagnostic:
+    """Return the note about a file of several moving figures."""
+    values = {
+        "n_figures": len(actors),
+        "figures": [actor.name for actor in actors],
+        "seconds": seconds,
+        "others": [Phrase("written-cameras", n=n_views)] if n_views else [],
+        "size": size,
+    }
+    return Diagnostic("X001.gltf-motions", path, values=values)
+
+
+def _unplaced(data: Mapping[Path, bytes], placing: Sequence[int]) -> GltfFile:
+    """Return a written file without placements, because errors are measured in figure space."""
+    file = parsed([*data.values()])
+    for node in placing:
+        del file.root["nodes"][node]["matrix"]
+    return file
+
+
+def _figure_notes(
+    path: Path, actor: Actor, added: Added, file: GltfFile, how: Skinning, is_vrm: bool = False
+) -> list[Diagnostic]:
+    """Return the notes about a figure in its pose or with its own animations."""
+    notes = _quantization(path, added.built, actor.figure) + _remarks(added.body, actor.figure.up)
+    return notes + figure_losses(added, path, file, how, is_vrm=is_vrm)
+
+
+def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
+    """Write all files or none; return their contents."""
+    saved: list[dict[Path, bytes]] = []
+    for path, document in documents:
+        if path.suffix.lower() == ".gltf":
+            beside = path.with_suffix(".bin")
+            text, arrays = document.pair(beside.name)
+            saved.append({path: text, **({beside: arrays} if arrays else {})})
+        else:
+            saved.append({path: document.glb()})
+    with all_or_none([file for files in saved for file in files]):
+        for files in saved:
+            for file, data in files.items():
+                save_bytes(file, data)
+    return saved
+
+
+def _beside(data: dict[Path, bytes], path: Path, document: Document) -> list[Diagnostic]:
+    """Return notes about the file of arrays, and about numbers that JSON cannot store."""
+    others = {file: len(content) for file, content in data.items() if file != path}
+    notes = [
+        Diagnostic("X001.gltf-arrays", file, values={"size": size}) for file, size in others.items()
+    ]
+    if document.n_omitted:
+        notes.append(Diagnostic("X003.json-numbers", path, values={"n": document.n_omitted}))
+    return notes
+
+
+def _quantization(path: Path, built: Built, figure: Figure) -> list[Diagnostic]:
+    """Return a note with the largest rounding errors of quantised attributes, if there are any."""
+    errors = built.errors
+    if not errors:
+        return []
+    parts = []
+    if "positions" in errors:
+        length = length_text(figure, errors["positions"])
+        parts.append(Phrase("quantized-positions", length=length))
+    for kind, factor in (("normals", 180.0 / np.pi), ("uvs", 1.0), ("weights", 1.0)):
+        if kind in errors:
+            parts.append(Phrase(f"quantized-{kind}", error=f"{factor * errors[kind]:.2g}"))
+    return [Diagnostic("X002.quantized", path, values={"parts": parts})]
+
+
+def _remarks(body: Body, up: str) -> list[Diagnostic]:
+    """Return notes about coordinate space and shape for users of the file."""
+    figure, notes = body.figure, list[Diagnostic]()
+    if up == "z":
+        notes.append(Diagnostic("X005.z-up"))
+    if METRES.get(figure.unit, 1.0) != 1.0:
+        values = {"unit": UNIT_NAMES[figure.unit], "factor": METRES[figure.unit]}
+        notes.append(Diagnostic("X005.unit-scaled", values=values))
+    elif figure.unit not in METRES:
+        notes.append(Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name}))
+    if figure.mesh is not None:
+        notes += material_losses(figure.mesh)
+    if figure.mesh is not None and figure.mesh.n_vertices == 0:
+        notes.append(Diagnostic("X003.empty-mesh"))
+    if body.shape.baked is not None:
+        notes.append(Diagnostic("X005.shape-baked"))
+    if len(body.shape.targets):
+        count = len(body.shape.targets)
+        notes.append(Diagnostic("X005.morph-targets", values={"n": count}))
+        shapes = figure.blend_shapes
+        if shapes is not None and shapes.normal_offsets is None:
+            notes.append(Diagnostic("X005.morph-normals"))
+    if body.influences is not None and body.influences.n_fixed:
+        unbound = int(body.influences.n_fixed)
+        notes.append(Diagnostic("X005.no-influence", values={"n": unbound}))
+    return notes
+
+
+# OpenCV's cameras look along z with y down, those of glTF along -z with y up.
+_FLIP = np.diag([1.0, -1.0, -1.0])
+_NEAR = 0.01  # distance of the near plane, which glTF requires, in metres: closer than any figure
+
+# Largest distance of the principal point from the centre that is not reported, pixels: calibrations
+# of a centred lens state W / 2 or, in OpenCV's coordinates, (W - 1) / 2.
+_CENTRED = 0.5 + 1e-6
+_EXACT = 1e-9  # tolerance for a matrix that is a rotation
+
+
+def _add_cameras(
+    document: Document,
+    views: Sequence[CameraView],
+    to_file: Floats,
+    written: Sequence[tuple[Actor, Built]],
+    together: Clips | None = None,
+    clips: Sequence[Sequence[TransformClip] | None] = (),
+    alone: Sequence[str] = (),
+) -> list[Diagnostic]:
+    """Add the cameras of a scene; return notes about what glTF cannot store.
+
+    ``document``: modified in place; already has a scene.
+    ``views``: the cameras, in the space of the scene.
+    ``to_file`` (4, 4): scene space to the space of the file.
+    ``written``: the figures of the file, whose joints carry some of the cameras.
+    ``together``, ``clips``: the animations of the file, and those written for each figure.
+    ``alone``: names of cameras whose motion is not written.
+    """
+    nodes, moving = document.root["nodes"], dict.fromkeys(alone)
+    keyed = dict(zip([actor for actor, _ in written], clips, strict=False))
+    built, actors = dict(written), [actor for actor, _ in written]
+    for view in views:
+        camera: dict[str, Any] = {"name": text_of(view.name)} if view.name else {}
+        focal_x, focal_y = float(view.intrinsic[0, 0]), float(view.intrinsic[1, 1])
+        width, height = _size(view)
+        angle = 2.0 * math.atan(0.5 * height / focal_y)
+        aspect = (width / focal_x) / (height / focal_y)
+        lens = {"yfov": angle, "aspectRatio": aspect, **_planes(view, to_file)}
+        index = document.add("cameras", {**camera, "type": "perspective", "perspective": lens})
+        item = {**camera, "camera": index}
+        carrier, mount = carrier_of(view, actors), view.mount
+        path = None if carrier is None or mount is None else mount.path
+        played = () if carrier is None or path is None else keyed.get(carrier) or ()
+        if view.motion is not None or (path is not None and not _is_kept(path, played)):
+            moving.setdefault(view.name)
+        if carrier is not None and mount is not None and (mount.joint >= 0 or played):
+            if path is not None and together is not None and played:
+                node = _add_path(document, path, item, together, played)
+            else:
+                node = document.add("nodes", {**item, **_placed(mount.matrix)})
+            if mount.joint >= 0:
+                joint = built[carrier].tree.joints[mount.joint]
+                nodes[joint].setdefault("children", []).append(node)
+                continue
+            matrix = to_file @ carrier.placement
+            if np.abs(matrix - np.eye(4)).max() > _EXACT:
+                name = f"above {nodes[node].get('name', 'camera')}"
+                node = document.add("nodes", {"name": name, "children": [node], **_placed(matrix)})
+            document.root["scenes"][0]["nodes"].append(node)
+            continue
+        center = to_file @ np.append(-view.rotation.T @ view.translation, 1.0)
+        turned = nearest_rotations(to_file[:3, :3])[0] @ view.rotation.T @ _FLIP
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = turned, center[:3]
+        node = document.add("nodes", {**item, **_placed(matrix)})
+        document.root["scenes"][0]["nodes"].append(node)
+    bent = [view.name for view in views if _is_bent(view)]
+    found = {"X003.camera-lenses": bent, "X003.camera-motions": [*moving]}
+    return [
+        Diagnostic(key, values={"n": len(names), "names": names})
+        for key, names in found.items()
+        if names
+    ]
+
+
+def _is_kept(path: CameraPath, clips: Sequence[TransformClip]) -> bool:
+    """Return whether all animations of a camera belong to some clips of a figure."""
+    numbers = {clip.number for clip in clips}
+    return all(animation.number in numbers for animation in path.animations)
+
+
+def _add_path(
+    document: Document,
+    path: CameraPath,
+    item: dict[str, Any],
+    together: Clips,
+    clips: Sequence[TransformClip],
+) -> int:
+    """Add the nodes above a camera and their keys in some clips; return the topmost node.
+
+    ``item``: the members of the camera's node other than its transform.
+    """
+    rest, made = path.nodes, list[int]()
+    for joint, parent in enumerate(rest.parents.tolist()):
+        node: dict[str, Any] = {"name": text_of(rest.names[joint])} if rest.names[joint] else {}
+        node |= item if joint == rest.n_joints - 1 else {}
+        node["translation"] = rest.rest_translations[joint].tolist()
+        node["rotation"] = rest.rest_rotations[joint].tolist()
+        node["scale"] = rest.rest_scales[joint].tolist()
+        made.append(document.add("nodes", node))
+        if parent >= 0:
+            document.root["nodes"][made[parent]]["children"] = [made[joint]]
+    found = [played_with(path, clip) for clip in clips]
+    own = [animation.clip() for animation in found if animation is not None]
+    none = np.zeros(0, dtype=np.int32)
+    together.add(own, Tree(made[0], -1, made, []), (), none, np.zeros(0))
+    return made[0]
+
+
+def _placed(matrix: Floats) -> dict[str, list[float]]:
+    """Return the members of a node with a transform."""
+    linear = matrix[:3, :3]
+    if np.abs(linear @ linear.T - np.eye(3)).max() > _EXACT or np.linalg.det(linear) < 0.0:
+        return {"matrix": matrix.T.ravel().tolist()}
+    rotation = matrix_to_quaternion(linear)
+    return {"translation": matrix[:3, 3].tolist(), "rotation": rotation.tolist()}
+
+
+def _planes(view: CameraView, to_file: Floats) -> dict[str, float]:
+    """Return the distances of the clipping planes."""
+    scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
+    near = _NEAR if view.near is None else scale * view.near
+    return {"znear": near} | ({} if view.far is None else {"zfar": scale * view.far})
+
+
+def _size(view: CameraView) -> tuple[float, float]:
+    """Return the width and height of the images; centred about the principal point if unknown."""
+    if view.size is not None:
+        return float(view.size[0]), float(view.size[1])
+    return 2.0 * float(view.intrinsic[0, 2]) + 1.0, 2.0 * float(view.intrinsic[1, 2]) + 1.0
+
+
+def _is_bent(view: CameraView) -> bool:
+    """Return whether a lens is distorted, skewed or off centre."""
+    width, height = _size(view)
+    apart = view.intrinsic[:2, 2] - (0.5 * (width - 1.0), 0.5 * (height - 1.0))
+    is_off = bool((np.abs(apart) > _CENTRED).any()) or view.intrinsic[0, 1] != 0.0
+    return is_off or bool(view.distortion.any())

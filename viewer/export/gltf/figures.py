@@ -1,0 +1,406 @@
+"""Figures in one glTF file: each in its pose, or at rest with its animations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.export._losses.apart import negligible
+from viewer.export._losses.skinned import Side, vertices
+from viewer.export.gltf.body import Body, Built, add_body, body_of
+from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.keyed import Clips, first_time
+from viewer.export.gltf.losses import (
+    Written,
+    causes_of,
+    first_set_note,
+    gltf_losses,
+    not_held,
+    sides,
+)
+from viewer.export.gltf.nodes import locals_of, to_metres
+from viewer.export.gltf.reading import GltfFile, Keys
+from viewer.export.gltf.skin import shape_of
+from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.figure import Figure
+from viewer.rig.motion.evaluation import Frames, frames_of
+from viewer.rig.motion.own_animations import still_pose
+from viewer.rig.motion.single_frame import pose_frames
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
+from viewer.rig.scalars import length_text
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Added:
+    """A figure in a file.
+
+    Attributes
+    ----------
+    figure, pose : Figure, Pose or None
+        The original, in the pose that was written.
+    body, built : Body, Built
+        The written form, and its indices in the file.
+    clips : sequence of TransformClip or None
+        The animations to write; None if only the pose was written.
+    kept : dict of TransformClip
+        Animations with an effect, by index in the file.
+    """
+
+    figure: Figure
+    pose: Pose | None
+    body: Body
+    built: Built
+    clips: Sequence[TransformClip] | None
+    kept: Mapping[int, TransformClip]
+
+
+def add_figure(
+    document: Document,
+    actor: Actor,
+    skinning: Skinning,
+    clips: Sequence[TransformClip] | None,
+    together: Clips,
+    optimizes: bool,
+) -> Added:
+    """Add a figure to a file.
+
+    ``document``: modified in place.
+    ``clips``: its motions, which are written at rest; None to write its current pose.
+    ``together``: the animations of the file.
+    ``optimizes``: whether to quantise vertex attributes.
+    Raises RigError if a number exceeds single precision.
+    """
+    figure = actor.figure
+    pose = actor.pose if clips is None else still_pose(actor)
+    weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
+    if clips is not None:
+        weights = _shape_rows(clips, _shown_weights(figure, weights[0]))
+    shape = shape_of(figure, weights)
+    body = body_of(figure, replace(shape, weights=shape.weights[:1]), skinning)
+    skeleton, still = body.figure.skeleton, None
+    if skeleton is not None and pose is not None:
+        still = locals_of(skeleton, pose)
+    built = add_body(document, body, figure.up, pose, still, actor.color, optimizes=optimizes)
+    kept = together.add(clips or (), built.tree, built.meshes, shape.targets, weights[0])
+    return Added(figure, pose, body, built, clips, kept)
+
+
+def place_figures(
+    document: Document, actors: Sequence[Actor], built: Sequence[Built], to_file: Floats
+) -> list[int]:
+    """Place several figures as in their scene; return the nodes that move them.
+
+    ``actors``: the figures, each upright in its own space.
+    ``built``: their contents in the file.
+    ``to_file`` (4, 4): scene space to the space of the file.
+    """
+    roots, placing = document.root["scenes"][0]["nodes"], list[int]()
+    for actor, each in zip(actors, built, strict=True):
+        own = to_metres(actor.figure.up, actor.figure.unit)
+        matrix = to_file @ actor.placement @ np.linalg.inv(own)
+        stays = np.allclose(matrix, np.eye(4), rtol=0.0, atol=1e-12)
+        if each.tree.place >= 0:
+            document.root["nodes"][each.tree.place]["name"] = text_of(actor.name)
+        # A root that only converts units or axes does not have the name of the figure.
+        if stays and each.tree.root in (each.tree.place, *each.tree.joints):
+            continue
+        # Nodes of skinned meshes stay roots, because their transforms have no effect.
+        moved = [root for root in each.roots if "skin" not in document.root["nodes"][root]]
+        item: dict[str, Any] = {"name": text_of(actor.name), "children": moved}
+        node = document.add("nodes", item)
+        roots[:] = [root for root in roots if root not in moved] + [node]
+        if not stays:
+            item["matrix"] = matrix.T.ravel().tolist()
+            placing.append(node)
+    return placing
+
+
+def figure_losses(
+    added: Added, path: Path, file: GltfFile, skinning: Skinning, is_vrm: bool = False
+) -> list[Diagnostic]:
+    """Return notes with the largest errors of a figure, and about data that is not written.
+
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
+    """
+    kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
+    place = path, file, added.built.tree, added.built.meshes
+    if added.clips is None:
+        figure, frames = pose_frames(added.figure, added.pose)
+        rows = np.zeros(1, dtype=np.intp)
+        shape, influences = body.shape, body.influences
+        notes += gltf_losses(
+            Written(*place), figure, frames, rows, skinning, shape, influences, None
+        )
+    elif added.pose is not None:
+        written = Written(*place, animations=[*kept])
+        clips = [*kept.values()]
+        notes += _clip_losses(written, figure, added.pose, clips, skinning, body)
+        early = [clip.name for clip in clips if first_time(clip) < 0.0]
+        if early:
+            values = {"names": early, "n": len(early)}
+            notes.append(Diagnostic("X005.negative-times", values=values))
+        notes += _without_effect(added, added.clips)
+    return notes + not_held(figure, body.shape, is_vrm)
+
+
+def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagnostic]:
+    """Return notes about animations and blend shapes whose keys move nothing that is written."""
+    notes, written = list[Diagnostic](), added.body.shape.targets
+    kept = {id(clip) for clip in added.kept.values()}
+    idle = [
+        clip.name or f"animation {number}"
+        for number, clip in enumerate(clips, 1)
+        if id(clip) not in kept
+    ]
+    if idle:
+        notes.append(Diagnostic("X003.idle-animations", values={"names": idle, "n": len(idle)}))
+    moved = [placed.part.targets for placed in added.built.meshes]
+    drawn = set(written[np.concatenate(moved)].tolist()) if moved else set[int]()
+    keyed = [
+        each.shapes.tolist() for clip in clips for each in clip.channels if each.shapes is not None
+    ]
+    shapes = added.figure.blend_shapes
+    lost = sorted({shape for each in keyed for shape in each} - drawn)
+    if lost and shapes is not None:
+        values = {"names": _names(shapes, lost), "n": len(lost)}
+        notes.append(Diagnostic("X003.idle-shapes", values=values))
+    return notes
+
+
+def _names(shapes: BlendShapes, rows: list[int]) -> list[str]:
+    return [shapes.names[row] or f"#{row}" for row in rows]
+
+
+# Maximum number of compared vertices over all times: takes about two seconds.
+_MOST_VERTICES = 4_000_000
+_FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
+_BLOCK = 64  # number of times per block
+_DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
+
+
+def _shown_weights(figure: Figure, weights: Floats) -> Floats:
+    """Return the displayed weights, (S,), by the rules of expressions; missing ones are 0."""
+    whole = np.zeros(figure.n_shapes)
+    whole[: len(weights)] = weights
+    shapes = figure.blend_shapes
+    return whole if shapes is None or shapes.rules is None else shapes.rules.shown(whole)
+
+
+def _shape_rows(clips: Sequence[TransformClip], weights: Floats) -> Floats:
+    """Return the weights at rest and a row with non-zero animated weights: (2, S)."""
+    rows = np.stack([weights, weights])
+    for clip in clips:
+        for channel in clip.channels:
+            if channel.shapes is not None:
+                rows[1, channel.shapes] = 1.0
+    return rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Samples:
+    """The rest pose and all animations at some times, of the figure and of the file.
+
+    ``clips``, ``times`` (F,): animation of each row, -1 for the rest pose, and its time in seconds.
+    """
+
+    frames: Frames
+    keys: Keys
+    clips: Floats
+    times: Floats
+
+
+def _clip_losses(
+    written: Written,
+    figure: Figure,
+    pose: Pose,
+    clips: Sequence[TransformClip],
+    how: Skinning,
+    body: Body,
+) -> list[Diagnostic]:
+    """Return notes with the largest distance of a vertex, or of a joint if there is no mesh.
+
+    ``written``: the file.
+    ``figure``, ``pose``: the original, and its pose where no animation moves it.
+    ``clips``: its motions, all of which are in the file.
+    ``how``: the requested skinning.
+    ``body``: the written shape and skin.
+    """
+    count = sum(len(placed.part.sources) for placed in written.meshes)
+    each = _MOST_VERTICES // max(1, count * len(clips))
+    found = _sampled(written, figure, pose, clips, min(_MOST, max(_FEWEST, each)))
+    written = replace(written, keys=found.keys)
+    expected, read = sides(written, figure, found.frames, how, body.shape)
+    distances = _distances(expected, read(None), len(found.times))
+    row = int(distances.argmax())
+    least = negligible(figure, found.frames, np.arange(len(found.times)))
+    causes: list[Phrase] = []
+    rows = np.arange(len(found.times))
+    if distances[row] > least and written.meshes:
+        causes = causes_of(figure, found.frames, rows, how, body.shape, body.influences, least)
+    place: Phrase | str = ""
+    if found.clips[row] >= 0:
+        name = clips[int(found.clips[row])].name or f"animation {int(found.clips[row]) + 1}"
+        place = Phrase("animation-time", name=name, time=round(float(found.times[row]), 4))
+    values = {
+        "vertices": Phrase("mesh-vertices" if written.meshes else "joint-positions"),
+        "n": len(clips),
+        "length": length_text(figure, float(distances[row])),
+        "distance": float(distances[row]),
+        "unit": figure.unit,
+        "place": place,
+        "times": len(found.times),
+        "causes": causes,
+    }
+    notes = [Diagnostic("X002.animations", written.path, values=values)]
+    return notes + first_set_note(expected, read, figure, rows, least, body.influences)
+
+
+def _distances(expected: Side, found: Side, count: int) -> Floats:
+    """Return the largest distance at each time: (F,)."""
+    distances = np.zeros(count)
+    for start in range(0, count, _BLOCK):
+        rows = np.arange(start, min(start + _BLOCK, count))
+        poses, others = expected.poses(rows), found.poses(rows)
+        one, other = poses.places, others.places
+        if expected.body is not None and found.body is not None:
+            other = vertices(found.body, others)
+            if expected.exact is not None:
+                one = np.stack([expected.exact(int(row)) for row in rows])
+            else:
+                one = vertices(expected.body, poses)
+        if one.shape[1]:
+            distances[rows] = np.linalg.norm(one - other, axis=2).max(axis=1)
+    return distances
+
+
+def _sampled(
+    written: Written, figure: Figure, pose: Pose, clips: Sequence[TransformClip], most: int
+) -> _Samples:
+    """Return the rest pose, and each animation at its keys and at times between them."""
+    frames, owners, seconds = [pose_frames(figure, pose)[1]], [-1], [0.0]
+    moved: list[tuple[int, Keys]] = []
+    file = written.file
+    animations = [file.root["animations"][index] for index in written.animations]
+    for index, (clip, animation) in enumerate(zip(clips, animations, strict=True)):
+        times = key_times(animation, file)
+        times = np.union1d(times, 0.5 * (times[1:] + times[:-1]))
+        chosen = np.linspace(0, len(times) - 1, min(most, len(times))).round().astype(int)
+        times = times[chosen]
+        own = times + first_time(clip)
+        frames.append(frames_of(figure, clip, own, pose))
+        moved.append((len(seconds), _keys_at(file, animation, times)))
+        owners += [index] * len(times)
+        seconds += own.tolist()
+    keys: Keys = {}
+    for start, values in moved:
+        for place, rows in values.items():
+            if place not in keys:
+                keys[place] = np.tile(_still(file, *place), (len(seconds), 1))
+            keys[place][start : start + len(rows)] = rows
+    return _Samples(_one(frames), keys, np.array(owners), np.array(seconds))
+
+
+def _still(file: GltfFile, node: int, path: str) -> Floats:
+    """Return the value of a property that is not animated."""
+    item = file.root["nodes"][node]
+    if path == "weights":
+        return np.array(file.root["meshes"][item["mesh"]]["weights"], dtype=np.float64)
+    return np.array(item.get(path, _DEFAULTS[path]), dtype=np.float64)
+
+
+def _one(parts: list[Frames]) -> Frames:
+    """Return the concatenation of several frames."""
+
+    def joined(name: str) -> Floats:
+        arrays = []
+        for part in parts:
+            values = getattr(part, name)
+            arrays.append(np.broadcast_to(values, (part.n_frames, *values.shape[1:])))
+        return np.concatenate(arrays)
+
+    return Frames(
+        joined("times"),
+        joined("present").astype(np.bool_),
+        joined("rotations"),
+        joined("translations"),
+        joined("scales"),
+        joined("shape_weights"),
+        joined("figure_translations"),
+        joined("figure_scales"),
+    )
+
+
+# Evaluation of the animations of a glTF file written by this program.
+#
+# The evaluation follows glTF 2.0, section 3.11 and appendix C, in double precision, and shares no
+# code with other parts of the program.
+
+_PARALLEL = 1.0 - 1e-9  # rotations with a larger cosine are interpolated linearly
+
+
+def key_times(animation: dict[str, Any], file: GltfFile) -> Floats:
+    """Return all key times of an animation, increasing: (T,)."""
+    inputs = {sampler["input"] for sampler in animation["samplers"]}
+    return np.unique(np.concatenate([file.floats(index)[:, 0] for index in sorted(inputs)]))
+
+
+def _keys_at(file: GltfFile, animation: dict[str, Any], times: Floats) -> Keys:
+    """Return the animated values at times (T,), by node and path: (T, C) each."""
+    found: Keys = {}
+    for channel in animation["channels"]:
+        sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
+        inputs = file.floats(sampler["input"])[:, 0]
+        kind = sampler.get("interpolation", "LINEAR")
+        count = len(inputs) * (3 if kind == "CUBICSPLINE" else 1)
+        values = file.floats(sampler["output"]).reshape(count, -1)
+        is_rotation = target["path"] == "rotation"
+        found[target["node"], target["path"]] = _values(inputs, values, kind, is_rotation, times)
+    return found
+
+
+def _values(inputs: Floats, values: Floats, kind: str, is_rotation: bool, times: Floats) -> Floats:
+    before = np.clip(np.searchsorted(inputs, times, side="right") - 1, 0, len(inputs) - 1)
+    after = np.minimum(before + 1, len(inputs) - 1)
+    spans = inputs[after] - inputs[before]
+    passed = np.clip(times - inputs[before], 0.0, spans)
+    u = np.divide(passed, spans, out=np.zeros_like(passed), where=spans > 0.0)[:, None]
+    if kind == "STEP":
+        return values[before]
+    if kind == "CUBICSPLINE":
+        rows = values.reshape(len(inputs), 3, -1)
+        h = spans[:, None]
+        found = (
+            (2 * u**3 - 3 * u**2 + 1) * rows[before, 1]
+            + h * (u**3 - 2 * u**2 + u) * rows[before, 2]
+            + (3 * u**2 - 2 * u**3) * rows[after, 1]
+            + h * (u**3 - u**2) * rows[after, 0]
+        )
+        return np.asarray(found)
+    if is_rotation:
+        return _slerp(values[before], values[after], u)
+    return np.asarray(values[before] + u * (values[after] - values[before]))
+
+
+def _slerp(first: Floats, second: Floats, u: Floats) -> Floats:
+    """Return sin((1 - u) a) / sin a q0 + sin(u a) / sin a q1 along the shorter arc."""
+    first = first / np.linalg.norm(first, axis=1, keepdims=True)
+    second = second / np.linalg.norm(second, axis=1, keepdims=True)
+    cosines = np.einsum("ta,ta->t", first, second)[:, None]
+    second = np.where(cosines < 0.0, -second, second)
+    cosines = np.abs(cosines)
+    near = cosines > _PARALLEL
+    angles = np.arccos(np.where(near, 0.0, cosines))
+    sines = np.sin(angles)
+    one = np.where(near, 1.0 - u, np.sin((1.0 - u) * angles) / sines)
+    other = np.where(near, u, np.sin(u * angles) / sines)
+    return np.asarray(one * first + other * second)

@@ -1,0 +1,271 @@
+"""Reader of glTF files written by this program: arrays, nodes in every frame, mesh and skin.
+
+Only the output of ``viewer.export.gltf`` is supported: one buffer without strides. Joints and
+vertices are returned in the figure's space, below the node that rotates and scales the whole
+figure.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.export._losses.skinned import Body, Poses, Rows, Side
+from viewer.export.gltf.mesh import Part
+from viewer.export.gltf.nodes import Tree
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.skin import Skin, influence_counts, skin_from_entries
+
+Keys: TypeAlias = dict[tuple[int, str], Floats]
+"""Animated values by node and path, one row per frame."""
+_TYPES = {5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
+_HEAD = 12  # bytes before the first chunk of a .glb
+_CHUNK = 8  # bytes before a chunk's data
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GltfFile:
+    """A file's JSON and the bytes of its buffer."""
+
+    root: dict[str, Any]
+    buffer: bytes
+
+    def array(self, accessor: int) -> NDArray[Any]:
+        """Return an array in its stored type: (N, components)."""
+        item = self.root["accessors"][accessor]
+        view = self.root["bufferViews"][item["bufferView"]]
+        start = view["byteOffset"] + item["byteOffset"]
+        dtype, width = np.dtype(_TYPES[item["componentType"]]), _SIZES[item["type"]]
+        whole = view.get("byteStride", width * dtype.itemsize) // dtype.itemsize
+        rows = np.frombuffer(self.buffer, dtype, item["count"] * whole, start)
+        return rows.reshape(item["count"], whole)[:, :width]
+
+    def floats(self, accessor: int) -> Floats:
+        """Return an array in double precision, normalised integers as fractions."""
+        values = self.array(accessor).astype(np.float64)
+        item = self.root["accessors"][accessor]
+        if not item.get("normalized"):
+            return values
+        most = np.iinfo(np.dtype(_TYPES[item["componentType"]])).max
+        return np.maximum(values / most, -1.0)
+
+
+def parsed(files: list[bytes]) -> GltfFile:
+    """Return a file from the bytes of a ``.glb``, or of a ``.gltf`` and its buffer."""
+    if files[0][:4] != b"glTF":
+        return GltfFile(json.loads(files[0]), files[1] if len(files) > 1 else b"")
+    (length,) = struct.unpack_from("<I", files[0], _HEAD)
+    end = _HEAD + _CHUNK + length
+    root = json.loads(files[0][_HEAD + _CHUNK : end])
+    return GltfFile(root, files[0][end + _CHUNK :])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A mesh in a file, and the figure's vertices in it.
+
+    Attributes
+    ----------
+    node : int
+        Its node.
+    part : Part
+        The part from which it was written.
+    decoding : (4, 4)
+        From positions in the file, which may be quantised, to the figure's.
+    """
+
+    node: int
+    part: Part
+    decoding: Floats = field(default_factory=lambda: np.eye(4))
+
+
+def read_back(
+    file: GltfFile,
+    tree: Tree,
+    meshes: list[Placed],
+    figure: Figure,
+    targets: Rows,
+    keys: Keys,
+    start: int = 0,
+    sets: int | None = None,
+) -> Side:
+    """Return the contents of a file in a form that can be compared with the figure.
+
+    ``file``: the written file.
+    ``tree``: indices of the nodes.
+    ``meshes``: its meshes, in the order of the compared vertices.
+    ``figure``: the figure as written, with the bindings of joints that have their own meshes.
+    ``targets`` (M,): indices of the figure's morph targets that change over time.
+    ``keys``: animated values of each frame, by node and path.
+    ``start``: frame of the figure that is the first in the file.
+    ``sets``: number of influence sets to use, normalised to a sum of 1; all if omitted.
+    """
+    nodes = file.root["nodes"]
+    parents = np.full(len(nodes), -1, dtype=np.int32)
+    for index, item in enumerate(nodes):
+        parents[item.get("children", [])] = index
+    n_joints = len(tree.joints)
+    bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
+    joints = [*tree.joints, len(nodes) if tree.place < 0 else tree.place]
+    if figure.skin is not None and n_joints:
+        bound[:-1] = figure.skin.inverse_bind
+    for placed in meshes:
+        item = nodes[placed.node]
+        if "skin" in item:
+            skin = file.root["skins"][item["skin"]]
+            stored = file.floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
+            bound[: len(stored)] = stored @ np.linalg.inv(placed.decoding)
+            joints[: len(skin["joints"])] = skin["joints"]
+        elif placed.part.joint < 0:
+            joints[-1] = placed.node
+            bound[-1] = np.linalg.inv(placed.decoding)
+    body, morphs = None, np.zeros((1, 0))
+    if meshes:
+        body, morphs = _body(file, meshes, keys, bound, targets, sets)
+
+    def poses(rows: Rows) -> Poses:
+        world = _world(nodes, parents, keys, rows - start)
+        world = np.concatenate([world, np.broadcast_to(np.eye(4), (len(rows), 1, 4, 4))], axis=1)
+        above = parents[tree.place] if tree.place >= 0 else -1
+        if above >= 0:
+            world = np.linalg.inv(world[:, above : above + 1]) @ world
+        places = world[:, tree.joints][..., :3, 3]
+        weights = morphs if len(morphs) == 1 else morphs[rows - start]
+        still = np.zeros((len(rows), 3))
+        return Poses(places, world[:, joints] @ bound, still, weights, np.zeros((len(rows), 0)))
+
+    return Side(body, poses)
+
+
+def frame_keys(file: GltfFile) -> Keys:
+    """Return the animated values of a file with one key per frame."""
+    found: Keys = {}
+    for animation in file.root.get("animations", ()):
+        for channel in animation["channels"]:
+            sampler = animation["samplers"][channel["sampler"]]
+            count = len(file.array(sampler["input"]))
+            values = file.floats(sampler["output"]).reshape(count, -1)
+            target = channel["target"]
+            found[target["node"], target["path"]] = values
+    return found
+
+
+def _world(nodes: list[dict[str, Any]], parents: Ints, keys: Keys, rows: Rows) -> Floats:
+    """Return the global matrices of all nodes: (F, N, 4, 4)."""
+    parts = {}
+    for path, default in _DEFAULTS.items():
+        values = np.array([item.get(path, default) for item in nodes], dtype=np.float64)
+        parts[path] = np.repeat(values[:, None], len(rows), axis=1)
+        for (node, what), moved in keys.items():
+            if what == path:
+                parts[path][node] = moved[rows]
+    local = np.zeros((len(nodes), len(rows), 4, 4))
+    local[..., 3, 3] = 1.0
+    rotations = parts["rotation"] / np.linalg.norm(parts["rotation"], axis=-1, keepdims=True)
+    local[..., :3, :3] = quaternion_to_matrix(rotations) * parts["scale"][..., None, :]
+    local[..., :3, 3] = parts["translation"]
+    return np.swapaxes(forward_kinematics(parents, local), 0, 1)
+
+
+def _body(
+    file: GltfFile,
+    meshes: list[Placed],
+    keys: Keys,
+    bound: Floats,
+    changing: Rows,
+    sets: int | None,
+) -> tuple[Body, Floats]:
+    """Return all meshes in the shape of the first frame, and the weights that change it: (F, M)."""
+    found = [_one_body(file, placed, keys, bound, sets) for placed in meshes]
+    positions = np.concatenate([each.positions for each in found])
+    skin = _joined([each.skin for each in found], bound)
+    count = max((len(each.weights) for each in found), default=1)
+    weights = np.zeros((count, len(changing)))
+    shapes = np.zeros((len(changing), len(positions), 3))
+    first = 0
+    for placed, each in zip(meshes, found, strict=True):
+        rows = slice(first, first + len(each.positions))
+        first = rows.stop
+        for column, target in enumerate(changing.tolist()):
+            for own in np.flatnonzero(placed.part.targets == target).tolist():
+                shapes[column, rows] = each.targets[own]
+                weights[:, column] = each.weights[:, own] - each.weights[0, own]
+    return Body(positions, skin, shapes if len(changing) else None), weights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OneBody:
+    """One mesh: positions (V, 3) in the first frame, skin, targets (S, V, 3), weights (F, S)."""
+
+    positions: Floats
+    skin: Skin
+    targets: Floats
+    weights: Floats
+
+
+def _one_body(
+    file: GltfFile, placed: Placed, keys: Keys, bound: Floats, sets: int | None
+) -> _OneBody:
+    mesh = file.root["meshes"][file.root["nodes"][placed.node]["mesh"]]
+    primitive = mesh["primitives"][0]  # all primitives share their vertices
+    attributes = primitive["attributes"]
+    positions = file.floats(attributes["POSITION"])
+    weights = np.zeros((1, 0))
+    directions = np.zeros((0, *positions.shape))
+    targets = [file.floats(target["POSITION"]) for target in primitive.get("targets", ())]
+    if targets:
+        directions = np.stack(targets)
+        weights = keys.get((placed.node, "weights"), np.array([mesh["weights"]], dtype=np.float64))
+        positions = positions + np.einsum("s,sva->va", weights[0], directions)
+    joint = placed.part.joint
+    # The comparison is in binding space.
+    space = placed.decoding if joint < 0 else np.linalg.inv(bound[joint])
+    if not np.array_equal(space, np.eye(4)):
+        positions = apply_transform(space, positions)
+        directions = directions @ space[:3, :3].T
+    slot = joint if joint >= 0 else len(bound) - 1
+    return _OneBody(positions, _skin(file, attributes, slot, bound, sets), directions, weights)
+
+
+def _skin(
+    file: GltfFile, attributes: dict[str, int], slot: int, bound: Floats, sets: int | None
+) -> Skin:
+    """Return the influences of a mesh; if it has none, all vertices follow one slot."""
+    count = file.root["accessors"][attributes["POSITION"]]["count"]
+    names = sorted(name for name in attributes if name.startswith("JOINTS_"))
+    numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]
+    if not numbers:
+        last = np.full(count, slot)
+        return skin_from_entries(count, np.arange(count), last, np.ones(count), bound)
+    joints = np.concatenate([file.array(attributes[f"JOINTS_{n}"]) for n in numbers], axis=1)
+    weights = np.concatenate([file.floats(attributes[f"WEIGHTS_{n}"]) for n in numbers], axis=1)
+    if sets is not None:
+        weights = weights / weights.sum(axis=1, keepdims=True)
+    used = weights != 0.0
+    rows, _ = np.nonzero(used)
+    return skin_from_entries(
+        count, rows.astype(np.int32), joints[used].astype(np.int32), weights[used], bound
+    )
+
+
+def _joined(skins: list[Skin], bound: Floats) -> Skin:
+    """Return one skin with the concatenated vertices of several."""
+    counts = np.concatenate([influence_counts(skin) for skin in skins])
+    return Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.concatenate([skin.joints for skin in skins]),
+        weights=np.concatenate([skin.weights for skin in skins]),
+        inverse_bind=bound,
+    )

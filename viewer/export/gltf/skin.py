@@ -1,0 +1,183 @@
+"""Influences in glTF form: sets of four with unique joints and positive weights that sum to 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.morph_target import MORPH_GROUP
+from viewer.rig.shape import shaped
+from viewer.rig.skin import (
+    Skin,
+    has_influence,
+    influence_counts,
+    limit_influences,
+    skin_from_entries,
+    weight_sums,
+)
+
+PER_SET = 4
+_SUM = 1e-6  # smaller deviations of weight sums from 1 are rounding errors of the original file
+_MOST_JOINTS = 65536  # maximum number of joints, as indices have 16 bits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Influences:
+    """A skin in the form that a file can store.
+
+    Attributes
+    ----------
+    skin : Skin
+        Skin with unique joints per vertex, strongest first, and positive weights that sum to 1.
+    n_scaled : int
+        Number of vertices whose weights did not sum to 1.
+    n_negative : int
+        Number of vertices with negative weights, which glTF forbids.
+    n_fixed : int
+        Number of vertices without influence.
+    most : int
+        Largest number of influences of a vertex.
+    """
+
+    skin: Skin
+    n_scaled: int
+    n_negative: int
+    n_fixed: int
+    most: int
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints that the file's skin lists: one more if some vertices are fixed."""
+        return self.skin.n_joints + bool(self.n_fixed)
+
+
+def influences_of(skin: Skin) -> Influences:
+    """Return a skin in the form that glTF can store.
+
+    ``skin``: a skin with arbitrary weights.
+    Raises RigError if there are more joints than a file can index.
+    """
+    merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
+    owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
+    positive = np.maximum(merged.weights, 0.0)
+    sums = np.bincount(owners, positive, skin.n_vertices)[owners]
+    weights = np.divide(positive, sums, out=np.zeros_like(positive), where=sums > 0.0)
+    kept = weights.astype(np.float32) > 0.0
+    written = skin_from_entries(
+        skin.n_vertices, owners[kept], merged.joints[kept], weights[kept], skin.inverse_bind
+    )
+    counts = influence_counts(written)
+    scaled = has_influence(skin) & (np.abs(weight_sums(skin) - 1.0) > _SUM)
+    found = Influences(
+        written,
+        int(scaled.sum()),
+        len(np.unique(owners[merged.weights < 0.0])),
+        int((counts == 0).sum()),
+        int(counts.max(initial=0)),
+    )
+    if found.n_joints > _MOST_JOINTS:
+        raise RigError(f"glTF supports at most {_MOST_JOINTS} joints, found {found.n_joints}")
+    return found
+
+
+def influence_sets(
+    influences: Influences, sources: Ints
+) -> Iterator[tuple[NDArray[np.unsignedinteger], Floats]]:
+    """Yield JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, and so on.
+
+    ``influences``: influences of V vertices.
+    ``sources`` (R,): the vertices, or copies of them, that are written.
+    Yields ``joints`` (R, 4) uint8 or uint16: indices into the skin's list of joints; the last joint
+      is the node of fixed vertices. Unused slots are 0, as the specification requires.
+    Yields ``weights`` (R, 4): 0 in unused slots.
+    """
+    skin = influences.skin
+    counts, starts = influence_counts(skin)[sources], skin.starts[sources]
+    dtype = np.uint8 if influences.n_joints <= 256 else np.uint16
+    for first in range(0, max(influences.most, 1), PER_SET):
+        rank = first + np.arange(PER_SET)
+        used = rank < counts[:, None]
+        place = (starts[:, None] + rank)[used]
+        joints, weights = np.zeros(used.shape, dtype), np.zeros(used.shape)
+        joints[used], weights[used] = skin.joints[place], skin.weights[place]
+        if first == 0:
+            fixed = counts == 0
+            joints[fixed, 0], weights[fixed, 0] = influences.n_joints - 1, 1.0
+        yield joints, weights
+
+
+def inverse_bind_matrices(influences: Influences, inverse_bind: Floats, decoding: Floats) -> Floats:
+    """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
+
+    ``influences``: determines whether any vertices are fixed; their node is bound at the
+    origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
+    ``decoding`` (4, 4): from stored positions to the figure's.
+    """
+    matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
+    if not np.array_equal(decoding, np.eye(4)):
+        matrices = matrices @ decoding
+    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # set exactly, as readers expect
+    return matrices.transpose(0, 2, 1).reshape(-1, 16)
+
+
+# Maximum number of targets: each takes 12 bytes per vertex, and programs support few.
+_MOST_TARGETS = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """The written form of a figure's shape.
+
+    Attributes
+    ----------
+    figure : Figure
+        Figure whose mesh, skeleton and skin are written.
+    targets : (M,) int
+        Blend shapes that become morph targets.
+    weights : (F, M) or (1, M)
+        Weights of the targets over time.
+    baked : (S,) or None
+        The shape baked into the mesh instead; None if there is none.
+    """
+
+    figure: Figure
+    targets: NDArray[np.intp]
+    weights: Floats
+    baked: Floats | None = None
+
+
+def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
+    """Return the written form of a figure's shape.
+
+    Morph targets do not move joints, so a shape that affects joints or has too many targets is
+    baked into the mesh. Morph targets of the figure's own file are always written; expressions,
+    which combine them, only if they are used.
+
+    ``figure``: figure without its shape applied.
+    ``weights`` (F, S) or (1, S): weights of its blend shapes over time.
+    ``reference``: index of the row to bake in.
+    """
+    shapes, is_used = figure.blend_shapes, np.asarray(weights.any(axis=0))
+    is_own = np.zeros(len(is_used), dtype=np.bool_)
+    if shapes is not None and figure.record is not None:
+        groups = enumerate(shapes.groups[: len(is_used)])
+        is_own[:] = [group == MORPH_GROUP and not shapes.is_expression(s) for s, group in groups]
+    used = np.flatnonzero(is_used | is_own)
+    if figure.mesh is None or shapes is None or len(used) == 0:
+        return Shape(figure, used[:0], np.zeros((1, 0)))
+    if (
+        figure.joint_regressor is None
+        and shapes.is_linear
+        and np.sum(is_used & ~is_own) <= _MOST_TARGETS
+    ):
+        return Shape(figure, used, weights[:, used])
+    row = weights[min(reference, len(weights) - 1)]
+    whole = replace(shaped(figure, row), blend_shapes=None)
+    return Shape(whole, used[:0], np.zeros((1, 0)), row)

@@ -1,0 +1,347 @@
+"""Exporter for VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
+
+A figure from a VRM file keeps its version and all data of its extensions, unless VRM 0.x is to
+become 1.0. Any other figure with the required human bones becomes VRM 1.0: at rest in a T-pose, in
+metres, facing +z. Specification: ``github.com/vrm-c/vrm-specification``.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.export import gltf
+from viewer.export._options import VrmMeta
+from viewer.export.gltf.body import Body, Built
+from viewer.export.gltf.document import Document, text_of
+from viewer.export.vrm.humanoid import human_bones
+from viewer.export.vrm.kept import Maps, kept_modern, kept_old, kept_toon
+from viewer.export.vrm.made import made_character
+from viewer.export.vrm.meta import LICENCE, changed_meta, checked_meta
+from viewer.export.vrm.standing import in_t_pose, standing
+from viewer.export.vrm.upgraded import upgraded
+from viewer.formats._vrm.bones import given_bones
+from viewer.formats._vrm.conformance import MOST_WEIGHT, is_weight, weighted_binds
+from viewer.formats._vrm.json_parts import listed, part
+from viewer.formats._vrm.numbers import value_of
+from viewer.formats._vrm.springs import EXTENDED
+from viewer.rig.constraints.constraint import Constraint
+from viewer.rig.figure import Figure
+from viewer.rig.file_record import VrmRecord
+from viewer.rig.humanoid import REQUIRED_BONES
+from viewer.rig.pose import pose_key
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skinning import Skinning
+from viewer.rig.units import METRES, UNIT_NAMES
+
+_STRAIGHT = 1e-4  # radians
+_CONSTRAINT = "VRMC_node_constraint"
+_TOON = "VRMC_materials_mtoon"
+_UNLIT = "KHR_materials_unlit"
+_TRANSFORM = "KHR_texture_transform"
+
+
+def export(
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    optimizes: bool = False,
+    meta: VrmMeta | None = None,
+) -> list[Diagnostic]:
+    """Write a figure in its rest pose; see ``viewer.export.export``.
+
+    Parameters
+    ----------
+    actor : Actor
+        Figure; its pose is not written.
+    path : Path
+        The file.
+    skinning : Skinning
+        Selects influences.
+    optimizes : bool
+        Whether vertex attributes are quantised.
+    meta : VrmMeta, optional
+        Name, authors and licence; those of the file if omitted or empty.
+
+    Raises
+    ------
+    RigError
+        If the figure lacks a required bone, or its authors or licence are unknown.
+    OutputError
+        If the file cannot be written.
+    """
+    figure, given = actor.figure, meta or VrmMeta()
+    bones = human_bones(figure)
+    record = None if figure.record is None else figure.record.vrm
+    notes = _left_out(actor)
+    still = replace(actor, pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
+    if record is not None:
+        record, names = _repaired(record, bones)
+        if names:
+            notes.append(Diagnostic("X005.vrm-repaired", values={"names": names, "n": len(names)}))
+        if record.version == 1 or not given.upgrades:
+            _require_meta(record, given, figure.name)
+    if record is not None and record.version == 0 and given.upgrades:
+        figure, record, lost = upgraded(figure, record, bones)
+        still = replace(still, figure=figure, pose=figure_pose(figure))
+        _require_author(record, given, figure.name)
+        if lost:
+            notes.append(Diagnostic("X003.vrm-upgrade", values={"names": lost, "n": len(lost)}))
+    if record is not None:
+        extend = partial(_add_kept, record, given)
+        return gltf.export(still, path, skinning, optimizes, extend) + notes
+    added_meta = checked_meta(given, figure.name)
+    pose = figure_pose(figure)
+    pose.shape_weights = actor.require_pose().shape_weights.copy()
+    figure, angle = in_t_pose(standing(figure, pose, bones), bones)
+    still = replace(still, figure=figure, pose=figure_pose(figure))
+    if angle > _STRAIGHT:
+        notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
+    notes += _unit_notes(actor.figure)
+    extend = partial(_add_made, bones, added_meta)
+    return gltf.export(still, path, skinning, optimizes, extend) + notes
+
+
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure that lacks a required human bone."""
+    human_bones(figure)
+
+
+def _repaired(record: VrmRecord, bones: Mapping[str, int]) -> tuple[VrmRecord, list[str]]:
+    """Return a record without invalid values, and the names of what was corrected.
+
+    ``record``: record of the figure's file.
+    ``bones``: joint of each human bone that may be written.
+    """
+    key = "VRM" if record.version == 0 else "VRMC_vrm"
+    told, names = copy.deepcopy(record.extensions[key]), list[str]()
+    if record.version == 1 and told.get("specVersion") != "1.0":
+        told["specVersion"] = "1.0"
+        names.append("specVersion")
+    if record.version == 1 and "VRM" in record.extensions:
+        names.append("VRM 0.x besides 1.0")
+    names += [f"human bone {bone}" for bone in _remove_bones(told, record.version, bones)]
+    limited = dict.fromkeys(_limit_weights(told, record.version))
+    names += [f"weights of {name}" for name in limited]
+    return replace(record, extensions={**record.extensions, key: told}), names
+
+
+def _remove_bones(told: Any, version: int, bones: Mapping[str, int]) -> list[str]:
+    """Remove the bones that are unknown, misplaced, or have the name or node of an earlier one."""
+    removed: dict[str, str] = {}
+    seen: set[str] = set()
+    nodes: list[Any] = []
+    # Required bones come first, so that they keep a node that an optional bone also uses.
+    rows = sorted(given_bones(told, version), key=lambda row: row[1] not in REQUIRED_BONES)
+    for place, bone, node in rows:
+        if bone not in bones or bone in seen or node in nodes:
+            removed[place] = bone
+        else:
+            seen.add(bone)
+            nodes.append(node)
+    if removed and version == 0:
+        stated = enumerate(told["humanoid"]["humanBones"])
+        left = [each for place, each in stated if str(place) not in removed]
+        told["humanoid"]["humanBones"] = left
+    for place in removed if version == 1 else ():
+        del told["humanoid"]["humanBones"][place]
+    return [*removed.values()]
+
+
+def _limit_weights(told: Any, version: int) -> list[str]:
+    """Limit the weights of expressions; return the names of those that were changed."""
+    changed = []
+    for bind, _, name in weighted_binds(told, version):
+        if not is_weight(bind["weight"], version):
+            weight = value_of(bind["weight"], 0.0)
+            if weight is None:
+                bind.clear()  # a bind without indices is not written, and counted as lost
+                continue
+            bind["weight"] = min(max(weight, 0.0), MOST_WEIGHT[version])
+            changed.append(name)
+    return changed
+
+
+def _require_meta(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
+    """Raise RigError if neither the file nor the options have the meta data that VRM needs."""
+    told = record.extensions["VRM" if record.version == 0 else "VRMC_vrm"].get("meta")
+    is_known = isinstance(told, dict)
+    if record.version == 1:
+        is_known = bool(part(told, "authors") and part(told, "licenseUrl"))
+    if not is_known:
+        authors = meta.authors or tuple(part(told, "authors") or ())
+        checked_meta(
+            replace(meta, authors=authors, licence=meta.licence or part(told, "licenseUrl") or ""),
+            figure,
+        )
+
+
+def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
+    """Raise RigError if neither the file nor the options name an author."""
+    if not any(record.extensions["VRMC_vrm"]["meta"]["authors"]):
+        checked_meta(replace(meta, licence=meta.licence or LICENCE), figure)
+
+
+def _unit_notes(figure: Figure) -> list[Diagnostic]:
+    """Return a note about lengths that are converted, or whose unit is unknown."""
+    if figure.unit not in METRES:
+        return [Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name})]
+    if METRES[figure.unit] != 1.0:
+        return [Diagnostic("X005.unit-converted", values={"unit": UNIT_NAMES[figure.unit]})]
+    return []
+
+
+def _left_out(actor: Actor) -> list[Diagnostic]:
+    """Return notes about pose and motions, which are not part of a VRM character."""
+    notes, figure = [], actor.figure
+    if actor.clip is not None or figure.animations:
+        n = max(len(figure.animations), 1)
+        notes.append(Diagnostic("X003.vrm-motions", values={"n": n}))
+    elif actor.pose is not None:
+        own = figure_pose(figure)
+        own.shape_weights = actor.pose.shape_weights
+        if pose_key(own) != pose_key(actor.pose):
+            notes.append(Diagnostic("X003.vrm-pose"))
+    return notes
+
+
+def _add_kept(
+    record: VrmRecord, meta: VrmMeta, document: Document, body: Body, built: Built
+) -> list[Diagnostic]:
+    """Add the extensions of the figure's own file; return notes about lost references."""
+    maps = Maps(record, document, built)
+    if record.version == 0:
+        names = [str(item.get("name", "")) for item in document.root.get("materials", ())]
+        extensions = kept_old(maps, names)
+    else:
+        extensions = kept_modern(maps)
+    _keep_shading(record, document, maps)
+    data = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
+    data["meta"] = changed_meta(data["meta"], meta, record.version)
+    if record.version == 1 and not data["meta"].get("name"):
+        data["meta"]["name"] = text_of(body.figure.name)
+    _add(document, body, built, extensions)
+    colliders = listed(extensions.get("VRMC_springBone"), "colliders")
+    if any(part(each, "extensions", EXTENDED) is not None for each in colliders):
+        _declare(document, EXTENDED)
+    return [_written(data, extensions, record.version), *_lost(maps.lost)]
+
+
+def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
+    """Add the file's toon extensions to its materials, and keep only its unlit extensions."""
+    for own, written in maps.materials.items():
+        given = record.toon.get(own, {})
+        item = document.root["materials"][written].setdefault("extensions", {})
+        if _UNLIT not in given:
+            item.pop(_UNLIT, None)
+        if _TOON in given:
+            item[_TOON] = kept_toon(given[_TOON], maps)
+            _declare(document, _TOON)
+            if any(_TRANSFORM in part(each, "extensions") for each in _textures(item[_TOON])):
+                _declare(document, _TRANSFORM)
+        if _UNLIT in given:
+            item[_UNLIT] = given[_UNLIT]
+            _declare(document, _UNLIT)
+        if not item:
+            del document.root["materials"][written]["extensions"]
+    items = document.root.get("materials", ())
+    is_used = any(_UNLIT in item.get("extensions", {}) for item in items)
+    used = document.root.get("extensionsUsed", [])
+    if _UNLIT in used and not is_used:
+        used.remove(_UNLIT)
+
+
+def _textures(toon: Mapping[str, Any]) -> list[Any]:
+    """Return the textures of toon shading that have extensions."""
+    return [each for each in toon.values() if isinstance(part(each, "extensions"), dict)]
+
+
+def _add_made(
+    bones: Mapping[str, int], meta: dict[str, Any], document: Document, body: Body, built: Built
+) -> list[Diagnostic]:
+    """Add the extension of a figure from another format."""
+    extensions = {"VRMC_vrm": made_character(body, built, bones, meta)}
+    _add(document, body, built, extensions)
+    notes = [_written(extensions["VRMC_vrm"], extensions, 1)]
+    if meta["licenseUrl"] != LICENCE:
+        notes.append(Diagnostic("X005.vrm-licence", values={"licence": LICENCE}))
+    return notes
+
+
+def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, Any]) -> None:
+    """Add root extensions, and the constraints of nodes."""
+    document.root["extensions"] = dict(extensions)
+    _declare(document, *extensions)
+    skeleton = body.figure.require_skeleton()
+    for node, item in _constraint_items(skeleton.constraints, built.tree.joints).items():
+        document.root["nodes"][node].setdefault("extensions", {})[_CONSTRAINT] = item
+        _declare(document, _CONSTRAINT)
+
+
+def _declare(document: Document, *names: str) -> None:
+    used: list[str] = document.root.setdefault("extensionsUsed", [])
+    used += [name for name in names if name not in used]
+
+
+def _written(data: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
+    """Return a note that counts the contents of the extensions."""
+    bones = data["humanoid"]["humanBones"]
+    if version == 0:
+        n_expressions = _size(part(data, "blendShapeMaster", "blendShapeGroups"))
+        groups = part(data, "secondaryAnimation", "boneGroups")
+        chains = groups if isinstance(groups, list) else []
+        n_chains = sum(_size(part(each, "bones")) for each in chains)
+    else:
+        kinds = ("preset", "custom")
+        n_expressions = sum(_size(part(data, "expressions", kind)) for kind in kinds)
+        n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
+    parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=n_expressions)]
+    parts.append(Phrase("vrm-springs", n=n_chains))
+    values = {"version": "0.x" if version == 0 else "1.0", "parts": parts}
+    return Diagnostic("X001.vrm", values=values)
+
+
+def _size(data: Any) -> int:
+    """Return the number of members of parsed JSON; 0 if it is neither a list nor an object."""
+    return len(data) if isinstance(data, list | dict) else 0
+
+
+def _lost(lost: Counter[str]) -> list[Diagnostic]:
+    """Return a note about references that could not be kept, if there are any."""
+    parts = [Phrase(f"lost-{kind}", n=count) for kind, count in sorted(lost.items()) if count]
+    return [Diagnostic("X003.vrm-lost", values={"parts": parts})] if parts else []
+
+
+_AXES = "XYZ"
+
+
+def _constraint_items(
+    constraints: tuple[Constraint, ...], joints: list[int]
+) -> dict[int, dict[str, Any]]:
+    """Return the extension of each constrained node.
+
+    ``constraints``: those of a skeleton.
+    ``joints`` (J,): nodes of its joints.
+    """
+    return {
+        joints[each.joint]: {"specVersion": "1.0", "constraint": {each.kind: _item(each, joints)}}
+        for each in constraints
+    }
+
+
+def _item(each: Constraint, joints: list[int]) -> dict[str, Any]:
+    item: dict[str, Any] = {"source": joints[each.source], "weight": each.weight}
+    axis = max(range(3), key=lambda index: abs(each.axis[index]))
+    if each.kind == "roll":
+        item["rollAxis"] = _AXES[axis]
+    elif each.kind == "aim":
+        item["aimAxis"] = ("Positive" if each.axis[axis] > 0.0 else "Negative") + _AXES[axis]
+    return item

@@ -1,0 +1,88 @@
+"""Human bones of a figure, as VRM 1.0 requires them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
+from viewer.rig.retargeting.joint_names import joint_meanings
+from viewer.rig.skeleton import Skeleton
+
+_ABOVE = {
+    **{"spine": "hips", "chest": "spine", "upperChest": "chest", "neck": "spine", "head": "spine"},
+    **{"UpperLeg": "hips", "LowerLeg": "UpperLeg", "Foot": "LowerLeg", "Toes": "Foot"},
+    **{"Shoulder": "spine", "UpperArm": "spine", "LowerArm": "UpperArm", "Hand": "LowerArm"},
+    **{"Eye": "head", "jaw": "head"},
+    **{"ThumbMetacarpal": "Hand", "ThumbProximal": "ThumbMetacarpal"},
+    "ThumbDistal": "ThumbProximal",
+}
+"""Required ancestor of each listed bone."""
+_FINGERS = ("Index", "Middle", "Ring", "Little")
+_PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
+
+
+def human_bones(figure: Figure) -> dict[str, int]:
+    """Return the joint of each human bone, by its name in VRM 1.0.
+
+    Optional bones whose hierarchy VRM does not allow are omitted.
+
+    ``figure``: figure with a skeleton, whose humanoid or joint names identify the bones.
+    Raises RigError if a required bone is missing.
+    """
+    skeleton = figure.require_skeleton()
+    found = dict(skeleton.humanoid.joints) if skeleton.humanoid is not None else _named(skeleton)
+    # Bones below an omitted bone are omitted, too, in whatever order the file lists them.
+    while misplaced := [bone for bone in found if not _is_allowed(skeleton, found, bone)]:
+        for bone in misplaced:
+            del found[bone]
+    missing = [bone for bone in REQUIRED_BONES if bone not in found]
+    if missing:
+        values = {"figure": figure.name, "names": missing, "n": len(missing)}
+        raise RigError(Diagnostic("F004.vrm-bones", values=values))
+    return found
+
+
+def is_humanoid(figure: Figure) -> bool:
+    """Return whether a figure with a skeleton has all required human bones."""
+    try:
+        return bool(human_bones(figure))
+    except RigError:
+        return False
+
+
+def _named(skeleton: Skeleton) -> dict[str, int]:
+    """Return the bones that joint names imply; hips, legs and arms are needed for a humanoid."""
+    joints = {name: joint for joint, name in enumerate(joint_meanings(skeleton)) if name}
+    found = {bone: joints[name] for bone, name in HUMAN_BONES.items() if name in joints}
+    spine = [joints[name] for name in ("spine1", "spine2", "spine3") if name in joints]
+    return found | dict(zip(SPINE_BONES, spine, strict=False))
+
+
+def bone_above(bone: str) -> str:
+    """Return the required ancestor of a bone; empty for the hips."""
+    side = next((side for side in ("left", "right") if bone.startswith(side)), "")
+    name = bone.removeprefix(side)
+    for finger in _FINGERS:
+        if side and name.startswith(finger):
+            above = _PHALANGES[name.removeprefix(finger)]
+            return f"{side}{above}" if above == "Hand" else f"{side}{finger}{above}"
+    found = _ABOVE.get(name, "")
+    return f"{side}{found}" if found[:1].isupper() else found
+
+
+def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool:
+    """Return whether a bone is below its required ancestor."""
+    above = bone_above(bone)
+    is_known = above in bones or above in REQUIRED_BONES
+    return not above or (is_known and _is_below(skeleton, bones[bone], bones.get(above, -1)))
+
+
+def _is_below(skeleton: Skeleton, joint: int, above: int) -> bool:
+    while joint >= 0:
+        joint = int(skeleton.parents[joint])
+        if joint == above:
+            return True
+    return False

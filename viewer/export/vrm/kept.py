@@ -1,0 +1,360 @@
+"""Extensions of a VRM 1.0 file, with the indices of the file that is written.
+
+Members without indices are kept unchanged.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from viewer.export.gltf.body import Built
+from viewer.export.gltf.document import Document
+from viewer.formats._vrm.json_parts import is_index, listed, part
+from viewer.rig.file_record import VrmRecord
+
+_SPRINGS = "VRMC_springBone"
+_BINDS = {
+    "morphTargetBinds": ("node", "morph-binds"),
+    "materialColorBinds": ("material", "material-binds"),
+    "textureTransformBinds": ("material", "material-binds"),
+}
+
+
+def kept_modern(maps: Maps) -> dict[str, Any]:
+    """Return the root extensions ``VRMC_vrm`` and ``VRMC_springBone`` of a character."""
+    data = maps.record.extensions
+    found = {"VRMC_vrm": _character(data["VRMC_vrm"], maps)}
+    if isinstance(data.get(_SPRINGS), dict):
+        found[_SPRINGS] = _springs(data[_SPRINGS], maps)
+    return found
+
+
+def _character(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    result = dict(data)
+    bones = part(data, "humanoid", "humanBones")
+    given = bones.items() if isinstance(bones, dict) else ()
+    result["humanoid"] = {
+        **(data["humanoid"] if isinstance(data.get("humanoid"), dict) else {}),
+        "humanBones": {
+            bone: {**each, "node": node}
+            for bone, each in given
+            if (node := maps.joint(part(each, "node"), "bones")) is not None
+        },
+    }
+    meta = dict(data["meta"]) if isinstance(data.get("meta"), dict) else {}
+    if "thumbnailImage" in meta:
+        image = maps.image(meta.pop("thumbnailImage"), "textures")
+        meta |= {} if image is None else {"thumbnailImage": image}
+    result["meta"] = meta
+    if isinstance(part(data, "firstPerson"), dict):
+        notes = _rows(
+            part(data, "firstPerson", "meshAnnotations"),
+            "node",
+            lambda node: maps.drawn(node, "annotations"),
+        )
+        result["firstPerson"] = {**data["firstPerson"], "meshAnnotations": notes}
+    if isinstance(part(data, "expressions"), dict):
+        result["expressions"] = {
+            kind: {name: _expression(each, maps) for name, each in listed.items()}
+            if isinstance(listed, dict) and kind in ("preset", "custom")
+            else listed
+            for kind, listed in data["expressions"].items()
+        }
+    return result
+
+
+def _rows(data: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
+    """Return the objects of a list with translated indices, except those whose index is lost."""
+    rows = data if isinstance(data, list) else []
+    return [
+        {**each, name: index}
+        for each in rows
+        if isinstance(each, dict) and (index := found(each.get(name))) is not None
+    ]
+
+
+def _expression(data: Any, maps: Maps) -> Any:
+    if not isinstance(data, dict):
+        return data
+    result = dict(data)
+    for key, (name, kind) in _BINDS.items():
+        if key in data:
+            found = maps.drawn if name == "node" else maps.material
+            result[key] = _rows(data[key], name, lambda index: found(index, kind))  # noqa: B023
+    return result
+
+
+def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the spring bones; chains with a lost joint are omitted as a whole."""
+    result, places, colliders = dict(data), dict[int, int](), list[Any]()
+    for index, each in enumerate(listed(data, "colliders")):
+        node = maps.joint(part(each, "node"), "colliders")
+        if node is not None:
+            places[index] = len(colliders)
+            colliders.append({**each, "node": node})
+    if colliders:
+        result["colliders"] = colliders
+        result["colliderGroups"] = [
+            {
+                **each,
+                "colliders": [
+                    places[i] for i in listed(each, "colliders") if type(i) is int and i in places
+                ],
+            }
+            for each in listed(data, "colliderGroups")
+            if isinstance(each, dict)
+        ]
+    else:
+        result.pop("colliders", None)
+        result.pop("colliderGroups", None)
+    springs = [
+        spring
+        for each in listed(data, "springs")
+        if isinstance(each, dict) and (spring := _spring(each, maps, bool(colliders)))
+    ]
+    return {**result, "springs": springs}
+
+
+def _spring(data: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, Any]:
+    """Return one chain; an empty one if a joint is lost."""
+    listed = data.get("joints")
+    joints = _rows(listed, "node", lambda node: maps.joint(node, "spring-joints"))
+    if not isinstance(listed, list) or len(joints) < len(listed):
+        return {}
+    result = {**data, "joints": joints}
+    if "center" in data:
+        center = maps.joint(result.pop("center"), "centers")
+        result |= {} if center is None else {"center": center}
+    if not has_colliders:
+        result.pop("colliderGroups", None)
+    return result
+
+
+def kept_toon(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the toon shading of a material; textures that cannot be read are omitted."""
+    result = {}
+    for name, each in data.items():
+        if name.endswith("Texture") and isinstance(each, dict):
+            index = maps.texture(each.get("index"), "textures")
+            if index is not None:
+                result[name] = {**each, "index": index}
+        else:
+            result[name] = each
+    return result
+
+
+# Extension of a VRM 0.x file, with the indices of the file that is written.
+#
+# Version 0.x binds expressions to meshes, which become one mesh per node here: such binds are
+# repeated. Its materials are parallel to those of the file.
+
+_PLAIN = {
+    "shader": "VRM_USE_GLTFSHADER",
+    "renderQueue": -1,
+    "floatProperties": {},
+    "vectorProperties": {},
+    "textureProperties": {},
+    "keywordMap": {},
+    "tagMap": {},
+}
+
+
+def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
+    """Return the root extension ``VRM`` of a character.
+
+    ``names``: names of the written materials.
+    """
+    data = maps.record.extensions["VRM"]
+    result = dict(data)
+    bones = listed(data, "humanoid", "humanBones")
+    result["humanoid"] = {
+        **(data["humanoid"] if isinstance(data.get("humanoid"), dict) else {}),
+        "humanBones": _nodes(bones, maps, "bones"),
+    }
+    meta = dict(data["meta"]) if isinstance(data.get("meta"), dict) else {}
+    if meta.get("texture", -1) != -1:
+        texture = maps.texture(meta.pop("texture"), "textures")
+        meta |= {} if texture is None else {"texture": texture}
+    result["meta"] = meta
+    if isinstance(data.get("firstPerson"), dict):
+        result["firstPerson"] = _first_person(data["firstPerson"], maps)
+    groups = listed(data, "blendShapeMaster", "blendShapeGroups")
+    if groups:
+        result["blendShapeMaster"] = {
+            **data["blendShapeMaster"],
+            "blendShapeGroups": [
+                {**each, "binds": _of_meshes(each.get("binds"), maps, "morph-binds")}
+                for each in groups
+                if isinstance(each, dict)
+            ],
+        }
+    if isinstance(data.get("secondaryAnimation"), dict):
+        result["secondaryAnimation"] = _old_springs(data["secondaryAnimation"], maps)
+    result["materialProperties"] = _materials(listed(data, "materialProperties"), maps, names)
+    return {"VRM": result}
+
+
+def _nodes(rows: list[Any], maps: Maps, kind: str) -> list[Any]:
+    return [
+        {**each, "node": node}
+        for each in rows
+        if isinstance(each, dict) and (node := maps.joint(each.get("node"), kind)) is not None
+    ]
+
+
+def _of_meshes(rows: Any, maps: Maps, kind: str) -> list[Any]:
+    """Return objects with translated meshes, one for each mesh that is written."""
+    given = rows if isinstance(rows, list) else []
+    return [
+        {**each, "mesh": mesh}
+        for each in given
+        if isinstance(each, dict)
+        for mesh in maps.meshes(each.get("mesh"), kind)
+    ]
+
+
+def _first_person(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    result = dict(data)
+    if data.get("firstPersonBone", -1) != -1:
+        bone = maps.joint(data["firstPersonBone"], "bones")
+        result["firstPersonBone"] = -1 if bone is None else bone
+    notes = _of_meshes(data.get("meshAnnotations"), maps, "annotations")
+    return {**result, "meshAnnotations": notes}
+
+
+def _old_springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the springs; groups of colliders keep their indices, because springs refer to them."""
+    groups = []
+    for each in listed(data, "boneGroups"):
+        if not isinstance(each, dict):
+            continue
+        bones = [maps.joint(bone, "spring-joints") for bone in listed(each, "bones")]
+        group = {**each, "bones": [bone for bone in bones if bone is not None]}
+        if part(each, "center") not in (None, -1):
+            center = maps.joint(each["center"], "centers")
+            group["center"] = -1 if center is None else center
+        groups.append(group)
+    colliders = []
+    for each in listed(data, "colliderGroups"):
+        node = maps.joint(part(each, "node"), "colliders")
+        # A group without a joint would be invalid: it moves to the first joint, without colliders.
+        empty = {"node": maps.first_joint, "colliders": []}
+        is_kept = node is not None and isinstance(each, dict)
+        colliders.append({**each, "node": node} if is_kept else empty)
+    return {**data, "boneGroups": groups, "colliderGroups": colliders}
+
+
+def _materials(data: list[Any], maps: Maps, names: list[str]) -> list[Any]:
+    """Return the properties of each written material, in their order."""
+    result: list[Any] = [{"name": name, **_PLAIN} for name in names]
+    for own, written in maps.materials.items():
+        if own >= len(data) or not isinstance(data[own], dict):
+            continue
+        each = dict(data[own])
+        textures = part(each, "textureProperties")
+        given = textures.items() if isinstance(textures, dict) else ()
+        each["textureProperties"] = {
+            name: texture
+            for name, index in given
+            if (texture := maps.texture(index, "textures")) is not None
+        }
+        result[written] = each
+    return result
+
+
+_KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # image formats that VRM allows
+
+
+class Maps:
+    """Translation of the indices of a VRM file, and counts of references that are lost.
+
+    ``record``: extensions of the original file.
+    ``document``, ``built``: the written file, to which textures are added on demand.
+
+    Attributes
+    ----------
+    lost : Counter
+        Number of lost references, by kind.
+    """
+
+    def __init__(self, record: VrmRecord, document: Document, built: Built) -> None:
+        self.record, self._document = record, document
+        self._joints = {node: built.tree.joints[j] for node, j in record.joints.items()}
+        of_part = {max(placed.part.index, 0): placed.node for placed in built.meshes}
+        self._drawn = {n: of_part[part] for n, part in record.parts.items() if part in of_part}
+        self._materials = {
+            own: built.materials[slot]
+            for slot, own in enumerate(record.materials)
+            if slot in built.materials
+        }
+        self.lost: Counter[str] = Counter()
+
+    def joint(self, node: Any, kind: str) -> int | None:
+        """Return the written node of a joint; None, counted as lost, if there is none."""
+        return self._found(self._joints, node, kind)
+
+    @property
+    def first_joint(self) -> int:
+        """The written node of the file's first joint."""
+        return next(iter(self._joints.values()), 0)
+
+    def drawn(self, node: Any, kind: str) -> int | None:
+        """Return the written node of a mesh; None, counted as lost, if there is none."""
+        return self._found(self._drawn, node, kind)
+
+    def material(self, index: Any, kind: str) -> int | None:
+        """Return a written material; None, counted as lost, if there is none."""
+        return self._found(self._materials, index, kind)
+
+    @property
+    def materials(self) -> dict[int, int]:
+        """Written materials, by material of the original file; only those in use."""
+        return self._materials
+
+    def meshes(self, mesh: Any, kind: str) -> list[int]:
+        """Return the written meshes of a mesh, which several nodes may share."""
+        nodes = [node for node, own in self.record.meshes.items() if own == mesh]
+        items = self._document.root["nodes"]
+        found = [items[self._drawn[node]]["mesh"] for node in nodes if node in self._drawn]
+        if not found:
+            self.lost[kind] += 1
+        return found
+
+    def image(self, index: Any, kind: str) -> int | None:
+        """Return a written image; None, counted as lost, if it cannot be read."""
+        stored = self.record.textures
+        image = stored.image(index) if stored is not None and type(index) is int else None
+        if image is None or not image.data.startswith(_KEPT):
+            self.lost[kind] += 1
+            return None
+        return self._document.picture(image.data, image.name or "image")
+
+    def texture(self, index: Any, kind: str) -> int | None:
+        """Return a written texture; None, counted as lost, if its image cannot be read."""
+        stored = self.record.textures
+        listed = () if stored is None else stored.textures
+        texture = listed[index] if is_index(index, len(listed)) else None
+        if not isinstance(texture, dict):
+            self.lost[kind] += 1
+            return None
+        source = self.image(texture.get("source"), kind)
+        if source is None:
+            return None
+        item = {"source": source}
+        sampler, samplers = texture.get("sampler"), () if stored is None else stored.samplers
+        if isinstance(sampler, int) and is_index(sampler, len(samplers)):
+            item = {"sampler": self._same("samplers", samplers[sampler]), **item}
+        return self._same("textures", item)
+
+    def _same(self, kind: str, item: Any) -> int:
+        """Return the index of an equal item, which is added if there is none."""
+        items = self._document.root.get(kind, [])
+        return items.index(item) if item in items else self._document.add(kind, item)
+
+    def _found(self, places: dict[int, int], index: Any, kind: str) -> int | None:
+        found = places.get(index) if type(index) is int else None
+        if found is None:
+            self.lost[kind] += 1
+        return found

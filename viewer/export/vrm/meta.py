@@ -1,0 +1,51 @@
+"""Meta data of VRM characters: name, authors and licence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
+from viewer.export._options import VrmMeta
+from viewer.export.gltf.document import text_of
+
+LICENCE = "https://vrm.dev/licenses/1.0/"
+"""The VRM Public Licence, the only one that VRM 1.0 accepts."""
+
+
+def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
+    """Return the meta data of a new VRM 1.0 character.
+
+    Permissions are not stated, so the defaults of the specification apply, which are the most
+    restrictive.
+
+    ``meta``: as requested.
+    ``figure``: name of the figure, the default name.
+    Raises RigError if the authors or the licence are missing.
+    """
+    if not any(meta.authors) or not meta.licence:
+        raise RigError(Diagnostic("F004.vrm-meta", values={"figure": figure, "licence": LICENCE}))
+    return {
+        "name": text_of(meta.name or figure),
+        "authors": [text_of(author) for author in meta.authors if author],
+        "licenseUrl": text_of(meta.licence),
+    }
+
+
+def changed_meta(data: dict[str, Any], meta: VrmMeta, version: int) -> dict[str, Any]:
+    """Return the meta data of a file with the requested changes.
+
+    ``data``: meta data of the file.
+    ``meta``: requested values; empty ones keep those of the file.
+    ``version``: 0 or 1; the names of the fields differ.
+    """
+    names = ("title", "author") if version == 0 else ("name", "authors")
+    changed = dict(data)
+    if meta.name:
+        changed[names[0]] = text_of(meta.name)
+    listed = [text_of(author) for author in meta.authors if author]
+    if listed:
+        changed[names[1]] = ", ".join(listed) if version == 0 else listed
+    if meta.licence:
+        changed["otherLicenseUrl" if version == 0 else "licenseUrl"] = text_of(meta.licence)
+    return changed

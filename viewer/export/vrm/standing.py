@@ -1,0 +1,207 @@
+"""Figures in the form of VRM 1.0: in metres, y up, on the ground, facing +z, in a T-pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import between, multiply
+from viewer.rig.geometry.rotation import (
+    matrix_to_quaternion,
+    nearest_rotations,
+    quaternion_to_matrix,
+)
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.humanoid import Humanoid
+from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.pose import Pose, joint_rotations, local_matrices, rest_pose
+from viewer.rig.shape import shaped
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.units import METRES
+
+_PAIRS = ("UpperLeg", "UpperArm")
+_SMALL = 1e-6  # radians
+_NEAR = 0.02  # fraction of the height within which a figure counts as standing on the ground
+_TARGETS = {"Arm": (1.0, 0.0, 0.0), "Leg": (0.0, -1.0, 0.0)}
+_BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "LowerLeg": "Foot"}
+
+
+def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
+    """Return a figure in VRM's axes and unit, whose skeleton has the same joints without DOFs.
+
+    Its shape is baked in unless it has only morph targets; pose correctives are dropped. VRM
+    characters keep their height above the ground.
+
+    ``figure``, ``pose``: the figure, and its rest pose with its shape.
+    ``bones``: joint of each human bone.
+    """
+    shapes = figure.blend_shapes
+    if figure.joint_regressor is not None and shapes is not None:
+        figure, shapes = shaped(figure, pose.shape_weights), None
+    skeleton = figure.require_skeleton()
+    local = local_matrices(skeleton, pose)
+    joints = forward_kinematics(skeleton.parents, local)[:, :3, 3]
+    turn = _axes(figure, joints, bones)
+    scale = METRES.get(figure.unit, 1.0)
+    matrix = np.eye(4)
+    matrix[:3, :3] = scale * turn
+    if figure.record is None or figure.record.vrm is None:
+        matrix[1, 3] = _lift(figure, joints, scale * turn[1])
+    return _transformed(figure, shapes, pose, local, matrix, scale, bones)
+
+
+def facing_front(figure: Figure, bones: Mapping[str, int]) -> Figure:
+    """Return a character of VRM 0.x, which faces -z, rotated by 180 degrees about y.
+
+    ``figure``: at rest, in metres with y up.
+    ``bones``: joint of each human bone.
+    """
+    skeleton = figure.require_skeleton()
+    pose = rest_pose(skeleton)
+    matrix = np.diag([-1.0, 1.0, -1.0, 1.0])
+    local = local_matrices(skeleton, pose)
+    return _transformed(figure, figure.blend_shapes, pose, local, matrix, 1.0, bones)
+
+
+def _transformed(
+    figure: Figure,
+    shapes: BlendShapes | None,
+    pose: Pose,
+    local: Floats,
+    matrix: Floats,
+    scale: float,
+    bones: Mapping[str, int],
+) -> Figure:
+    """Return a figure whose roots, mesh and bindings are transformed, with joints without DOFs.
+
+    ``shapes``: blend shapes that are kept.
+    ``pose``, ``local``: its rest pose, and the local matrices of the joints.
+    ``matrix`` (4, 4), ``scale``: the whole transform, and the scale that it contains.
+    """
+    skeleton, turn = figure.require_skeleton(), matrix[:3, :3] / scale
+    roots = skeleton.parents < 0
+    places = scale * local[:, :3, 3]
+    places[roots] = apply_transform(matrix, local[roots, :3, 3])
+    rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
+    rotations[roots] = multiply(matrix_to_quaternion(turn), rotations[roots])
+    plain = Skeleton(
+        names=skeleton.names,
+        parents=skeleton.parents,
+        rest_translations=places,
+        rest_rotations=rotations,
+        rest_scales=pose.scales,
+        dof_joints=np.zeros(0, np.int32),
+        dof_kinds=np.zeros(0, np.int32),
+        rest_dofs=np.zeros(0),
+        dof_limits=np.zeros((0, 2)),
+        auxiliary=skeleton.auxiliary,
+        humanoid=Humanoid(dict(bones)),
+        constraints=skeleton.constraints,
+    )
+    moved = replace(
+        figure, skeleton=plain, up="y", unit="m", correctives=None, joint_regressor=None, hands=(),
+        pose_layout=None, body_parts=None, keypoints=None, reduced=None, symmetry=None, fields=(),
+        blend_shapes=None, animations=(),
+    )  # fmt: skip
+    moved = _moved_mesh(moved, matrix, scale)
+    if shapes is None:
+        return moved
+    normals = None if shapes.normal_offsets is None else shapes.normal_values() @ turn.T
+    offsets = shapes.direction_values() @ (scale * turn).T
+    return replace(moved, blend_shapes=replace(shapes, offsets=offsets, normal_offsets=normals))
+
+
+def vrm_axes(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Floats:
+    """Return the rotation from the axes of a figure in its rest pose to those of VRM: (3, 3)."""
+    skeleton = figure.require_skeleton()
+    world = forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
+    return _axes(figure, world[:, :3, 3], bones)
+
+
+def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
+    """Return the rotation that turns the figure's left side to +x and its top to +y: (3, 3)."""
+    up = np.zeros(3)
+    up["xyz".index(figure.up)] = 1.0
+    across = sum(places[bones[f"left{name}"]] - places[bones[f"right{name}"]] for name in _PAIRS)
+    left = unit(np.asarray(across) - up * float(np.dot(across, up)))
+    if not left.any():
+        left = np.array([1.0, 0.0, 0.0])
+    return np.stack([left, up, np.cross(left, up)])
+
+
+def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
+    """Return the height by which a figure is raised onto the ground; 0 if it is nearly there.
+
+    ``joints`` (J, 3): their positions.
+    ``up`` (3,): vector whose dot product with a position is its height.
+    """
+    points = joints if figure.mesh is None else np.concatenate([joints, figure.mesh.positions])
+    heights = points @ up
+    low = float(heights.min())
+    return -low if abs(low) > _NEAR * float(np.ptp(heights)) else 0.0
+
+
+def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
+    """Return a figure with its mesh and bindings transformed as its joints already are."""
+    mesh, skin = figure.mesh, figure.skin
+    if mesh is None:
+        return figure
+    turned = replace(
+        mesh,
+        positions=apply_transform(matrix, mesh.positions),
+        normals=mesh.normals @ (matrix[:3, :3] / scale).T,
+    )
+    if skin is None:
+        return replace(figure, mesh=turned)
+    bound = np.diag([scale, scale, scale, 1.0]) @ skin.inverse_bind @ np.linalg.inv(matrix)
+    return replace(figure, mesh=turned, skin=replace(skin, inverse_bind=bound))
+
+
+def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
+    """Return a figure whose rest pose has straight horizontal arms and vertical legs.
+
+    ``figure``: from ``standing``; its mesh follows the skeleton.
+    ``bones``: joint of each human bone.
+    Also returns the largest rotation of a joint in radians.
+    """
+    skeleton = figure.require_skeleton()
+    rotations, largest = skeleton.rest_rotations.copy(), 0.0
+    for bone, sign in ((b, s) for s in (1.0, -1.0) for b in _BELOW):
+        side = "left" if sign > 0.0 else "right"
+        joint, below = bones[f"{side}{bone}"], bones[f"{side}{_BELOW[bone]}"]
+        world = _worlds(skeleton, rotations)
+        away = unit(world[below, :3, 3] - world[joint, :3, 3])
+        wanted = np.array(_TARGETS[bone[-3:]]) * (sign if bone.endswith("Arm") else 1.0)
+        angle = float(np.arccos(np.clip(away @ wanted, -1.0, 1.0)))
+        if angle < _SMALL or not away.any():
+            continue
+        largest = max(largest, angle)
+        parent = int(skeleton.parents[joint])
+        above = unit_rotation(world[parent]) if parent >= 0 else np.eye(3)
+        own = quaternion_to_matrix(rotations[joint])
+        turn = quaternion_to_matrix(between(away, wanted))
+        rotations[joint] = matrix_to_quaternion(above.T @ turn @ above @ own)
+    return replace(figure, skeleton=replace(skeleton, rest_rotations=rotations)), largest
+
+
+def unit_rotation(matrix: Floats) -> Floats:
+    """Return the rotation of a matrix without shear: (3, 3)."""
+    linear = matrix[:3, :3]
+    lengths = np.linalg.norm(linear, axis=0)
+    # A scale of 0 flattens or hides what is below a joint.
+    found: Floats = linear / lengths if lengths.all() else nearest_rotations(linear)[0]
+    return found
+
+
+def _worlds(skeleton: Skeleton, rotations: Floats) -> Floats:
+    local = np.zeros((skeleton.n_joints, 4, 4))
+    local[:, :3, :3] = quaternion_to_matrix(rotations) * skeleton.rest_scales[:, None, :]
+    local[:, :3, 3] = skeleton.rest_translations
+    local[:, 3, 3] = 1.0
+    return forward_kinematics(skeleton.parents, local)
