@@ -9,7 +9,7 @@ from typing import Any
 
 from viewer.app.display_loss import stop_watching, watch_display
 from viewer.errors import RenderError, ViewerError
-from viewer.rendering.gpu.context import explain, offer_of, offer_text
+from viewer.rendering.gpu.context import explain_failure, offer_of, offer_text
 
 __all__ = ["NoDisplay", "find_display", "import_glfw", "window_error"]
 
@@ -47,11 +47,11 @@ def window_error(message: str) -> RenderError:
     # Without a requested version, GLFW creates the newest compatibility profile.
     handle = glfw.create_window(64, 64, "viewer", None, None)
     if not handle:
-        return RenderError(explain(message))
+        return RenderError(explain_failure(message))
     try:
         glfw.make_context_current(handle)
         address = glfw.get_proc_address("glGetString")
-        return RenderError(offer_text(offer_of(address)) if address else explain(message))
+        return RenderError(offer_text(offer_of(address)) if address else explain_failure(message))
     finally:
         glfw.destroy_window(handle)
 

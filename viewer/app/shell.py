@@ -25,7 +25,7 @@ from viewer.app.preferences.system_theme import system_theme  # noqa: E402
 from viewer.app.theme import apply_theme  # noqa: E402
 from viewer.app.typed_keys import TypedKeys, end_frame, end_frame_before  # noqa: E402
 from viewer.errors import RenderError  # noqa: E402
-from viewer.rendering.gpu.context import explain  # noqa: E402
+from viewer.rendering.gpu.context import explain_failure  # noqa: E402
 
 __all__ = ["Shell", "create_context", "create_window"]
 
@@ -207,4 +207,4 @@ def create_context() -> moderngl.Context:
     try:
         return moderngl.create_context(require=330)
     except Exception as problem:  # glcontext raises bare Exception
-        raise RenderError(explain(str(problem))) from None
+        raise RenderError(explain_failure(str(problem))) from None

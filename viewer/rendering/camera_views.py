@@ -55,7 +55,7 @@ def drawn_cameras(
     return [view_in(camera, scene) for camera in scene.views if camera is not view_through]
 
 
-def reach_of(
+def depth_bounds(
     scene: Scene, view_through: CameraView | None, options: DisplayOptions, box: Floats
 ) -> Floats:
     """Return the box of a scene and its drawn cameras, for the depth range: (2, 3)."""

@@ -12,7 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.joint_spheres import box_spheres, skin_spheres, stretch
+from viewer.rendering.joint_spheres import box_spheres, skin_spheres, stretch_bounds
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
@@ -96,7 +96,7 @@ class Casters:
             figure = actor.figure
             if actor.is_drawn and figure.mesh is not None:
                 size = _sizes.get(figure, None, partial(_mesh_size, figure))
-                scale = stretch(placement_of(actor, self.options)[None])[0]
+                scale = stretch_bounds(placement_of(actor, self.options)[None])[0]
                 found = max(found, float(scale) * size)
         return found
 
@@ -139,7 +139,7 @@ def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
         places = np.pad(actor.points[seen, :3], ((0, 0), (0, 1)))
         found = np.concatenate([found, places])
     centers = found[:, :3] @ placement[:3, :3].T + placement[:3, 3]
-    return np.column_stack([centers, found[:, 3] * stretch(placement[None])])
+    return np.column_stack([centers, found[:, 3] * stretch_bounds(placement[None])])
 
 
 def _mesh_spheres(actor: Actor, options: DisplayOptions) -> Floats:
@@ -164,5 +164,5 @@ def _joint_spheres(actor: Actor) -> Floats:
         return bones
     middles, halves = skeleton.boxes.mean(axis=1), 0.5 * np.ptp(skeleton.boxes, axis=1)
     centers = np.einsum("jik,jk->ji", world[:, :3, :3], middles) + world[:, :3, 3]
-    boxes = np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch(world)])
+    boxes = np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch_bounds(world)])
     return np.concatenate([bones, boxes])

@@ -12,7 +12,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.skin import Skin, bind_positions, owners
 
 _MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
-
 _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()
 
 
@@ -41,10 +40,10 @@ def skin_spheres(figure: Figure, pose: Pose) -> Floats:
     if not used.all():
         palette, centers, radii = palette[used], centers[used], radii[used]
     moved = (palette[:, :3, :3] @ centers[..., None])[..., 0] + palette[:, :3, 3]
-    return np.column_stack([moved, _MARGIN * radii * stretch(palette)])
+    return np.column_stack([moved, _MARGIN * radii * stretch_bounds(palette)])
 
 
-def stretch(matrices: Floats) -> Floats:
+def stretch_bounds(matrices: Floats) -> Floats:
     """Return upper bounds of the spectral norms of matrices; exact for rotations.
 
     The spectral norm is at most the square root of the largest absolute row sum of M^T M.

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from viewer.rendering.casters import Casters
     from viewer.rendering.passes.occlusion_pass import OcclusionPass
     from viewer.rendering.passes.shadow_passes import (
-        Contact,
         ContactPass,
+        ContactShadows,
         GroundShadowPass,
         ShadowPass,
     )
@@ -47,7 +47,7 @@ class Lighting:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
         self._spheres: Floats | None = None
-        self._contact: Contact | None = None
+        self._contact: ContactShadows | None = None
         self._size = 0.0  # size of the largest figure, scene units
         self._shadow: ShadowPass | None = None
         self._occlusion: OcclusionPass | None = None

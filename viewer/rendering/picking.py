@@ -15,7 +15,7 @@ from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.joint_marks import joint_at, marks_of
+from viewer.rendering.overlay.joint_marks import joint_at, joint_marks_of
 from viewer.rendering.passes.instance_pass import InstanceBuffers, draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_boxes, draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
@@ -121,7 +121,7 @@ class PickPass:
         """
         if has_joint_marks(options):
             # Dots, and bones in X-ray mode, are drawn over everything else.
-            marked = joint_at(marks_of(scene.actors), view, size, pixel, options.xray)
+            marked = joint_at(joint_marks_of(scene.actors), view, size, pixel, options.xray)
             if marked is not None:
                 whose, joint, point = marked
                 return Pick(whose, joint, -1, -1, point)

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.camera_views import draw_image_behind, draw_image_planes, frusta_of, reach_of
+from viewer.rendering.camera_views import (
+    depth_bounds,
+    draw_image_behind,
+    draw_image_planes,
+    frusta_of,
+)
 from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import draw_nearest, without_depth_writes
@@ -24,7 +29,7 @@ from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass, draw_layer
-from viewer.rendering.sampling import jittered, n_passes, sample
+from viewer.rendering.sampling import jittered, n_passes, pass_sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.view import View, view_of
 from viewer.rendering.visibility import (
@@ -145,14 +150,14 @@ class Renderer:
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
-        view = view_of(camera, target.size, reach_of(scene, camera.fixed, options, box))
+        view = view_of(camera, target.size, depth_bounds(scene, camera.fixed, options, box))
         meshes = self._update(scene, view, options, selected)
         parts = self.programs, self.mesh_pass, self.late, self.buffers
         casters = Casters(*parts, meshes, scene.actors, options)
         self.lighting.begin(casters, camera.up, box)
         count = n_passes(options)
         for index in range(count) if passes is None else passes:
-            one = sample(index, count)
+            one = pass_sample(index, count)
             shifted = jittered(view, one.shift, target.size)
             lit = self.lighting.light(casters, shifted, target.size, one, strength)
             self._set_state(target)
@@ -344,16 +349,12 @@ class Renderer:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        drawn = [mesh.mesh for _, mesh in meshes.singles]
-        drawn += [instances.mesh for _, instances in meshes.instanced]
-        self.late.use_pictures(drawn, options)
+        self.late.use_pictures(meshes.uploaded, options)
         self._draw_layer(meshes, view, options, blended=False)
 
     def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         """Draw translucent surfaces over opaque ones and the ground."""
-        drawn = [mesh.mesh for _, mesh in meshes.singles]
-        drawn += [instances.mesh for _, instances in meshes.instanced]
-        if any(mesh.is_blended for mesh in drawn):
+        if any(mesh.is_blended for mesh in meshes.uploaded):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
 

@@ -59,10 +59,10 @@ def n_passes(options: DisplayOptions) -> int:
     return max(options.passes, 1) if options.quality == "final" else 1
 
 
-def sample(index: int, count: int) -> Sample:
+def pass_sample(index: int, count: int) -> Sample:
     """Return one of ``count`` passes, with Halton points in the pixel and a spiral over the light.
 
-    >>> sample(0, 1)
+    >>> pass_sample(0, 1)
     Sample(shift=(0.0, 0.0), light=(0.0, 0.0), phase=0.0, threshold=0.5)
     """
     if count == 1:

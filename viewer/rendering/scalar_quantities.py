@@ -82,7 +82,7 @@ class ScalarQuantities:
         # A new buffer may reuse the id and version of a deleted one.
         if key == self._key and all(buffer.is_shown for _, buffer in values):
             return
-        from viewer.rendering.overlay.legend import Shown, legend_of
+        from viewer.rendering.overlay.legend import ColoredFigure, legend_of
         from viewer.rendering.scalar_look import look_of, shown_ends
 
         having = [one for one in values if not missing_part(name, one[0].figure)]
@@ -98,7 +98,7 @@ class ScalarQuantities:
                 continue
             look = look_of(name, actor.figure, ends, options)
             buffer.show(look)
-            shown.append(Shown(actor.figure, buffer.numbers, look))
+            shown.append(ColoredFigure(actor.figure, buffer.numbers, look))
         self.legend = legend_of(name, shown, options.skinning, figures)
         self._key = key
 

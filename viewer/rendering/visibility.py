@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import InstanceBuffers, instance_groups
@@ -29,6 +30,12 @@ class Meshes:
 
     def __bool__(self) -> bool:
         return bool(self.singles or self.instanced)
+
+    @property
+    def uploaded(self) -> list[MeshBuffers]:
+        """Uploaded meshes of the figures."""
+        singles = [mesh.mesh for _, mesh in self.singles]
+        return singles + [instances.mesh for _, instances in self.instanced]
 
     def opaque(self, options: DisplayOptions) -> list[tuple[Actor, PosedMesh]]:
         """Return the opaque meshes that are drawn individually."""

@@ -13,7 +13,12 @@ import pytest
 
 from viewer.cli import run
 from viewer.errors import RenderError, ViewerError
-from viewer.rendering.gpu.context import check_errors, device_count, explain, headless_context
+from viewer.rendering.gpu.context import (
+    check_errors,
+    device_count,
+    explain_failure,
+    headless_context,
+)
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.offscreen import Offscreen
 
@@ -242,8 +247,8 @@ def test_drawing_does_not_need_a_display(tmp_path):
     ],
 )
 def test_library_messages_are_explained(text, start):
-    assert explain(text).startswith(start)
-    assert "\n" not in explain(text)
+    assert explain_failure(text).startswith(start)
+    assert "\n" not in explain_failure(text)
 
 
 @LINUX
@@ -300,7 +305,7 @@ def test_inaccessible_graphics_card_is_reported_in_a_note(monkeypatch):
 
 
 def test_display_without_opengl_3_reports_the_requirement():
-    assert explain("GLX: Failed to create context: GLXBadFBConfig") == (
+    assert explain_failure("GLX: Failed to create context: GLXBadFBConfig") == (
         "OpenGL 3.3 is needed, but this display's driver does not offer it "
         "[GLX: Failed to create context: GLXBadFBConfig]"
     )

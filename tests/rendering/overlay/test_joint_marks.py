@@ -14,7 +14,7 @@ from viewer.rendering.overlay.joint_marks import (
     bone_segments,
     joint_at,
     joint_dots,
-    marks_of,
+    joint_marks_of,
 )
 from viewer.rendering.view import view_of
 from viewer.rig.figure import Figure
@@ -42,7 +42,7 @@ def test_marks_follow_pose_and_placement():
     actor.pose.figure_translation[:] = 0.0, 0.0, 5.0
     actor.pose.figure_scale = 2.0
     actor.placement[0, 3] = 10.0
-    (marks,) = marks_of([actor])
+    (marks,) = joint_marks_of([actor])
     # (1, 1, 0) is rotated to (-1, 1, 0), scaled by two, and moved by both translations.
     assert_allclose(marks.points[2], [10.0 - 2.0, 2.0, 5.0], atol=1e-12)
 
@@ -50,11 +50,11 @@ def test_marks_follow_pose_and_placement():
 def test_hidden_actors_have_no_marks():
     first, second, third = chain(), chain(), chain()
     first.visible, second.is_present = False, False
-    assert [marks.actor for marks in marks_of([first, second, third])] == [2]
+    assert [marks.actor for marks in joint_marks_of([first, second, third])] == [2]
 
 
 def test_bones_connect_parents_and_children_over_dark_borders():
-    (marks,) = marks_of([chain()])
+    (marks,) = joint_marks_of([chain()])
     bones = bone_segments(marks, 1, 2.0)
     assert_allclose(bones.starts[3:], [[0, 0, 0], [1, 0, 0], [1, 1, 0]], atol=1e-12)
     assert_allclose(bones.ends[3:], [[1, 0, 0], [1, 1, 0], [1, 1, 0]], atol=1e-12)
@@ -65,7 +65,7 @@ def test_bones_connect_parents_and_children_over_dark_borders():
 
 
 def test_selected_joint_has_a_larger_dot():
-    (marks,) = marks_of([chain()])
+    (marks,) = joint_marks_of([chain()])
     plain, chosen = joint_dots(marks, -1, 1.0), joint_dots(marks, 1, 1.0)
     assert len(plain) == 2 and len(chosen) == 4
     assert_allclose(chosen[-1].starts, [[1, 0, 0]], atol=1e-12)
@@ -75,7 +75,7 @@ def test_selected_joint_has_a_larger_dot():
 def test_axes_follow_the_joint_and_are_shorter_than_the_bone():
     actor = chain()
     actor.pose.dofs[2] = np.pi / 2
-    (marks,) = marks_of([actor])
+    (marks,) = joint_marks_of([actor])
     axes = axis_segments(marks, 1.0)
     ways = (axes.ends - axes.starts).reshape(4, 3, 3)
     # The size of the skeleton is sqrt(2); a twentieth of it is less than 0.4 of a bone.
@@ -87,7 +87,7 @@ def test_axes_follow_the_joint_and_are_shorter_than_the_bone():
 
 def test_axes_of_joints_close_together_are_short():
     near = skeleton([-1, 0, 1], [[0, 0, 0], [10, 0, 0], [0, 0.5, 0]])
-    (marks,) = marks_of([Actor(Figure("near", skeleton=near))])
+    (marks,) = joint_marks_of([Actor(Figure("near", skeleton=near))])
     axes = axis_segments(marks, 1.0)
     lengths = np.linalg.norm(axes.ends - axes.starts, axis=1)[::3]
     size = np.linalg.norm([10.0, 0.5])
@@ -95,7 +95,7 @@ def test_axes_of_joints_close_together_are_short():
 
 
 def test_single_joint_has_axes():
-    (marks,) = marks_of([Actor(Figure("one", skeleton=skeleton([-1], [[0, 0, 0]])))])
+    (marks,) = joint_marks_of([Actor(Figure("one", skeleton=skeleton([-1], [[0, 0, 0]])))])
     axes = axis_segments(marks, 1.0)
     assert_allclose(np.linalg.norm(axes.ends - axes.starts, axis=1), 0.05)
     assert len(bone_segments(marks, 0, 1.0).widths) == 0
@@ -103,7 +103,7 @@ def test_single_joint_has_axes():
 
 def at(view, x, y, with_bones=True, actors=None):
     """Return the actor and joint at a point of the plane z = 0."""
-    marks = marks_of([chain()] if actors is None else actors)
+    marks = joint_marks_of([chain()] if actors is None else actors)
     found = joint_at(marks, view, SIZE, (400 + 200 * x, 400 - 200 * y), with_bones)
     return None if found is None else found[:2]
 
@@ -131,7 +131,7 @@ def test_nearer_of_two_coincident_actors_is_picked(view):
     assert at(view, 1.0, 0.0, actors=[far, near]) == (1, 1)
     assert at(view, 1.0, 0.0, actors=[near, far]) == (0, 1)
     # The returned point is the position of the joint.
-    found = joint_at(marks_of([near]), view, SIZE, (600.0, 400.0), True)
+    found = joint_at(joint_marks_of([near]), view, SIZE, (600.0, 400.0), True)
     assert_allclose(found[2], [1.0, 0.0, 0.5], atol=1e-12)
 
 

@@ -9,7 +9,7 @@ from rendering.drawn_figures import skeleton
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.overlay.annotation import letters_for, place_labels
-from viewer.rendering.overlay.joint_marks import HIGHLIGHT, marks_of, name_labels
+from viewer.rendering.overlay.joint_marks import HIGHLIGHT, joint_marks_of, name_labels
 from viewer.rendering.overlay.typeface import Lettering
 from viewer.rendering.view import view_of
 from viewer.rig.figure import Figure
@@ -27,7 +27,7 @@ def lettering():
 def placed(lettering, offsets, selected=(0, -1)):
     """Return the names drawn for joints at given positions, seen from +z."""
     joints = skeleton([-1] * len(offsets), offsets)
-    marks = marks_of([Actor(Figure("figure", skeleton=joints))])
+    marks = joint_marks_of([Actor(Figure("figure", skeleton=joints))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     view = view_of(camera, SIZE, BOX)
     return place_labels([name_labels(marks, selected)], view, SIZE, lettering)

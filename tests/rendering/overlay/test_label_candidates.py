@@ -11,15 +11,15 @@ from viewer.rendering.overlay.labels import (
     clear_places,
     crowded,
     crowded_lines,
+    label_places,
     line_pixels,
-    places_of,
 )
 
 PICTURE, GAP = (300, 200), 8.0
 
 
 def test_label_in_the_middle_has_eight_positions_at_three_distances():
-    places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
+    places = label_places(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert places.ranks.tolist() == list(range(24))
     assert places.has_line.tolist() == [False] * 8 + [True] * 16
     # The positions are right, left, above and below, and the same at three times the distance.
@@ -32,14 +32,14 @@ def test_label_in_the_middle_has_eight_positions_at_three_distances():
 
 
 def test_positions_outside_the_image_are_excluded():
-    places = places_of(np.array([(4.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
+    places = label_places(np.array([(4.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert (places.low[:, 0] >= 0).all() and 1 not in places.ranks
     # There is room above the point, because the label may be shifted sideways.
     assert places.low[places.ranks == 6].tolist() == [[0, 82]]
 
 
 def test_leader_line_starts_half_a_margin_from_the_point_and_ends_a_pixel_before_the_label():
-    places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
+    places = label_places(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     pixels, are_part = line_pixels(places, GAP)
     assert not are_part[:8].any()
     assert pixels[8, are_part[8]].tolist() == [[x, 100] for x in range(154, 173)]
@@ -51,7 +51,7 @@ def scene(request):
     rng = np.random.default_rng(2)
     points = np.unique(rng.integers(0, 4 * np.array(PICTURE), (request.param, 2)), axis=0) / 4.0
     sizes = rng.integers(2, 30, (len(points), 2)).astype(np.int32)
-    places = places_of(points, sizes, PICTURE, GAP)
+    places = label_places(points, sizes, PICTURE, GAP)
     return points, places, Dots(Cells(PICTURE, 4), points)
 
 

@@ -10,7 +10,7 @@ from rendering.drawn_figures import skeleton
 
 from viewer.rendering.colors import NOTHING
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.legend import Entry, Shown, legend_of, round_ticks
+from viewer.rendering.overlay.legend import ColoredFigure, LegendEntry, legend_of, round_ticks
 from viewer.rendering.scalar_look import look_of, shown_ends
 from viewer.rig.annotations import BodyParts, VertexField
 from viewer.rig.figure import Figure
@@ -37,7 +37,9 @@ def legend(name, *numbers, figure=None, **options):
     values = [np.array(each, dtype=float) for each in numbers]
     ends = shown_ends(name, figure, [(v.min(), v.max()) for v in values], shown_options)
     look = look_of(name, figure, ends, shown_options)
-    having = [] if missing_part(name, figure) else [Shown(figure, each, look) for each in values]
+    having = (
+        [] if missing_part(name, figure) else [ColoredFigure(figure, each, look) for each in values]
+    )
     return legend_of(name, having, shown_options.skinning, [figure])
 
 
@@ -87,7 +89,7 @@ def test_lengths_are_in_millimetres():
 def test_weight_legend_has_isolines_and_a_zero_swatch():
     found = legend("weight:j1", [0, 0.5, 0.25, 0, 0, 0])
     assert found.heading == "Weight of j1"
-    assert found.entries == (Entry(NOTHING, "no weight"),)
+    assert found.entries == (LegendEntry(NOTHING, "no weight"),)
     np.testing.assert_allclose(found.lines, np.arange(1, 10) / 10)
     assert found.ticks[-1].text == "1.0" and found.ticks[-1].place == pytest.approx(1.0)
     assert found.note == "from 0 to 0.5"
@@ -117,7 +119,7 @@ def test_typical_range_also_reports_the_extremes():
         ((-480.0, 480.0), "from -10 to +480"),
     ):
         look = look_of("stretch", figure, ends, shown_options)
-        found = legend_of("stretch", [Shown(figure, numbers, look)], Skinning(), [figure])
+        found = legend_of("stretch", [ColoredFigure(figure, numbers, look)], Skinning(), [figure])
         assert found.note == note
 
 

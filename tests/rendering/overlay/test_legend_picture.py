@@ -12,7 +12,7 @@ from viewer.rendering.camera import Camera, fit
 from viewer.rendering.colors import colormap
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.legend import Entry, Legend, legend_pixels
+from viewer.rendering.overlay.legend import Legend, LegendEntry, legend_pixels
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 
 SIZE = 640, 360
@@ -68,7 +68,7 @@ def test_isolines_are_on_the_bar():
 
 
 def test_swatches_are_listed_downwards_in_their_order():
-    entries = tuple(Entry((200, 10 * index, 40), f"joint {index}") for index in range(5))
+    entries = tuple(LegendEntry((200, 10 * index, 40), f"joint {index}") for index in range(5))
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), SIZE)
     tops = [rows_with(pixels, entry.color)[0] for entry in entries]
     steps = np.diff(tops)
@@ -78,7 +78,8 @@ def test_swatches_are_listed_downwards_in_their_order():
 def joints(count, size, name="joint {}"):
     """Return the legend of n joints, and the first pixel column of each swatch, None if hidden."""
     entries = tuple(
-        Entry((200, index % 256, 40 + index // 256), name.format(index)) for index in range(count)
+        LegendEntry((200, index % 256, 40 + index // 256), name.format(index))
+        for index in range(count)
     )
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), size)
     # The first pixel of a colour, counted down the columns, is in its leftmost column.
@@ -141,7 +142,10 @@ def test_letters_grow_with_the_image():
 
 
 def test_names_with_line_breaks_stay_on_one_line():
-    entries = (Entry((200, 0, 40), "two\nlines\t" + "x" * 500), Entry((0, 200, 40), "骨"))
+    entries = (
+        LegendEntry((200, 0, 40), "two\nlines\t" + "x" * 500),
+        LegendEntry((0, 200, 40), "骨"),
+    )
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), SIZE)
     assert pixels.shape[1] < 0.9 * SIZE[0]
 

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, begin_overlay, overlay_rect
 from viewer.phrases import printable
-from viewer.rendering.overlay.legend import Entry, Legend, legend_columns
+from viewer.rendering.overlay.legend import Legend, LegendEntry, legend_columns
 
 __all__ = ["draw_legend"]
 
@@ -101,7 +101,7 @@ def _draw_entries(legend: Legend, width: float, height: float) -> None:
     imgui.dummy((0.0, 0.0))  # ImGui requires an item after the cursor is set
 
 
-def _draw_entry(entry: Entry, text: str, side: float) -> None:
+def _draw_entry(entry: LegendEntry, text: str, side: float) -> None:
     place, draw_list = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
     r, g, b = (channel / 255.0 for channel in entry.color)
     color = imgui.get_color_u32((r, g, b, 1.0))

@@ -35,7 +35,6 @@ _GL_VERSION, _GL_RENDERER, _GL_LANGUAGE = 0x1F02, 0x1F01, 0x8B8C
 _NEEDED, _NEEDED_LANGUAGE = (3, 3), (3, 30)  # OpenGL and GLSL
 _TRIED = (320, 310, 210, 100)  # versions to try, newest first; from 3.1 on, they are core profiles
 _OVERRIDES = ("MESA_GL_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE")
-
 _thread = threading.local()
 
 
@@ -151,7 +150,7 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     except Exception as problem:  # glcontext raises Exception itself
         text = str(problem)
         offer = _headless_offer(settings) if "0x3009" in text or "version" in text else None
-        raise RenderError(explain(text) if offer is None else offer_text(offer)) from None
+        raise RenderError(explain_failure(text) if offer is None else offer_text(offer)) from None
 
 
 def check_device(device: int) -> None:
@@ -193,7 +192,7 @@ def is_software(context: moderngl.Context) -> bool:
     return any(name in renderer for name in ("llvmpipe", "softpipe", "swrast", "software", "basic"))
 
 
-def explain(text: str) -> str:
+def explain_failure(text: str) -> str:
     """Return an explanation of a message from glcontext or GLFW, with a remedy.
 
     Parameters
@@ -206,7 +205,7 @@ def explain(text: str) -> str:
     str
         One line: cause and remedy, and the library's message in brackets.
 
-    >>> explain("libEGL.so.1 not loaded").startswith("libEGL was not found")
+    >>> explain_failure("libEGL.so.1 not loaded").startswith("libEGL was not found")
     True
     """
     devices = re.search(r"requested device index (\d+), but found (\d+)", text)

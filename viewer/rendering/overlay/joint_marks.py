@@ -58,7 +58,7 @@ def joint_annotation(
     selected : (int, int)
         Index of an actor and of its highlighted joint; -1 for none.
     """
-    marks = marks_of(actors)
+    marks = joint_marks_of(actors)
     parts = [part for one in marks for part in _mark_segments(one, options, size, selected)]
     if not parts:
         return None
@@ -108,7 +108,7 @@ class JointMarks:
         return children, parents[children]
 
 
-def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
+def joint_marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
     """Return the joints of all drawn actors that have a skeleton."""
     found = []
     for index, actor in enumerate(actors):

@@ -52,7 +52,7 @@ _PAIRS = 1 << 18  # number of pairs of a rectangle and a dot per batch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layout:
+class LabelLayout:
     """The placed labels.
 
     Attributes
@@ -79,7 +79,7 @@ def lay_out(
     sizes: Ints,
     picture: tuple[int, int],
     gap: float,
-) -> Layout:
+) -> LabelLayout:
     """Place labels next to their points in order, and omit those without room.
 
     A label is placed right or left of its point, diagonally, above or below, whichever position has
@@ -106,7 +106,7 @@ def lay_out(
     chosen, corners = [np.zeros(0, np.int32)], [np.zeros((0, 2), np.int32)]
     ends, has_line = [np.zeros((0, 2))], [np.zeros(0, np.bool_)]
     for some in _portions(order):
-        places = places_of(anchors[some], sizes[some], picture, gap)
+        places = label_places(anchors[some], sizes[some], picture, gap)
         # Vectorized rejection of most positions that overlap others.
         may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
         places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
@@ -117,7 +117,7 @@ def lay_out(
         corners.append(found.low)
         ends.append(found.ends)
         has_line.append(found.has_line)
-    return Layout(
+    return LabelLayout(
         np.concatenate(chosen), np.concatenate(corners), np.concatenate(ends),
         np.concatenate(has_line),
     )  # fmt: skip
@@ -131,7 +131,7 @@ def _portions(order: Ints) -> Iterator[Ints]:
         first, count = first + count, min(2 * count, _MOST_IN_BATCH)
 
 
-def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> Ints:
+def _with_free_lines(places: LabelPlaces, taken: _Taken, dots: Dots, gap: float) -> Ints:
     """Return the indices of positions without a leader line or with a clear path for it: (M,)."""
     rows = np.flatnonzero(places.has_line)
     led = places.take(rows)
@@ -141,7 +141,7 @@ def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> I
     return np.delete(np.arange(len(places.labels)), rows[~free])
 
 
-def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
+def _settle(places: LabelPlaces, taken: _Taken, gap: float) -> Ints:
     """Choose the first free position of each label; return indices of positions: (M,)."""
     found: list[int] = []
     settled = -1  # the most recently placed label
@@ -203,7 +203,7 @@ class _Taken:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Places:
+class LabelPlaces:
     """Candidate positions of labels.
 
     Attributes
@@ -233,9 +233,9 @@ class Places:
     own: Floats
     has_line: Bools
 
-    def take(self, rows: NDArray[np.integer[Any]]) -> Places:
+    def take(self, rows: NDArray[np.integer[Any]]) -> LabelPlaces:
         """Return a selection of the positions."""
-        return Places(
+        return LabelPlaces(
             self.labels[rows],
             self.ranks[rows],
             self.anchors[rows],
@@ -247,7 +247,7 @@ class Places:
         )
 
 
-def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> Places:
+def label_places(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> LabelPlaces:
     """Return all candidate positions of labels that lie within an image.
 
     Parameters
@@ -274,10 +274,10 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
     high = low + sizes[labels]
     ends = np.clip(anchors, low, high)
     own = np.hypot(*(ends - anchors).T)
-    return Places(labels, ranks, anchors, low, high, ends, own, ranks >= len(_WAYS))
+    return LabelPlaces(labels, ranks, anchors, low, high, ends, own, ranks >= len(_WAYS))
 
 
-def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
+def crowded(places: LabelPlaces, anchors: Floats, dots: Dots, gap: float) -> Bools:
     """Return a mask of positions certainly too close to other points, or over their own: (M,).
 
     Parameters
@@ -299,7 +299,7 @@ def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
     return np.asarray((found > around[places.labels]) | (places.own == 0.0))
 
 
-def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
+def line_pixels(places: LabelPlaces, gap: float) -> tuple[Ints, Bools]:
     """Return the pixels of leader lines from next to the points to just before their labels.
 
     Parameters
@@ -324,7 +324,9 @@ def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
     return np.where(are_part[..., None], pixels, 0), are_part
 
 
-def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap: float) -> Bools:
+def crowded_lines(
+    places: LabelPlaces, pixels: Ints, are_part: Bools, dots: Dots, gap: float
+) -> Bools:
     """Return a mask of lines that certainly pass too close to other points: (M,).
 
     Parameters
@@ -348,7 +350,7 @@ def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap
     return np.asarray((is_away & (dots.count_at(pixels) > 0)).any(axis=1))
 
 
-def clear_places(places: Places, dots: Dots, gap: float) -> Places:
+def clear_places(places: LabelPlaces, dots: Dots, gap: float) -> LabelPlaces:
     """Return the positions that are far enough from other points, best first for each label.
 
     Parameters
@@ -372,12 +374,12 @@ def clear_places(places: Places, dots: Dots, gap: float) -> Places:
     return places.take(order)
 
 
-def _least(places: Places, gap: float) -> Floats:
+def _least(places: LabelPlaces, gap: float) -> Floats:
     """Return the minimum distance of positions from other points, pixels: (M,)."""
     return _CLEARER * np.where(places.has_line, gap, places.own)
 
 
-def _clearances(places: Places, dots: Dots, layer: int, gap: float) -> tuple[Floats, Floats]:
+def _clearances(places: LabelPlaces, dots: Dots, layer: int, gap: float) -> tuple[Floats, Floats]:
     """Return distances of the nearest other points from positions and lines: (M,), inf if far."""
     reach = np.where(places.has_line, _CLEARER * gap, _FREE * places.own)[:, None]
     low = np.minimum(places.low - reach, places.anchors - _BESIDE_LINE * gap)

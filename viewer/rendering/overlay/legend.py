@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 _MOST_TICKS = 6
 _MOST_COUNTS = 10  # maximum number of labelled blocks of a bar
 _SAME = 1e-9  # relative tolerance for equal numbers
+
 # Pixels.
 _TEXT_HEIGHTS = 9, 40  # minimum and maximum text height, pixels
 _LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 46.0
@@ -50,6 +51,7 @@ _WIDE, _WIDER = 0.3, 0.45
 _LONGEST = 40  # maximum number of characters of a name
 _BAR_WIDTH = 14.0  # width of the bar, in text heights
 _ISOLINE_COLOR = (12, 12, 14)  # isolines, sRGB
+_areas: Memo[Figure, Floats] = Memo()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +64,9 @@ class Legend:
         Title and unit of the values; the unit may be empty.
     colors : (N, 4) uint8
         Colours of the bar from left to right, sRGB; empty for named items.
-    ticks : tuple of Tick
+    ticks : tuple of LegendTick
         Round numbers along the bar.
-    entries : tuple of Entry
+    entries : tuple of LegendEntry
         Named items, largest area first.
     lines : tuple of float
         Positions of isolines on the bar.
@@ -75,8 +77,8 @@ class Legend:
     title: str
     unit: str = ""
     colors: Bytes = field(default_factory=lambda: np.zeros((0, 4), dtype=np.uint8))
-    ticks: tuple[Tick, ...] = ()
-    entries: tuple[Entry, ...] = ()
+    ticks: tuple[LegendTick, ...] = ()
+    entries: tuple[LegendEntry, ...] = ()
     lines: tuple[float, ...] = ()
     note: str = ""
 
@@ -87,7 +89,7 @@ class Legend:
 
 
 @dataclass(frozen=True, slots=True)
-class Tick:
+class LegendTick:
     """A number next to the bar: position, from 0 at the left end to 1 at the right, and text."""
 
     place: float
@@ -95,7 +97,7 @@ class Tick:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class LegendEntry:
     """A named item: colour, sRGB 0 to 255, and name."""
 
     color: tuple[int, int, int]
@@ -103,7 +105,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shown:
+class ColoredFigure:
     """A figure with the values of a scalar quantity and their colours.
 
     Attributes
@@ -122,7 +124,7 @@ class Shown:
 
 
 def legend_of(
-    name: str, having: Sequence[Shown], skinning: Skinning, figures: Sequence[Figure]
+    name: str, having: Sequence[ColoredFigure], skinning: Skinning, figures: Sequence[Figure]
 ) -> Legend:
     """Return the legend of a scalar quantity.
 
@@ -130,7 +132,7 @@ def legend_of(
     ----------
     name : str
         Name of the quantity.
-    having : sequence of Shown
+    having : sequence of ColoredFigure
         The drawn figures that have the quantity; the first figure provides title and unit.
     skinning : Skinning
         Skinning of the figures.
@@ -161,7 +163,7 @@ def _empty(name: str, skinning: Skinning, figures: Sequence[Figure]) -> Legend:
     return Legend(menu_title(split_name(name)[0], skinning), note=f"no figure has {missing[0]}")
 
 
-def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
+def _bar(name: str, title: str, shown: Sequence[ColoredFigure]) -> Legend:
     factor, unit = shown_unit(name, shown[0].figure)
     look = shown[0].look
     low = factor * min(float(one.numbers.min()) for one in shown)
@@ -177,40 +179,37 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
         unit,
         look.colors,
         () if is_flat else round_ticks(*ends, is_signed),
-        (Entry(NOTHING, "no weight"),) if look.dark_zero else (),
+        (LegendEntry(NOTHING, "no weight"),) if look.dark_zero else (),
         tuple(tenth / 10.0 for tenth in range(1, 10)) if look.isolines else (),
         "0 everywhere" if is_flat else span,
     )
 
 
-def _counts(title: str, shown: Sequence[Shown]) -> Legend:
+def _counts(title: str, shown: Sequence[ColoredFigure]) -> Legend:
     """Return the legend of a count: one block per number, starting at the lowest number present."""
     first = min(int(one.numbers.min()) for one in shown)
     colors = shown[0].look.colors[first:]
     step = -(-len(colors) // _MOST_COUNTS)
     ticks = [
-        Tick((block + 0.5) / len(colors), str(first + block))
+        LegendTick((block + 0.5) / len(colors), str(first + block))
         for block in range(len(colors))
         if (first + block) % step == 0 or len(colors) == 1
     ]
     return Legend(title, "", colors, tuple(ticks))
 
 
-def _entries(name: str, shown: Sequence[Shown]) -> tuple[Entry, ...]:
+def _entries(name: str, shown: Sequence[ColoredFigure]) -> tuple[LegendEntry, ...]:
     """Return the visible items, largest area first; equal items of several figures are merged."""
-    areas: dict[Entry, float] = {}
+    areas: dict[LegendEntry, float] = {}
     for one in shown:
         names = categories(name, one.figure)
         indices = one.numbers.astype(int)
         found = np.bincount(indices + 1, _vertex_areas(one.figure), len(names) + 1)
         for index in np.unique(indices).tolist():
             color = NOTHING if index < 0 else tuple(one.look.colors[index, :3].tolist())
-            entry = Entry(color, "no influence" if index < 0 else names[index])
+            entry = LegendEntry(color, "no influence" if index < 0 else names[index])
             areas[entry] = areas.get(entry, 0.0) + float(found[index + 1])
     return tuple(sorted(areas, key=lambda entry: -areas[entry]))
-
-
-_areas: Memo[Figure, Floats] = Memo()
 
 
 def _vertex_areas(figure: Figure) -> Floats:
@@ -225,7 +224,7 @@ def _vertex_areas(figure: Figure) -> Floats:
     return _areas.get(figure, (), make)
 
 
-def round_ticks(low: float, high: float, signed: bool = False) -> tuple[Tick, ...]:
+def round_ticks(low: float, high: float, signed: bool = False) -> tuple[LegendTick, ...]:
     """Return at most six round numbers within a range: multiples of 1, 2 or 5 times 10 to the n.
 
     Parameters
@@ -249,7 +248,7 @@ def round_ticks(low: float, high: float, signed: bool = False) -> tuple[Tick, ..
         is_plain = digits <= 4 and abs(value) < 1e6
         text = f"{value:+.{digits}f}" if is_plain else f"{value:+.3g}"
         text = text if (signed and number) or number < 0 else text[1:]
-        ticks.append(Tick((value - low) / (high - low), text if number else "0"))
+        ticks.append(LegendTick((value - low) / (high - low), text if number else "0"))
     return tuple(ticks)
 
 

@@ -100,7 +100,11 @@ class MeshPass:
         if look is not None:
             set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
-        indices = self._indices(mesh, placement, view, options, blended)
+        listed = mesh.index_set(options)
+        indices: IndexSet | SortedTriangles = listed
+        if blended and listed.is_blended:
+            indices = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
+            indices.sort(mesh, listed, (view.matrix @ placement)[2, :3])
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
         backs = None if blended else self._back_faces(mesh, placement, view, options)
@@ -165,22 +169,6 @@ class MeshPass:
             return None
         model_view = view.matrix @ placement
         return mesh.back_faces.regions(model_view, view.projection, self.context.viewport)
-
-    def _indices(
-        self,
-        mesh: PosedMesh,
-        placement: Floats,
-        view: View,
-        options: DisplayOptions,
-        blended: bool,
-    ) -> IndexSet | SortedTriangles:
-        """Return the triangles to draw; blended ones are sorted."""
-        indices = mesh.index_set(options)
-        if not (blended and indices.is_blended):
-            return indices
-        found = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
-        found.sort(mesh, indices, (view.matrix @ placement)[2, :3])
-        return found
 
     def draw_shape(
         self,

@@ -129,7 +129,7 @@ class ContactPass:
         size: float,
         axes: Floats,
         height: float,
-    ) -> Contact | None:
+    ) -> ContactShadows | None:
         """Draw and return the contact shadows of figures; None if all are far above the ground.
 
         Parameters
@@ -159,7 +159,7 @@ class ContactPass:
         halves = np.array([*(0.5 * (high - low)), 0.5 * (top - bottom)])
         _draw_depths(self._framebuffer, draw, _parallel_view(below, middle, halves))
         self._blur(size / (high - low))
-        return Contact(self._fields[1], low, high)
+        return ContactShadows(self._fields[1], low, high)
 
     def _blur(self, scale: Floats) -> None:
         """Convert depths to darkness and blur it; ``scale`` is a figure's size in the field."""
@@ -190,7 +190,7 @@ class ContactPass:
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class ContactShadows:
     """A field of contact shadows.
 
     Attributes
@@ -259,7 +259,7 @@ class GroundShadowPass:
         self._draw(program, view, places[0], places[1] - places[0], places[2] - places[0])
 
     def draw_contact(
-        self, contact: Contact, view: View, axes: Floats, height: float, strength: float
+        self, contact: ContactShadows, view: View, axes: Floats, height: float, strength: float
     ) -> None:
         """Draw contact shadows; the rows of ``axes`` are the ground's two axes and the up axis."""
         program = self.programs.drawing("patch", fragment="ground_contact")
