@@ -39,7 +39,7 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     skeleton = template.require_skeleton()
     joints = joint_matrices(template, pose)[:, :3, 3]
     pairs = []
-    for number, data in enumerate(source.data.splitlines(), start=1):
+    for line_number, data in enumerate(source.data.splitlines(), start=1):
         line = data.decode("utf-8", "replace")
         words = line.partition("#")[0].split()
         if not words:
@@ -47,13 +47,13 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         values = _floats(words if len(words) == 6 else words[-3:])
         if values is None or len(words) < 4 or (len(words) != 6 and _floats(words) is not None):
             found = {"found": printable(line.strip(), 60)}
-            raise FormatError(Diagnostic("F002.landmark", source.path, number, values=found))
+            raise FormatError(Diagnostic("F002.landmark", source.path, line_number, values=found))
         if len(values) == 6:
             pairs.append([values[:3], values[3:]])
             continue
         name = " ".join(words[:-3])
         if name not in skeleton.names:
-            raise _unknown_joint(source, number, name, template)
+            raise _unknown_joint(source, line_number, name, template)
         pairs.append([joints[skeleton.names.index(name)].tolist(), values])
     last = max(len(source.data.splitlines()), 1)
     if len(pairs) < 3:
