@@ -32,7 +32,7 @@ IMPORTED = (
     "viewer.commands.info",
     "viewer.commands.lint",
     "viewer.commands.render",
-    "viewer.commands._sequence.recording",
+    "viewer.commands.render",
     "viewer.formats.anim",
     "viewer.formats.ply",
     "viewer.formats.skel",

@@ -11,7 +11,7 @@ pytest.importorskip("scipy")
 import viewer
 from viewer.cli import run
 from viewer.commands import rig
-from viewer.commands._landmarks import read_landmarks
+from viewer.commands.rig import read_landmarks
 from viewer.errors import FormatError
 from viewer.export import export
 from viewer.formats import Source

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rig.animated import animated_leg, animation, bow, leg
 
-from viewer.commands._info.clips import animation_lines, describe_animations
+from viewer.commands._info_clips import animation_lines, describe_animations
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading import Contents, MotionSettings, begin

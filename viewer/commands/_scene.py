@@ -7,10 +7,9 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from viewer.commands._cleanup import clean_up_of
-from viewer.commands._gaps import add_gap_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
@@ -21,6 +20,7 @@ from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.cleaning_settings import CleanUp
 from viewer.models import named_files, resolve
+from viewer.phrases import printable
 from viewer.progress import report
 from viewer.rig.scene import Scene
 from viewer.rig.smpl_family import GENDERS
@@ -31,9 +31,8 @@ if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
     from viewer.rig.retargeting.joint_map import JointMap
 
-LAYOUTS = ("body19", "panoptic", "coco", "h36m")
+_LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts with the same number of points as another one."""
-
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # maximum number of names in a message
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
@@ -107,7 +106,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") 
     _add_video_arguments(group)
     group.add_argument(
         "--layout",
-        choices=LAYOUTS,
+        choices=_LAYOUTS,
         help="layout of captured keypoints, if their number is ambiguous",
     )
     group.add_argument(
@@ -371,3 +370,79 @@ def print_warnings(warnings: Iterable[str | Diagnostic], plain: str = "warning")
         if not note_found(warning, plain):
             severity = warning.severity if isinstance(warning, Diagnostic) else plain
             print(f"{'note' if severity == 'note' else 'warning'}: {warning}", file=sys.stderr)
+
+
+_ONE_SECOND = 1.0
+_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|[0-9]{1,6}(?:\.[0-9]{1,6})?s)%s)?"
+_PATTERNS = {
+    "view": _LIMIT % "",
+    "check": "interpolate",
+    "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
+}
+_WHAT = {
+    "view": "gaps in captures: interpolate all, or those of up to N frames or N seconds (2s)",
+    "check": "gaps in captures: interpolate all",
+    "write": "gaps in captures: hold the pose before the gap (at the start, the first pose), split "
+    "the file, or interpolate all or those of up to N frames or N seconds (2s), as in "
+    "interpolate:10,split (default: missing frames are omitted from EasyMocap, .obj and arrays; "
+    "other formats hold poses)",
+}
+_METAVAR = {
+    "view": "interpolate[:N|:Ns]",
+    "check": "interpolate",
+    "write": "hold|split|interpolate[:N|:Ns]",
+}
+
+
+def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
+    """Add ``--gaps``, and deprecated options for its values, which are hidden in the help.
+
+    ``group``: options of a command.
+    ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``.
+    Parsing sets ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps
+      are interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, frames as an
+      integer or seconds as a float, or None.
+    """
+    group.add_argument("--gaps", action=_Gaps, metavar=_METAVAR[use], help=_WHAT[use], const=use)
+    hidden = argparse.SUPPRESS
+    group.add_argument("--interpolate-gaps", action="store_true", help=hidden)
+    if use == "check":
+        return
+    group.add_argument("--fill-gaps", nargs="?", type=_longest, const=_ONE_SECOND, help=hidden)
+
+
+class _Gaps(argparse.Action):
+    """Parses the value of ``--gaps`` into the results of all three options."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Store the results, or raise ArgumentError."""
+        text, use = str(values), str(self.const)
+        found = re.fullmatch(_PATTERNS[use], text)
+        if found is None:
+            raise argparse.ArgumentError(
+                self, f"expected {_METAVAR[use]}, found {printable(text, 60)}"
+            )
+        parts = found.groupdict()
+        namespace.gaps = parts.get("alone") or parts.get("rest")
+        limit = parts.get("limit")
+        namespace.interpolate_gaps = limit is None and parts.get("alone") is None
+        if use != "check":
+            is_time = limit is not None and limit.endswith("s")
+            longest = float(limit[:-1]) if limit is not None and is_time else int(limit or 0)
+            namespace.fill_gaps = None if limit is None else longest
+
+
+def _longest(text: str) -> int:
+    """Return the length of the longest gap in frames."""
+    if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
+        raise argparse.ArgumentTypeError(
+            f"expected a number of frames, or no value and the files before the option, found "
+            f"{printable(text, 60)}"
+        )
+    return int(text)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from viewer.commands._cleanup import add_cleanup_arguments
+from viewer.commands._cleanup import add_cleanup_arguments, clean_up_of
 from viewer.commands._one_pose import check_frame_options
 from viewer.commands._output import inputs_of
 from viewer.commands._pose import (
     add_pose_arguments,
     add_skinning_arguments,
+    apply_pose,
     skinning_of,
     use_file_method,
 )
@@ -20,7 +23,11 @@ from viewer.commands._progress import shown_progress
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
+    motion_settings,
     open_scene,
+    print_warnings,
+    scene_files,
+    size_limit,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._writing.baked_springs import bake_springs
@@ -30,22 +37,25 @@ from viewer.commands._writing.motion_export import (
     check_kind,
     check_numbered,
     is_motion,
+    motion_options,
+    requested_frames,
     write_motions,
     writes_keys,
 )
-from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
-from viewer.commands._writing.streamed_bvh import convert_streamed
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.commands._writing.written_actors import (
     able_actors,
     left_out_notes,
     pose_or_point_actors,
 )
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
-from viewer.errors import FormatError, RigError, UnsupportedFormatError, ViewerError
+from viewer.errors import FormatError, OutputError, RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
+    MotionOptions,
+    animation_for,
     export,
     export_clips,
     export_figures,
@@ -53,17 +63,22 @@ from viewer.export import (
     files_written,
 )
 from viewer.export._motion_paths import PERSON, motion_paths
-from viewer.formats import all_or_none, check_folder_target, check_targets
+from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
 from viewer.interrupts import raising
+from viewer.loading import Contents, MotionSettings, begin
+from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import printable
 from viewer.rig.motion.own_animations import has_own_animations, own_animations
+from viewer.rig.motion.sampled_animation import SampledAnimation, frame_range
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor, upright_placement
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
-__all__ = ["add_arguments", "run"]
+if TYPE_CHECKING:
+    from viewer.formats._bvh.streaming import BvhStream
 
 _OPTIMIZED = (".glb", ".gltf", ".vrm")
 
@@ -82,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "walk_{person}.glb for a file per person",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
-    add_joint_map_argument(group)
+    _add_joint_map_argument(group)
     add_motion_arguments(parser)
     add_vrm_arguments(parser, upgrades=True)
     add_frame_arguments(parser, "A:B")
@@ -119,7 +134,7 @@ def _converted(arguments: argparse.Namespace, output: Path, skinning: Skinning) 
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    with saving_joint_map(arguments, scene), shown_progress("converting"):
+    with _saving_joint_map(arguments, scene), shown_progress("converting"):
         return [*write(arguments, scene, output, skinning), *baked]
 
 
@@ -253,3 +268,180 @@ def _write_motions(
     return write_motions(
         arguments, scene, output, skinning, lambda files: check_targets(files, inputs, force)
     )
+
+
+def _add_joint_map_argument(group: argparse._ArgumentGroup) -> None:
+    """Add ``--save-joint-map``."""
+    group.add_argument(
+        "--save-joint-map",
+        metavar="FILE",
+        help="also write which joint of the motion drives each joint of the figure, as a text file "
+        "for --joint-map (in a batch, a template such as maps/{stem}.txt)",
+    )
+
+
+@contextmanager
+def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[None]:
+    """Write the requested joint map before the block; remove it if the block fails.
+
+    ``arguments``: arguments of ``convert``.
+    ``scene``: the opened scene.
+    Raises OutputError if a file may not be written, RigError if no motion drives a figure.
+    """
+    if arguments.save_joint_map is None:
+        yield
+        return
+    from viewer.formats._text.joint_map import joint_map_text
+    from viewer.media.saving import save_text
+    from viewer.rig.retargeting.driven_clip import full_map
+
+    texts: dict[str, Actor] = {}
+    for actor in scene.actors:
+        if actor.drive is not None:
+            titles = actor.drive.motion.figure.name, actor.figure.name
+            texts.setdefault(joint_map_text(full_map(actor.drive, actor.figure), titles), actor)
+    if not texts:
+        raise RigError(
+            "--save-joint-map: expected a motion that drives a figure with different joints, found "
+            "none"
+        )
+    files = motion_paths(Path(arguments.save_joint_map), [*texts.values()])
+    check_targets(files, inputs_of(arguments, scene), arguments.force)
+    output = Path(arguments.output)
+    if output.suffix and "{frame" not in output.name:
+        check_targets([*files, output], (), force=True)  # the files must be different
+    with all_or_none(files):
+        for file, text in zip(files, texts, strict=True):
+            save_text(file, text)
+        yield
+
+
+_PEEK = 1 << 16  # bytes that identify the format
+_LARGE = 8_000_000  # bytes; smaller files are read as a whole
+
+# Options that involve other files, or pose the figure.
+_OTHERS = (
+    "body",
+    "model",
+    "motion",
+    "joint_map",
+    "save_joint_map",
+    "video",
+    "images",
+    "hands",
+    "pose",
+    "shape",
+    "expression",
+    "dof",
+    "mirror",
+)
+
+
+def convert_streamed(
+    arguments: argparse.Namespace, output: Path, skinning: Skinning
+) -> list[Diagnostic] | None:
+    """Convert a long, regular file part by part; print warnings and return the notes.
+
+    ``arguments``: arguments of ``convert``.
+    ``output``: the requested file, which may be replaced.
+    ``skinning``: the requested method.
+    Returns None, and leaves the file unchanged, if the files or options need the whole motion in
+    memory.
+    """
+    if not _is_streamable(arguments, output):
+        return None
+    from viewer.export.bvh.streaming import Parts, export_parts
+    from viewer.formats._bvh.streaming import Irregular
+
+    try:
+        options = motion_options(arguments, skinning)
+        request = _opened(arguments, options)
+    except ViewerError:
+        return None  # reading the whole file finds and reports what is wrong
+    if request is None:
+        return None
+    first, stop = request.span
+    options.world_up = request.up
+    moves = request.stream.may_move_inner_joints
+    animation = Parts(lambda: request.parts(options), stop - first, moves)
+    try:
+        with shown_progress("converting"), raising():
+            notes = export_parts(animation, output, options)
+    except (Irregular, FormatError, RigError):
+        return None
+    except OutputError:
+        print_warnings(request.warnings)
+        raise
+    print_warnings(request.warnings)
+    return notes
+
+
+def _is_streamable(arguments: argparse.Namespace, output: Path) -> bool:
+    """Return whether the options can be applied to parts, and the output is a ``.bvh`` file."""
+    given = [name for name in _OTHERS if getattr(arguments, name)]
+    # Frame 0 and time 0 are values, too.
+    given += [
+        name for name in ("frame", "time", "model_path") if getattr(arguments, name) is not None
+    ]
+    if given or arguments.springs == "on" or not clean_up_of(arguments).is_empty:
+        return False
+    if arguments.kind not in (None, "bvh") or len(arguments.files) != 1:
+        return False
+    is_file = not is_stdout(output) and (output.is_file() or not output.exists())
+    is_pattern = "{frame" in output.name or PERSON in output.name
+    return is_file and output.suffix.lower() == ".bvh" and not is_pattern
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Request:
+    """A file that can be streamed, and a scene with its figure."""
+
+    stream: BvhStream
+    settings: MotionSettings
+    scene: Scene
+    warnings: list[str | Diagnostic]
+    span: tuple[int, int]
+    up: str
+
+    @property
+    def actor(self) -> Actor:
+        return self.scene.actors[0]
+
+    def parts(self, options: MotionOptions) -> Iterator[SampledAnimation]:
+        """Yield the requested frames."""
+        first, stop = self.span
+        for clip in self.stream.clips(first, stop):
+            motion = as_asked(replace(self.stream.motion, clip=clip), self.settings)
+            actor = replace(self.actor, clip=motion.clip)
+            part = animation_for("bvh", options, self.scene, actor)[0]
+            yield replace(part, first_frame=first)
+
+
+def _opened(arguments: argparse.Namespace, options: MotionOptions) -> _Request | None:
+    """Return the request, or None if the file must be read as a whole."""
+    from viewer.formats._bvh.streaming import open_stream
+
+    source = Source.open(scene_files(arguments)[0], size_limit(arguments))
+    path = source.path
+    if source.is_folder or path.suffix.lower() != ".bvh" or path.stat().st_size < _LARGE:
+        return None
+    settings = motion_settings(arguments)
+    head = Source(path, source.peek(_PEEK))
+    if detect(head) != "bvh" or len(head.diagnostics):
+        return None
+    stream = open_stream(source)
+    if stream is None:
+        return None
+    contents = Contents(
+        skeleton_motions=[(path, stream.motion)],
+        diagnostics=tuple(source.diagnostics.warnings),
+        files=(path,),
+        used_options=set(),
+    )
+    scene, _ = begin(contents, settings)
+    warnings = [*scene.diagnostics, *apply_pose(scene, arguments)]
+    actor = scene.actors[0]
+    assert isinstance(actor.clip, SampledClip)  # that of the stream
+    span = frame_range(actor.clip, actor.clip.timing.frame_rate, requested_frames(arguments, actor))
+    up = animation_for("bvh", options, scene, actor, frames=(0, 1))[1]
+    return _Request(stream, settings, scene, warnings, span, up)

@@ -8,33 +8,35 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TextIO
 
 from viewer.commands._diff.inputs import input_files
-from viewer.commands._diff.pairs import Pairing, pair_actors
-from viewer.commands._diff.picture import Heat, heat_of, save_heat
-from viewer.commands._diff.report import Compared, json_data, lines_of, table_of
 from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
+from viewer.commands._printing import table_lines
 from viewer.commands._progress import Progress
 from viewer.commands._scene import add_animation_argument, print_warnings
 from viewer.commands._sequence.frame_numbers import parse_range
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase, described
 from viewer.diagnostics.record import is_recorded, note_values
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
-from viewer.phrases import printable
-from viewer.rig.comparison import Difference, compare
+from viewer.phrases import printable, rounded
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.annotations import VertexField
+from viewer.rig.arrays import Bytes
+from viewer.rig.comparison import Difference, Measure, compare
 from viewer.rig.comparison.steps import FrameRange
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.motion.clip import Clip, suits
+from viewer.rig.scalars import length_unit
+from viewer.rig.scene import Actor, Motion, Scene, figure_pose
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
 from viewer.streams import require_stdout, summary_stream
-
-__all__ = ["add_arguments", "run"]
 
 _DIFFERS = 1  # exit code if there are differences
 _UNREADABLE = 2
@@ -119,8 +121,8 @@ def run(arguments: argparse.Namespace) -> int:
     reference = open_one(arguments.reference)
     print_warnings(reference.diagnostics)
     skinning = skinning_of(arguments)
-    rows: list[Compared] = []
-    heats: list[Heat] = []
+    rows: list[_Compared] = []
+    heats: list[_Heat] = []
     inputs = [*_inputs(arguments), *reference.files]
     for name in arguments.files:
         try:
@@ -128,7 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
             inputs += other.files
             row, heat = _compared(name, reference, other, skinning, arguments.poses, frames)
         except ViewerError as problem:
-            row, heat = Compared(name, error=printable(problem, 500)), None
+            row, heat = _Compared(name, error=printable(problem, 500)), None
         rows.append(row)
         heats += [] if heat is None else [heat]
     stream = sys.stdout if output is None else summary_stream(output)
@@ -136,7 +138,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets([output], inputs, arguments.force)
     _print(arguments, rows, stream)
     if output is not None:
-        summary = save_heat(heats, output, skinning)
+        summary = _save_heat(heats, output, skinning)
         print(summary, file=sys.stderr if arguments.json else stream)
     if any(row.error for row in rows):
         return _UNREADABLE
@@ -195,7 +197,7 @@ def _compared(
     skinning: Skinning,
     n_poses: int,
     frames: FrameRange | None,
-) -> tuple[Compared, Heat | None]:
+) -> tuple[_Compared, _Heat | None]:
     pairing = pair_actors(reference.actors, other.actors)
     is_choice = len(reference.actors) > 1 or len(other.actors) > 1
     found: list[tuple[Actor, Difference]] = []
@@ -214,11 +216,11 @@ def _compared(
             difference = replace(difference, notes=(note, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
-    row = Compared(name, differences, _lone(name, pairing), diagnostics=other.diagnostics)
-    return row, heat_of(name, found)
+    row = _Compared(name, differences, _lone(name, pairing), diagnostics=other.diagnostics)
+    return row, _heat_of(name, found)
 
 
-def _lone(name: str, pairing: Pairing) -> tuple[Diagnostic, ...]:
+def _lone(name: str, pairing: _Pairing) -> tuple[Diagnostic, ...]:
     """Return messages about actors and motions that are present in only one of the scenes."""
     sides = ((Phrase("the-reference"), pairing.first), (name, pairing.second))
     return tuple(
@@ -228,15 +230,386 @@ def _lone(name: str, pairing: Pairing) -> tuple[Diagnostic, ...]:
     )
 
 
-def _print(arguments: argparse.Namespace, rows: Sequence[Compared], stream: TextIO) -> None:
+def _print(arguments: argparse.Namespace, rows: Sequence[_Compared], stream: TextIO) -> None:
     tolerance = arguments.tolerance
     if arguments.json or is_recorded():
-        found = json_data(arguments.reference, rows, tolerance)
+        found = _json_data(arguments.reference, rows, tolerance)
         note_values(found)
     if arguments.json:
         print(json.dumps(found, indent=2, ensure_ascii=False), file=stream)
     elif len(rows) > 1:
-        print("\n".join(table_of(rows, tolerance)), file=stream)
+        print("\n".join(_table_of(rows, tolerance)), file=stream)
     else:
         print_warnings(rows[0].diagnostics)
-        print("\n".join(lines_of(rows[0], tolerance)), file=stream)
+        print("\n".join(_lines_of(rows[0], tolerance)), file=stream)
+
+
+# Ranks of clips for an actor: same name, the actor's own clip, any other clip.
+_N_RANKS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairing:
+    """Paired actors of two scenes.
+
+    Attributes
+    ----------
+    pairs : tuple of (Actor, Actor)
+        In the first scene's order; each with the motion to compare.
+    first, second : tuple of Phrase
+        Labels of everything unpaired: actors, and motions that belong only to unpaired actors.
+    """
+
+    pairs: tuple[tuple[Actor, Actor], ...]
+    first: tuple[Phrase, ...] = ()
+    second: tuple[Phrase, ...] = ()
+
+
+# Each rule is tried for all actors before the next rule.
+_RULES: tuple[Callable[[Actor, Actor], bool], ...] = (
+    lambda one, other: one.figure.name == other.figure.name and _kind(one) == _kind(other),
+    lambda one, other: one.figure.name == other.figure.name,
+    lambda one, other: _kind(one) == _kind(other),
+    lambda one, other: True,
+)
+
+
+def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> _Pairing:
+    """Pair the actors of two scenes, and the motions of paired actors.
+
+    People of captures are paired by their number. Actors with the same name are paired first, of
+    the same kind if there are several; then actors of the same kind, such as skinned figures; then
+    the remaining ones, in order. Keyframed clips are assigned to any skeleton they fit when files
+    are opened, so a clip with the same name as the other actor's clip takes precedence, then the
+    actor's own, then one assigned to an unpaired actor.
+
+    ``first``, ``second``: actors of the reference and of the other scene; not modified.
+    """
+    found: dict[int, int] = {}
+    taken: set[int] = set()
+    for rule in _RULES:
+        for index, actor in enumerate(first):
+            if index in found:
+                continue
+            open_ones = (n for n in range(len(second)) if n not in taken)
+            chosen = next((n for n in open_ones if _may_pair(rule, actor, second[n])), None)
+            if chosen is not None:
+                found[index] = chosen
+                taken.add(chosen)
+    chosen_pairs = [(first[index], second[found[index]]) for index in sorted(found)]
+    left = [actor for index, actor in enumerate(first) if index not in found]
+    other_left = [actor for index, actor in enumerate(second) if index not in taken]
+    ones, others = [one for one, _ in chosen_pairs], [other for _, other in chosen_pairs]
+    dealt, other_clips = _with_clips(others, other_left, [one.clip for one in ones])
+    dealt_ones, clips = _with_clips(ones, left, [other.clip for other in dealt])
+    return _Pairing(
+        tuple(zip(dealt_ones, dealt, strict=True)),
+        _lone_actors(left, clips),
+        _lone_actors(other_left, other_clips),
+    )
+
+
+def _may_pair(rule: Callable[[Actor, Actor], bool], one: Actor, other: Actor) -> bool:
+    return one.person == other.person and rule(one, other)
+
+
+def _kind(actor: Actor) -> tuple[bool, bool, bool]:
+    figure = actor.figure
+    return figure.skeleton is not None, figure.mesh is not None, figure.points is not None
+
+
+def _lone_actors(actors: Sequence[Actor], clips: Sequence[Clip]) -> tuple[Phrase, ...]:
+    """Return labels of unpaired clips and actors, by kind unless they have mesh and skeleton."""
+    kinds = {
+        (True, False, False): "lone-skeleton",
+        (False, True, False): "lone-mesh",
+        (False, False, True): "lone-points",
+    }
+    figures = (Phrase(kinds.get(_kind(one), "lone-figure"), name=one.name) for one in actors)
+    return (*figures, *(Phrase("lone-motion", name=clip.name) for clip in clips))
+
+
+def _with_clips(
+    actors: Sequence[Actor], lone: Sequence[Actor], partners: Sequence[Motion | None]
+) -> tuple[list[Actor], list[Clip]]:
+    """Return actors with the keyframed clips to compare, and the remaining clips.
+
+    ``actors``: the paired actors.
+    ``lone``: the unpaired actors of the same scene; their clips may belong to paired actors.
+    ``partners``: the motion of each actor's counterpart.
+    """
+    pool = [actor.clip for actor in (*actors, *lone) if isinstance(actor.clip, Clip)]
+    if not pool:
+        return list(actors), []
+    moves = [actor.clip is None or isinstance(actor.clip, Clip) for actor in actors]
+    dealt: dict[int, Clip] = {}
+    for rank in range(_N_RANKS):
+        for index, (actor, partner) in enumerate(zip(actors, partners, strict=True)):
+            if index in dealt or not moves[index]:
+                continue
+            fitting = [c for c in pool if _rank(c, actor, partner) == rank and _suits(c, actor)]
+            if fitting:
+                # Among clips with the same name, the actor's own comes first.
+                dealt[index] = next((c for c in fitting if c is actor.clip), fitting[0])
+                pool.remove(dealt[index])
+    found = [
+        _moved_by(actor, dealt.get(index)) if moves[index] else actor
+        for index, actor in enumerate(actors)
+    ]
+    return found, pool
+
+
+def _rank(clip: Clip, actor: Actor, partner: Motion | None) -> int:
+    """Return the rank of a clip's match with the other motion: 0 is best, ``_N_RANKS`` no match."""
+    if isinstance(partner, Clip) and clip.name == partner.name:
+        return 0
+    if clip is actor.clip:
+        return 1
+    return _N_RANKS if partner is None else _N_RANKS - 1
+
+
+def _suits(clip: Clip, actor: Actor) -> bool:
+    return actor.figure.skeleton is not None and suits(clip, actor.figure.skeleton)
+
+
+def _moved_by(actor: Actor, clip: Clip | None) -> Actor:
+    """Return an actor with a clip, or in its current pose if there is none."""
+    if clip is actor.clip:
+        return actor
+    return replace(actor, clip=clip, pose=figure_pose(actor.figure))
+
+
+@dataclass(frozen=True, slots=True)
+class _Compared:
+    """Comparison of one input with the reference.
+
+    Attributes
+    ----------
+    name : str
+        The argument as given.
+    differences : tuple of (str, Difference)
+        One per actor, with the actor's name in the reference.
+    mismatches : tuple of Diagnostic
+        Actors without a counterpart, and the scene that contains them.
+    error : str
+        Reason why the input could not be opened; empty if it was.
+    diagnostics : tuple of Diagnostic
+        Warnings of the file readers.
+    """
+
+    name: str
+    differences: tuple[tuple[str, Difference], ...] = ()
+    mismatches: tuple[Diagnostic, ...] = ()
+    error: str = ""
+    diagnostics: tuple[Diagnostic, ...] = field(default=())
+
+    def exceeds(self, tolerance: float) -> bool:
+        """Return whether anything differs by more than the tolerance or was not compared."""
+        parts = (difference.exceeds(tolerance) for _, difference in self.differences)
+        return bool(self.error or self.mismatches or not self.differences) or any(parts)
+
+
+def _amount(value: float, kind: str, difference: Difference) -> str:
+    """Return a number as text: lengths in millimetres or as a fraction of the size."""
+    if kind == "angle":
+        return f"{rounded(math.degrees(value), 4)}\N{DEGREE SIGN}"
+    if kind == "weight":
+        return rounded(value, 4)
+    if difference.unit in METRES:
+        metres = METRES[difference.unit] * value
+        return f"{rounded(metres, 4)} m" if metres >= 1.0 else f"{rounded(1000.0 * metres, 4)} mm"
+    percent = 100.0 * value / difference.size if difference.size > 0.0 else math.nan
+    return f"{rounded(value, 4)} ({rounded(percent)} % of the size)"
+
+
+def _lines_of(compared: _Compared, tolerance: float | None) -> list[str]:
+    """Return the lines of one comparison."""
+    lines = [f"{printable(compared.name, 300)}:"]
+    if compared.error:
+        return [*lines, f"  could not be compared: {compared.error}"]
+    lines += [f"  {text}" for text in compared.mismatches]
+    many = len(compared.differences) > 1 or bool(compared.mismatches)
+    for name, difference in compared.differences:
+        if many:
+            lines.append(f"  {printable(name)}:")
+        lines += [f"    differs: {text}" for text in difference.mismatches]
+        lines += [f"    note: {text}" for text in difference.notes]
+        lines += [_line(measure, difference) for measure in difference.measures]
+        if not difference.measures:
+            lines.append("    nothing in common to compare")
+    if tolerance is not None:
+        verdict = "differs by more than" if compared.exceeds(tolerance) else "within"
+        lines.append(f"  {verdict} the tolerance of {tolerance:g}")
+    return lines
+
+
+def _line(measure: Measure, difference: Difference) -> str:
+    most = _amount(measure.maximum, measure.kind, difference)
+    mean = _amount(measure.mean, measure.kind, difference)
+    place = ", ".join(filter(None, (printable(measure.item), measure.step)))
+    where = f" ({place})" if measure.maximum > 0.0 else ""
+    return f"    {measure.name}: at most {most}{where}, mean {mean}"
+
+
+_COLUMNS = {
+    "joints": ("joint positions", "captured points"),
+    "orientations": ("joint orientations",),
+    "vertices": ("vertices", "surface, from the first", "surface, from the second"),
+    "weights": ("weights",),
+}
+
+
+def _table_of(rows: Sequence[_Compared], tolerance: float | None) -> list[str]:
+    """Return one line per comparison: the largest differences over all its actors."""
+    heads = ["", *_COLUMNS, "result"]
+    table = [heads, *([printable(row.name, 60), *_cells(row, tolerance)] for row in rows)]
+    return table_lines(table, right=range(1, len(heads) - 1))
+
+
+def _cells(row: _Compared, tolerance: float | None) -> list[str]:
+    cells = []
+    for names in _COLUMNS.values():
+        found = [
+            (measure, difference)
+            for _, difference in row.differences
+            for measure in difference.measures
+            if measure.name in names
+        ]
+        # Relative to each reference's size, because figures in a scene may have different units.
+        worst = max(found, key=lambda pair: pair[0].relative(pair[1].size), default=None)
+        cells.append("-" if worst is None else _amount(worst[0].maximum, worst[0].kind, worst[1]))
+    count = len(row.mismatches) + sum(len(d.mismatches) for _, d in row.differences)
+    result = [row.error] if row.error else []
+    if not row.error and tolerance is not None:
+        result.append("DIFFERS" if row.exceeds(tolerance) else "within")
+    if count:
+        result.append(f"{count} mismatch{'es' if count > 1 else ''}")
+    return [*cells, ", ".join(result)]
+
+
+def _json_data(
+    reference: str, rows: Sequence[_Compared], tolerance: float | None
+) -> dict[str, object]:
+    """Return the whole report as JSON data; lengths in the reference's unit, angles in radians."""
+    return {
+        "reference": reference,
+        "tolerance": tolerance,
+        "comparisons": [
+            {
+                "name": row.name,
+                "error": row.error or None,
+                "within": None if tolerance is None else not row.exceeds(tolerance),
+                "mismatches": [str(found) for found in row.mismatches],
+                "warnings": [str(found) for found in row.diagnostics],
+                "diagnostics": [described(found) for found in (*row.diagnostics, *row.mismatches)],
+                "actors": [_actor(name, difference) for name, difference in row.differences],
+            }
+            for row in rows
+        ],
+    }
+
+
+def _actor(name: str, difference: Difference) -> dict[str, object]:
+    return {
+        "name": name,
+        "size": difference.size,
+        "unit": difference.unit or None,
+        "mismatches": [str(found) for found in difference.mismatches],
+        "notes": [str(found) for found in difference.notes],
+        "diagnostics": [described(found) for found in (*difference.mismatches, *difference.notes)],
+        "measures": [
+            {
+                "name": measure.name,
+                "kind": measure.kind,
+                "maximum": measure.maximum,
+                "mean": measure.mean,
+                "relative": measure.relative(difference.size),
+                "step": measure.step or None,
+                "item": measure.item,
+                "compared": measure.n_compared,
+                "maxima": dict(zip(measure.items, measure.item_maxima.tolist(), strict=True))
+                if measure.items
+                else None,
+            }
+            for measure in difference.measures
+        ],
+    }
+
+
+_SIZE = (1280, 960)
+_SHEET = (2400, 1800)
+_COLORED = ("vertices", "surface, from the first")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Heat:
+    """Heat map of the reference, coloured by its distance to another figure.
+
+    Attributes
+    ----------
+    actors : tuple of Actor
+        Actors in the pose with the largest distance, with the field ``difference``.
+    most : float
+        The largest distance, in the unit of the legend.
+    """
+
+    actors: tuple[Actor, ...]
+    most: float
+
+
+def _heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> _Heat | None:
+    """Return the heat map of a comparison; None if no mesh was compared.
+
+    ``name``: name of the compared files, for the legend.
+    ``posed``: the reference's actors in their worst poses.
+    """
+    actors, most = [], 0.0
+    for actor, difference in posed:
+        measure = next((one for one in difference.measures if one.name in _COLORED), None)
+        if measure is None:
+            continue
+        title = f"Distance of {printable(Path(name.split('+')[0]).name or name, 40)}"
+        field = VertexField("difference", title, measure.item_maxima, "length")
+        figure = replace(actor.figure, fields=(field,))
+        pose = None if actor.pose is None else actor.pose.copy()
+        actors.append(Actor(figure, pose))
+        most = max(most, length_unit(figure)[0] * measure.maximum)
+    return _Heat(tuple(actors), most) if actors else None
+
+
+def _save_heat(heats: Sequence[_Heat], output: Path, skinning: Skinning) -> str:
+    """Write one image, a sheet with a common scale for several heat maps; return a summary line.
+
+    Raises ViewerError if there is nothing to colour, or too many heat maps for one sheet.
+    Raises OutputError if it cannot be written.
+    """
+    from viewer.media.picture_sinks import SheetSink
+    from viewer.rendering.offscreen import render
+
+    if not heats:
+        raise ViewerError(f"{printable(output, 300)}: no common mesh to colour")
+    most = max(heat.most for heat in heats)
+    options = DisplayOptions(
+        shading="scalar",
+        scalar="field:difference",
+        scalar_range=(0.0, most) if most > 0.0 else None,
+        legend=True,
+        grid=False,
+        skinning=skinning,
+    )
+    size = _SIZE if len(heats) == 1 else _SHEET
+    sink = SheetSink(output, size, range(1, len(heats) + 1))
+    for number, heat in enumerate(heats):
+        pixels = render(Scene(list(heat.actors)), sink.cell, None, options)
+        if len(heats) == 1:
+            return _save_one(output, pixels)
+        sink.write(number, pixels)
+    sink.close()
+    return f"{printable(output)}: {len(heats)} heat maps with a common scale"
+
+
+def _save_one(output: Path, pixels: Bytes) -> str:
+    from viewer.formats import save_image
+
+    save_image(output, pixels)
+    return f"{printable(output)}: the largest distance at each vertex"

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.commands._info.body_models import describe_model, model_lines
-from viewer.commands._info.materials import describe_surface, surface_words
 from viewer.commands._pose import add_skinning_arguments, skinning_of, use_file_method
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
 from viewer.diagnostics.record import note_values
 from viewer.phrases import counted, listed, printable, rounded
+from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size, flat_triangles
 from viewer.rig.number_text import number_text
+from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor, Scene, actor_points, scene_unit
+from viewer.rig.shape import shaped
 from viewer.rig.skeleton import (
     DOF_KINDS,
     Skeleton,
@@ -26,17 +28,16 @@ from viewer.rig.skeleton import (
     shown_joints,
     shown_parents,
 )
-from viewer.rig.skinning import Skinning
+from viewer.rig.skinning import METHODS, PURE, Skinning
 
 if TYPE_CHECKING:
     from viewer.rig.blendshapes import BlendShapes
+    from viewer.rig.material import Material
     from viewer.rig.skin import Skin
 
-__all__ = ["add_arguments", "describe", "run"]
 
 # If more unlimited DOFs than this differ from 0, only their number is printed.
-MOST_FREE_DOFS = 24
-
+_MOST_FREE_DOFS = 24
 _BOX_DIGITS = 4  # digits of a size; those of the corners of a box have the same precision
 
 
@@ -62,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(found, indent=1, allow_nan=False))
     else:
         for actor, parts in zip(scene.actors, found["actors"], strict=True):
-            print("\n".join(_lines(parts) + model_lines(parts["model"], actor.figure)))
+            print("\n".join(_lines(parts) + _model_lines(parts["model"], actor.figure)))
         for heading, text in found["captures"]:
             print(f"{heading}: {text}")
         if found["cameras"]:
@@ -83,7 +84,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
     how = skinning or Skinning()
     return {
         "actors": [
-            _describe_actor(actor, scene.up) | {"model": describe_model(actor, how)}
+            _describe_actor(actor, scene.up) | {"model": _describe_model(actor, how)}
             for actor in scene.actors
         ],
         "captures": [[heading, text] for heading, text in scene.facts],
@@ -120,7 +121,7 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
 def _describe_motions(actor: Actor) -> dict[str, Any]:
     if actor.clip is None and not actor.figure.animations:
         return {}
-    from viewer.commands._info.clips import describe_animations, describe_clip
+    from viewer.commands._info_clips import describe_animations, describe_clip
 
     parts: dict[str, Any] = {}
     if actor.clip is not None:
@@ -185,7 +186,7 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
                 "name": material.name,
                 "texture": material.texture,
                 "pixels": None if material.image is None else list(material.image.shape[1::-1]),
-                **describe_surface(material),
+                **_describe_surface(material),
             }
             for material in mesh.materials
         ],
@@ -259,11 +260,11 @@ def _lines(actor: dict[str, Any]) -> list[str]:
 def _motion_lines(actor: dict[str, Any]) -> list[str]:
     lines: list[str] = []
     if "clip" in actor:
-        from viewer.commands._info.clips import clip_lines
+        from viewer.commands._info_clips import clip_lines
 
         lines += clip_lines(actor["clip"])
     if "animations" in actor:
-        from viewer.commands._info.clips import animation_lines
+        from viewer.commands._info_clips import animation_lines
 
         lines += animation_lines(actor["animations"])
     return lines
@@ -292,7 +293,7 @@ def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
         f"({skeleton['limited_dofs']} limited, {skeleton['locked_dofs']} of them locked)"
     ]
     # The many ball joints of glTF, FBX and BVH would hide everything else.
-    too_many = sum(_is_free(dof) and dof["value"] != 0.0 for dof in table) > MOST_FREE_DOFS
+    too_many = sum(_is_free(dof) and dof["value"] != 0.0 for dof in table) > _MOST_FREE_DOFS
     listed_dofs = [dof for dof in table if not _is_free(dof) or (dof["value"] and not too_many)]
     lines += [_dof_line(dof) for dof in listed_dofs]
     if left_out := len(table) - len(listed_dofs):
@@ -335,7 +336,7 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
         state = f"{pixels[0]} x {pixels[1]} pixels" if pixels else "not drawn"
         name = printable(material["name"] or "without a name")
         picture = [f"{printable(material['texture'])}, {state}"] if material["texture"] else []
-        shown = "; ".join([*picture, *surface_words(material)]) or "no picture"
+        shown = "; ".join([*picture, *_surface_words(material)]) or "no picture"
         lines.append(f"    material {name}: {shown}")
     return lines
 
@@ -369,3 +370,216 @@ def _point(values: list[float], finest: float) -> str:
     """Return coordinates as text, rounded to multiples of ``finest``, a power of ten."""
     rows = [value if finest == 0.0 else finest * round(value / finest) for value in values]
     return f"({', '.join(number_text(row, '.10g') for row in rows)})"
+
+
+_LIMITS = (4, 8)  # influences per vertex in common engines
+
+
+def _describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
+    """Return the properties of a body model as JSON data; empty for a plain rig.
+
+    ``actor``: shaped and posed.
+    ``skinning``: the skinning method and its options.
+    """
+    figure, pose = actor.figure, actor.pose
+    facts = {heading: str(fact) for heading, fact in figure.facts}
+    model: dict[str, Any] = {"facts": facts} if facts else {}
+    if figure.blend_shapes is not None:
+        shapes = figure.blend_shapes
+        model["shapes"] = [
+            {"name": name, "group": group}
+            for name, group in zip(shapes.names, shapes.groups, strict=True)
+        ]
+    if figure.mesh is not None and figure.unit == "m":
+        model["rest"] = _rest(figure, pose)
+    if pose is not None:
+        model |= _place(pose)
+        if figure.pose_layout is not None and figure.skeleton is not None:
+            from viewer.rig.posing.pose_vector import write_vector
+
+            numbers = write_vector(figure.pose_layout, figure.skeleton, pose)
+            model["own_numbers"] = numbers.tolist()
+    model |= _annotations(figure)
+    model["effects"] = _effects(figure, pose, skinning)
+    return model
+
+
+def _rest(figure: Figure, pose: Pose | None) -> dict[str, Any]:
+    from viewer.rig.inspection.measure import measure
+    from viewer.rig.skinning import deform
+
+    rest = figure if pose is None else shaped(figure, pose.shape_weights)
+    skeleton, mesh = figure.skeleton, figure.mesh
+    # A body model is at rest as it was modelled. The joints of other figures may be elsewhere at
+    # rest than where they were when the skin was attached, or be scaled.
+    if mesh is not None and skeleton is not None and figure.is_attached and not figure.pose_layout:
+        still = rest_pose(skeleton)
+        if pose is not None:
+            still.shape_weights = pose.shape_weights
+        positions, _ = deform(figure, still)
+        rest = replace(rest, mesh=replace(rest.mesh or mesh, positions=positions))
+    found = measure(rest)
+    return {"height": found.height, "volume": found.volume, "mass": found.mass}
+
+
+def _place(pose: Pose) -> dict[str, Any]:
+    return {
+        "shape_weights": pose.shape_weights.tolist(),
+        "figure_translation": pose.figure_translation.tolist(),
+        "figure_scale": pose.figure_scale,
+    }
+
+
+def _annotations(figure: Figure) -> dict[str, Any]:
+    parts: dict[str, Any] = {}
+    if figure.body_parts is not None:
+        names = figure.body_parts.names
+        counts = np.bincount(figure.body_parts.of_vertex, minlength=len(names))
+        parts["body_parts"] = dict(zip(names, counts.tolist(), strict=True))
+    if figure.keypoints is not None:
+        parts["keypoints"] = list(figure.keypoints.names)
+    if figure.reduced is not None:
+        parts["reduced"] = {
+            "vertices": len(figure.reduced.vertices),
+            "triangles": len(figure.reduced.triangles),
+        }
+    if figure.symmetry is not None:
+        from viewer.rig.retargeting.mirror import asymmetry
+
+        parts["asymmetry"] = float(asymmetry(figure).max())
+    return parts
+
+
+def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str, float]:
+    """Return the largest difference between skinning options in this pose, for each option."""
+    if not figure.is_attached or pose is None:
+        return {}
+    from viewer.rig.scalars import compute, strongest
+
+    effects: dict[str, float] = {}
+    for count in sorted({*_LIMITS, skinning.max_influences} - {0}):
+        if strongest(figure) > count:
+            pruned = Skinning(max_influences=count, correctives=skinning.correctives)
+            largest = float(compute("pruning", figure, pose, pruned).max())
+            effects[f"pruned to {count} influences"] = largest
+    for name, text in (("normalized", "normalised weights"), ("correctives", "pose correctives")):
+        effects[text] = float(compute(name, figure, pose, skinning).max())
+    first, *others = (METHODS[name].short for name in PURE)
+    effects[f"{' or '.join(others)} against {first}"] = float(
+        compute("methods", figure, pose, skinning).max()
+    )
+    return {text: value for text, value in effects.items() if value > 0.0}
+
+
+def _model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
+    """Return the description as lines of text."""
+    lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
+    if "rest" in model:
+        rest = model["rest"]
+        solid = "open mesh without a volume"
+        if rest["volume"] is not None:
+            litres = 1000.0 * rest["volume"]
+            solid = f"{litres:.2f} litres" if litres < 1000.0 else f"{rounded(rest['volume'])} m3"
+            # The density of people says nothing about other figures.
+            if figure.pose_layout is not None:
+                solid += f", {rest['mass']:,.1f} kg at 985 kg/m3"
+        lines.append(f"  rest       {rest['height']:.3f} m high, {solid}")
+    if any(model.get("shape_weights", [])):
+        weights = ", ".join(number_text(weight) for weight in model["shape_weights"])
+        lines.append(f"  shape      {weights}")
+    if "body_parts" in model:
+        counts = ", ".join(f"{printable(n)} {c}" for n, c in model["body_parts"].items())
+        lines.append(f"  parts      {counts}")
+    if "reduced" in model:
+        reduced = model["reduced"]
+        lines.append(
+            f"  reduced    {counted(reduced['vertices'], 'vertex')}, "
+            f"{counted(reduced['triangles'], 'triangle')}"
+        )
+    if "keypoints" in model:
+        lines.append(f"  keypoints  {len(model['keypoints'])}")
+    if "asymmetry" in model:
+        size = _length(figure, model["asymmetry"])
+        lines.append(f"  symmetry   left and right differ by {size}")
+    for text, value in model.get("effects", {}).items():
+        lines.append(f"  effect     {text}: up to {_length(figure, value)} in this pose")
+    return lines
+
+
+def _length(figure: Figure, value: float) -> str:
+    from viewer.rig.scalars import length_text
+
+    return length_text(figure, value)
+
+
+def _facts(model: dict[str, Any]) -> list[tuple[str, str]]:
+    return list(model.get("facts", {}).items())
+
+
+def _describe_surface(material: Material) -> dict[str, Any]:
+    """Return the properties of a material other than one opaque texture."""
+    if material.is_plain:
+        return {}
+    maps = {
+        name.removesuffix("_texture"): texture.name
+        for name, texture in material.textures.items()
+        if name != "base_texture"
+    }
+    color = None if material.base_color is None else list(material.base_color)
+    surface: dict[str, Any] = {"base_color": color, "maps": maps, "alpha": material.alpha_mode}
+    if material.is_physical:
+        surface |= {"metallic": material.metallic, "roughness": material.roughness}
+    if material.shade_color is not None:
+        surface["toon"] = _describe_toon(material)
+    return surface
+
+
+def _describe_toon(material: Material) -> dict[str, Any]:
+    """Return the shade, rim light and outline of a toon material; None for what it lacks."""
+    rim, outline = material.rim, material.outline
+    toon: dict[str, Any] = {
+        "shade_color": None if material.shade_color is None else list(material.shade_color),
+        "shade_range": list(material.shade_range),
+        "rim": None,
+        "outline": None,
+    }
+    if rim is not None and rim.has_effect:
+        matcap = None if rim.matcap is None else rim.matcap.name
+        toon["rim"] = {"color": list(rim.color), "power": rim.power, "matcap": matcap}
+    if outline is not None:
+        color = list(outline.color)
+        toon["outline"] = {"mode": outline.mode, "width": outline.width, "color": color}
+    return toon
+
+
+def _surface_words(material: dict[str, Any]) -> list[str]:
+    """Return the properties of ``_describe_surface`` other than one texture, as text."""
+    if "maps" not in material:
+        return []
+    words, toon = [], material.get("toon")
+    if material["base_color"] is not None:
+        words.append(f"colour {_numbers(material['base_color'])}")
+    if toon is not None:
+        words += _toon_words(toon)
+    elif "metallic" in material:
+        words.append(f"metallic {material['metallic']:.3g}, roughness {material['roughness']:.3g}")
+    words += [f"{kind} {printable(file)}" for kind, file in material["maps"].items()]
+    return words if material["alpha"] == "opaque" else [*words, f"alpha {material['alpha']}"]
+
+
+def _toon_words(toon: dict[str, Any]) -> list[str]:
+    words = [f"toon with shade colour {_numbers(toon['shade_color'])}"]
+    rim, outline = toon["rim"], toon["outline"]
+    if rim is not None:
+        matcap = f", matcap {printable(rim['matcap'])}" if rim["matcap"] else ""
+        words.append(f"rim light {_numbers(rim['color'])}{matcap}")
+    if outline is not None:
+        on_screen = outline["mode"] == "screen"
+        width = f"{100.0 * outline['width']:.3g} %" if on_screen else f"{outline['width']:.3g} m"
+        of = " of the picture's height" if on_screen else ""
+        words.append(f"outline {width}{of}, colour {_numbers(outline['color'])}")
+    return words
+
+
+def _numbers(values: list[float]) -> str:
+    return " ".join(f"{value:.3g}" for value in values)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import re
+import string
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import add_cleanup_arguments
+from viewer.commands._numbers import number
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, use_file_method
 from viewer.commands._scalar import choose_subject, scalar_text
@@ -16,8 +20,7 @@ from viewer.commands._scene import (
     open_scene,
     print_warnings,
 )
-from viewer.commands._sequence.frame_numbers import add_frame_arguments
-from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
+from viewer.commands._sequence.frame_numbers import add_frame_arguments, parse_range
 from viewer.commands._view import (
     VIEWS,
     add_camera_arguments,
@@ -33,7 +36,7 @@ from viewer.commands._view import (
 )
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
-from viewer.interrupts import deferred
+from viewer.interrupts import deferred, hold, poll
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
@@ -45,9 +48,10 @@ from viewer.rig.scene import Scene, scene_points
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
-    from viewer.commands._sequence.shots import Request
-
-__all__ = ["add_arguments", "run"]
+    from viewer.commands._sequence.shots import Request, Shots
+    from viewer.media.picture_sinks import PictureSink, SheetSink
+    from viewer.media.video import VideoSink
+    from viewer.rendering.recorder import Recording
 
 _SIZE = "1280x720"
 _OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
@@ -61,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_capture_arguments(parser, gaps="view")
     add_cleanup_arguments(parser)
     add_frame_arguments(parser, "A:B[:STEP]")
-    add_sequence_arguments(parser)
+    _add_sequence_arguments(parser)
     add_pose_arguments(parser)
     add_camera_arguments(parser)
     add_display_arguments(parser)
@@ -100,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
     size = parse_size(_SIZE if arguments.size is None else arguments.size)
     output = Path(arguments.output)
     _check_suffix(arguments, output)
-    request = request_of(arguments, output)
+    request = _request_of(arguments, output)
     if request is None or request.kind != "pictures":
         check_targets([output], inputs_of(arguments), arguments.force)
     options = display_of(arguments)
@@ -121,7 +125,7 @@ def run(arguments: argparse.Namespace) -> int:
     if request is not None and request.kind == "onion":
         _draw_onion(request, arguments, scene, options, size)
     elif request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
-        line = draw_sequence(request, arguments, scene, options, size)
+        line = _draw_sequence(request, arguments, scene, options, size)
         print(line, file=summary_stream(output))
     else:
         _draw_still(arguments, scene, options, size)
@@ -288,3 +292,299 @@ def _grid_step(points: Floats) -> float:
     from viewer.rendering.passes.ground_pass import grid_step
 
     return grid_step(bounding_box(points))
+
+
+_FIELD = re.compile(r"\{frame[:!}]")
+_MOST_CELLS = 1000
+_MOST_POSES = 100
+_NARROW, _WIDE = 0.4, 2.5  # aspect ratios of the cells of contact sheets
+
+
+def _add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of videos, numbered images and contact sheets."""
+    group = parser.add_argument_group("videos, numbered images, contact sheets")
+    group.add_argument(
+        "--turntable",
+        nargs="?",
+        const="",
+        metavar="SECONDS|DEGREESdeg",
+        help="rotate the camera once within the given number of seconds, or by the given degrees",
+    )
+    group.add_argument(
+        "--contact-sheet",
+        type=int,
+        metavar="N",
+        help="one image of N numbered frames, evenly spaced over the motion, with a common scale "
+        "and ground line",
+    )
+    group.add_argument(
+        "--onion",
+        type=int,
+        metavar="N",
+        help="one image of N poses, each at its position, evenly spaced over the motion, with "
+        "earlier poses fainter",
+    )
+    group.add_argument(
+        "--speed",
+        type=number,
+        metavar="S",
+        help="playback speed of videos: 0.5 is half as fast, -1 backwards",
+    )
+    group.add_argument(
+        "--follow",
+        metavar="NAME",
+        help="follow an actor or joint with the camera: fox, head, or fox/head; captured people "
+        "by number: 1 or 1:pelvis (a single picture: aim at it)",
+    )
+    group.add_argument(
+        "--video-quality",
+        type=number,
+        metavar="Q",
+        help="quality of .mp4 and .webm: 0 to 100 (default: 75)",
+    )
+
+
+def _request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
+    """Return the requested output if it is more than one still image.
+
+    Raises ViewerError if options conflict, or the name of numbered images has no frame field.
+    """
+    frames = None if arguments.frames is None else parse_range(arguments.frames)
+    turntable = None
+    if arguments.turntable is not None:
+        from viewer.commands._sequence.shots import parse_turntable
+
+        turntable = parse_turntable(arguments.turntable)
+    kind, is_certain = _kind(arguments, output)
+    _check_options(arguments, kind)
+    if not kind:
+        return None
+    if kind == "pictures":
+        _check_name(str(output))
+        _check_picture(output)
+    from viewer.commands._sequence.shots import Request
+
+    return Request(kind, output, frames, turntable, is_certain)
+
+
+def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
+    """Return the kind of output, "" for a still image, and whether the kind is certain."""
+    asks = arguments.frames is not None or arguments.turntable is not None
+    if arguments.contact_sheet is not None:
+        return "sheet", True
+    if arguments.onion is not None:
+        return "onion", True
+    if _FIELD.search(str(output)):
+        return "pictures", True
+    if output.suffix.lower() == ".gif":
+        wants = asks or arguments.follow is not None or arguments.speed is not None
+        is_still = arguments.frame is not None or arguments.time is not None or arguments.panels
+        return ("video", wants) if wants or not is_still else ("", True)
+    if output.suffix.lower() in VIDEOS:
+        return "video", True
+    return ("pictures", True) if asks else ("", True)
+
+
+def _check_options(arguments: argparse.Namespace, kind: str) -> None:
+    if kind and arguments.panels:
+        raise ViewerError("--panels: applies to single images only, not to videos or sequences")
+    if arguments.frames is not None:
+        for option in ("frame", "time"):
+            if getattr(arguments, option) is not None:
+                raise ViewerError(f"--frames and --{option}: expected one of them, found both")
+    if arguments.follow is not None and arguments.look_at is not None:
+        raise ViewerError("--follow and --look-at: expected one of them, found both")
+    _check_onion(arguments, kind)
+    for option in ("speed", "video-quality"):
+        given = getattr(arguments, option.replace("-", "_"))
+        if given is not None and kind != "video":
+            raise ViewerError(f"--{option}: applies to videos only: {', '.join(VIDEOS)}")
+    is_gif = Path(arguments.output).suffix.lower() == ".gif"
+    if arguments.video_quality is not None and is_gif:
+        raise ViewerError("--video-quality: applies to .mp4 and .webm, not to a GIF")
+    speed = arguments.speed
+    if speed is not None and not 1e-3 <= abs(speed) <= 1e3:
+        raise ViewerError(f"--speed: expected 0.001 to 1000 or their negatives, found {speed:g}")
+    cells = arguments.contact_sheet
+    if cells is not None and not 1 <= cells <= _MOST_CELLS:
+        raise ViewerError(f"--contact-sheet: expected 1 to {_MOST_CELLS} frames, found {cells}")
+    if kind == "sheet" and Path(arguments.output).suffix.lower() in (".mp4", ".webm"):
+        raise ViewerError(
+            "--contact-sheet: expected an image file name, such as .png, found a video"
+        )
+
+
+def _check_onion(arguments: argparse.Namespace, kind: str) -> None:
+    poses, suffix = arguments.onion, Path(arguments.output).suffix.lower()
+    if poses is None:
+        return
+    for option in ("contact_sheet", "turntable", "follow", "frame", "time"):
+        if getattr(arguments, option) is not None:
+            name = option.replace("_", "-")
+            raise ViewerError(f"--onion and --{name}: expected one of them, found both")
+    if not 2 <= poses <= _MOST_POSES:
+        raise ViewerError(f"--onion: expected 2 to {_MOST_POSES} poses, found {poses}")
+    if suffix in (".mp4", ".webm"):
+        raise ViewerError("--onion: expected the name of a picture, such as .png, found a video")
+
+
+def _check_name(name: str) -> None:
+    """Check the frame field of a name: ``{frame}`` or ``{frame:05}``."""
+    try:
+        fields = [part for part in string.Formatter().parse(name) if part[1] is not None]
+    except ValueError:
+        fields = []
+    is_good = fields and all(
+        field == "frame" and conversion is None and re.fullmatch(r"0?\d{0,2}d?", spec or "")
+        for _, field, spec, conversion in fields
+    )
+    if not is_good:
+        raise ViewerError(
+            "--output: expected {frame} or {frame:05} in the name of numbered images, as in "
+            f'frame_{{frame:05}}.png, found "{printable(name)}"'
+        )
+
+
+def _check_picture(output: Path) -> None:
+    """Check that numbered images do not have the suffix of a video; a GIF may be either."""
+    suffix = output.suffix.lower()
+    if suffix in VIDEOS and suffix not in PICTURES:
+        raise UnsupportedFormatError(
+            f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) for one file "
+            f"per frame, found {suffix}"
+        )
+
+
+def _draw_sequence(
+    request: Request,
+    arguments: argparse.Namespace,
+    scene: Scene,
+    options: DisplayOptions,
+    size: tuple[int, int],
+) -> str:
+    """Draw and write all frames; return a line about the written files.
+
+    Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
+    Raises OutputError if a file already exists, or cannot be written.
+    """
+    from viewer.commands._progress import Progress
+    from viewer.commands._sequence.shots import shots_of
+    from viewer.rendering.camera_views import with_cameras
+    from viewer.rendering.framing import fit_turntable, frame_motion, framed_poses, seen_aspect
+    from viewer.rendering.gpu.context import thread_graphics
+    from viewer.rendering.gpu.target import check_size
+    from viewer.rendering.offscreen import Offscreen
+    from viewer.rendering.recorder import record
+
+    shots = shots_of(request, arguments, scene)
+    outputs = _outputs(request, shots)
+    check_targets(outputs, inputs_of(arguments, scene), arguments.force)
+    recording = _recording(request, arguments, scene, shots, options)
+    points, recording.box = frame_motion(recording)
+    points = with_cameras(scene, options, points, framed_poses(recording))
+    aspect = seen_aspect(camera_of(arguments, scene, points, size), points)
+    sink = _sink(request, arguments, options, shots, outputs, size, aspect)
+    print_warnings([*shots.notes, *follow_notes(arguments, scene), *getattr(sink, "notes", [])])
+    recording.size = frame_size = getattr(sink, "cell", size)
+    recording.camera = camera_of(arguments, scene, points, frame_size)
+    if arguments.distance is None and arguments.look_at is None:
+        fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
+    title = f"drawing {printable(outputs[0].name)}"
+    hold()
+    with Offscreen(graphics=thread_graphics(arguments.gpu)) as offscreen, offscreen.context:
+        if request.kind == "sheet":
+            cells = f"cells of a contact sheet of {size[0]} x {size[1]} pixels"
+            check_size(offscreen.context, frame_size, cells)
+        steps = record(recording, offscreen.renderer, sink)
+        # The drawing is closed while the context still exists, even after an error.
+        try:
+            with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
+                for progress in steps:
+                    line.show(progress.done)
+                    if progress.done < progress.total:
+                        poll()  # after the last frame, the file may be complete at any moment
+        except BaseException:  # also Ctrl-C
+            kept = getattr(sink, "n_written", 0)
+            if kept:
+                print_warnings([f"{kept} of {len(outputs)} pictures were written, and are kept"])
+            raise
+        print_warnings(offscreen.renderer.notes)
+    return _summary(request, shots, outputs, frame_size, sink)
+
+
+def _outputs(request: Request, shots: Shots) -> list[Path]:
+    if request.kind != "pictures":
+        return [request.output]
+    pattern = str(request.output)
+    return [Path(pattern.format(frame=number)) for number in shots.numbers]
+
+
+def _sink(
+    request: Request,
+    arguments: argparse.Namespace,
+    options: DisplayOptions,
+    shots: Shots,
+    outputs: list[Path],
+    size: tuple[int, int],
+    aspect: float,
+) -> PictureSink | SheetSink | VideoSink:
+    if request.kind == "video":
+        from viewer.media.video import VideoSink
+
+        quality = 75.0 if arguments.video_quality is None else arguments.video_quality
+        is_transparent = options.background == "transparent"
+        return VideoSink(outputs[0], size, shots.rate, quality, is_transparent)
+    from viewer.media.picture_sinks import PictureSink, SheetSink
+
+    if request.kind == "sheet":
+        return SheetSink(outputs[0], size, shots.numbers, min(max(aspect, _NARROW), _WIDE))
+    return PictureSink(outputs)
+
+
+def _recording(
+    request: Request,
+    arguments: argparse.Namespace,
+    scene: Scene,
+    shots: Shots,
+    options: DisplayOptions,
+) -> Recording:
+    """Return the recording, without its camera, box and size."""
+    from viewer.rendering.camera import Camera
+    from viewer.rendering.framing import find_follow, level_shifts
+    from viewer.rendering.recorder import Recording
+
+    recording = Recording(
+        scene,
+        shots.times,
+        Camera(up=scene.up),
+        (1, 1),
+        options,
+        moves=shots.moves,
+        interpolate=arguments.interpolate_gaps,
+        turntable=shots.turntable,
+        follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
+    )
+    is_free = arguments.follow is None and arguments.view is None
+    if request.kind == "sheet" and is_free and shots.moves:
+        recording.shifts = level_shifts(recording)
+    return recording
+
+
+def _summary(
+    request: Request,
+    shots: Shots,
+    outputs: list[Path],
+    size: tuple[int, int],
+    sink: PictureSink | SheetSink | VideoSink,
+) -> str:
+    name, count = printable(outputs[0]), len(shots.times)
+    frames = "1 frame" if count == 1 else f"{count} frames"
+    pixels = f"{size[0]} x {size[1]}"
+    weight = f"{sink.n_bytes / 1e6:.2f} MB"
+    if request.kind == "video":
+        seconds, rate = count / shots.rate, f"{shots.rate:g} frames per second{shots.remark}"
+        return f"{name}: {frames}, {seconds:.3g} s, {pixels}, {rate}, {weight}"
+    if request.kind == "sheet":
+        return f"{name}: {frames} of {pixels}, {weight}"
+    last = f" to {printable(outputs[-1].name)}" if count > 1 else ""
+    return f"{name}{last}: {frames}, {shots.seconds:.3g} s, {pixels}, {weight}"

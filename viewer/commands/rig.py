@@ -14,35 +14,40 @@ from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.surface_alignment import SCALES, AlignmentSettings
 from viewer.autorig.correspondence.matching import MatchSettings
 from viewer.autorig.pipeline import transfer
-from viewer.autorig.rigged import Rigged
+from viewer.autorig.rigged import Rigged, clip_for
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
-from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
-from viewer.export import check_figure, exporter_for
+from viewer.export import MotionOptions, animation_for, check_figure, export_animation, exporter_for
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.export.vrm.meta import checked_meta
 from viewer.formats import MESHES, Source, all_or_none, check_targets
+from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import named_files, resolve
 from viewer.models.bundled import BUNDLED
-from viewer.near_names import did_you_mean
+from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import printable
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.motion.baking import baked
+from viewer.rig.motion.clip import Clip, is_course_rig
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
 from viewer.rig.posing.posed_mesh import posed_mesh
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Scene, figure_pose
+from viewer.rig.skinning import joint_matrices
 from viewer.streams import require_stdout, summary_stream
-
-__all__ = ["add_arguments", "run"]
 
 _SMOOTHING = 10  # number of iterations if --smooth has no value
 
@@ -75,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig", metavar="NAME", help="rig of the template, for Anny (default: default)"
     )
-    add_clip_argument(parser)
+    _add_clip_argument(parser)
     parser.add_argument("--view", action="store_true", help="open the result in a window")
     _add_method_arguments(parser)
     _add_alignment_arguments(parser)
@@ -185,7 +190,7 @@ def run(arguments: argparse.Namespace) -> int:
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
     settings = _settings(arguments, template, output)
-    clips = read_clips(arguments, _files(arguments), template.figure)
+    clips = _read_clips(arguments, _files(arguments), template.figure)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
     title = f"rigging {printable(target.name, 40)}"
@@ -202,7 +207,7 @@ def run(arguments: argparse.Namespace) -> int:
     _print_report(rigged, stream)
     if output is not None:
         with all_or_none(files):
-            written = [*write_rigged(rigged, output, meta), *write_clips(rigged, clips)]
+            written = [*write_rigged(rigged, output, meta), *_write_clips(rigged, clips)]
         for note in written:
             note_found(note)
         print("\n".join(map(str, written)), file=stream)
@@ -347,3 +352,152 @@ def _show(rigged: Rigged, target: Figure) -> None:
 
     result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
     show(Scene([result, Actor(target, visible=False)], world_up=rigged.figure.up))
+
+
+# Landmark files: pairs of corresponding points on two meshes.
+#
+# One pair per line: three numbers of the posed template and three of the target, or the name of a
+# joint of the template and three numbers of the target; ``#`` begins a comment::
+#
+#     0.0 1.62 0.1      0.0 162.0 9.5
+#     left_wrist        71.2 140.0 -3.0
+
+_FARTHEST = 1e9  # largest coordinate, in any unit
+_LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
+
+
+def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
+    """Read pairs of points.
+
+    ``source``: the file.
+    ``template``: figure with the joints that the file refers to.
+    ``pose``: pose of the template.
+    Returns (N, 2, 3): the template's point and the target's for each pair.
+    Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
+      if there are fewer than three pairs, or if no scale fits them.
+    """
+    skeleton = template.require_skeleton()
+    joints = joint_matrices(template, pose)[:, :3, 3]
+    pairs = []
+    for line_number, data in enumerate(source.data.splitlines(), start=1):
+        line = data.decode("utf-8", "replace")
+        words = line.partition("#")[0].split()
+        if not words:
+            continue
+        values = _floats(words if len(words) == 6 else words[-3:])
+        if values is None or len(words) < 4 or (len(words) != 6 and _floats(words) is not None):
+            found = {"found": printable(line.strip(), 60)}
+            raise FormatError(Diagnostic("F002.landmark", source.path, line_number, values=found))
+        if len(values) == 6:
+            pairs.append([values[:3], values[3:]])
+            continue
+        name = " ".join(words[:-3])
+        if name not in skeleton.names:
+            raise _unknown_joint(source, line_number, name, template)
+        pairs.append([joints[skeleton.names.index(name)].tolist(), values])
+    last = max(len(source.data.splitlines()), 1)
+    if len(pairs) < 3:
+        count = {"found": len(pairs)}
+        raise FormatError(Diagnostic("F002.landmarks", source.path, last, values=count))
+    points = np.array(pairs, dtype=np.float64)
+    own, other = np.ptp(points, axis=0).max(axis=1).tolist()
+    if not (own < _LARGEST_SCALE * other and other < _LARGEST_SCALE * own):
+        extents = {"own": own, "other": other}
+        raise FormatError(Diagnostic("F002.landmark-extents", source.path, last, values=extents))
+    return points
+
+
+def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> FormatError:
+    names = () if template.skeleton is None else template.skeleton.names
+    values = {"figure": printable(template.name, 60), "found": name, "near": name_hint(name, names)}
+    return FormatError(Diagnostic("F002.landmark-joint", source.path, line, values=values))
+
+
+def _floats(words: list[str]) -> list[float] | None:
+    found = [to_number(word.encode()) for word in words]
+    values = [value for value in found if value is not None and abs(value) < _FARTHEST]
+    return values if len(values) == len(found) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _TransferredClip:
+    """A motion of the template, and the file its transferred copy is written to.
+
+    Attributes
+    ----------
+    clip : Clip or SampledClip
+        The template's motion.
+    path : Path
+        ``.anim`` for .skel-style rigs, ``.bvh`` for other figures.
+    """
+
+    clip: Clip | SampledClip
+    path: Path
+
+
+def _add_clip_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--clip``."""
+    parser.add_argument(
+        "--clip",
+        dest="clips",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a motion of the template: it is transferred to the target, with its path scaled to "
+        "the figure, and written next to the result as NAME-FILE.anim (.skel-style rigs) or "
+        ".bvh; may be repeated",
+    )
+
+
+def _read_clips(
+    arguments: argparse.Namespace, template: list[Path], figure: Figure
+) -> list[_TransferredClip]:
+    """Return the motions named by ``--clip``, before any work is done.
+
+    ``arguments``: arguments of ``viewer rig``.
+    ``template``: the template's files.
+    ``figure``: the template.
+    Raises ViewerError if there is no output to write next to, a file contains no motion of the
+    template, or two output files would have the same name.
+    """
+    if not arguments.clips:
+        return []
+    if arguments.output is None:
+        raise ViewerError("--clip: expected -o FILE to write the motion next to, found none")
+    output = Path(arguments.output)
+    found: list[_TransferredClip] = []
+    suffix = ".anim" if is_course_rig(figure.require_skeleton()) else ".bvh"
+    for name in arguments.clips:
+        path = output.with_name(f"{output.stem}-{Path(name).stem}{suffix}")
+        if any(each.path == path for each in found):
+            raise ViewerError(f"--clip: expected different file names, found {path.stem} twice")
+        found.append(_TransferredClip(_clip_of(name, template, arguments.fps), path))
+    return found
+
+
+def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | SampledClip:
+    scene = load(*template, resolve(name), motion=MotionSettings(frame_rate=fps))
+    print_warnings(scene.diagnostics)
+    for actor in scene.actors:
+        if actor.figure.is_attached and isinstance(actor.clip, TransformClip):
+            return baked(actor.figure, actor.clip, fps)
+        if actor.figure.is_attached and isinstance(actor.clip, Clip | SampledClip):
+            return actor.clip
+    raise RigError(f"--clip: expected a motion of the template, found none in {printable(name)}")
+
+
+def _write_clips(rigged: Rigged, clips: list[_TransferredClip]) -> list[Diagnostic]:
+    """Write the template's motions for the rigged figure; return notes about the files.
+
+    ``rigged``: the result of the rig transfer.
+    ``clips``: from ``_read_clips``.
+    Raises RigError if a clip is for a different skeleton.
+    Raises OutputError if a file cannot be written.
+    """
+    notes: list[Diagnostic] = []
+    for each in clips:
+        actor = Actor(rigged.figure, figure_pose(rigged.figure), clip_for(rigged, each.clip))
+        key, options = each.path.suffix[1:], MotionOptions()
+        animation, _ = animation_for(key, options, Scene([actor]), actor)
+        notes += export_animation(animation, each.path, key, options)
+    return notes

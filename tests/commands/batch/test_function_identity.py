@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from viewer.commands._batch.functions import identity_of
+from viewer.commands._batch.calling import identity_of
 
 
 def defined(source: str) -> Any:

@@ -11,7 +11,7 @@ from formats.synthetic_smpl import model
 
 from viewer.cli import run
 from viewer.commands._cleanup import clean_up_of
-from viewer.commands._gaps import add_gap_arguments
+from viewer.commands._scene import add_gap_arguments
 from viewer.commands._usage import Parser
 from viewer.commands.convert import add_arguments
 from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay

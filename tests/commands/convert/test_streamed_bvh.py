@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from viewer.cli import run
+from viewer.commands import convert as streamed_bvh
 from viewer.commands._progress import Progress
-from viewer.commands._writing import streamed_bvh
 from viewer.formats import Source
 from viewer.formats._bvh import streaming
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.commands._diff.pairs import pair_actors
+from viewer.commands.diff import pair_actors
 from viewer.diagnostics import Phrase
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure

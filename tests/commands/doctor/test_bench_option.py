@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.commands import _benchmarks, doctor
-from viewer.commands._benchmarks import Measured, measured
+from viewer.commands import doctor
+from viewer.commands import doctor as _benchmarks
+from viewer.commands.doctor import Measured, measured
 from viewer.errors import RenderError
 
 pytestmark = pytest.mark.slow

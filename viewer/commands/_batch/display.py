@@ -15,8 +15,6 @@ from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.phrases import counted, printable
 
-__all__ = ["Display", "summary_lines"]
-
 _MINUTE = 60.0  # seconds between lines without a terminal, and over which the rate is averaged
 _MOST = 20  # maximum number of failures listed
 

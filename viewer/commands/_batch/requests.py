@@ -3,26 +3,43 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import json
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 from viewer.batching.engines import Job
-from viewer.batching.submissions import find_submissions
+from viewer.batching.execution import attempt
+from viewer.batching.inputs import is_recording
+from viewer.batching.items import Item, Result
+from viewer.batching.submissions import (
+    Submission,
+    find_submissions,
+    is_archive,
+    opened,
+    patterns_of,
+)
+from viewer.batching.tables import comparisons
 from viewer.commands._batch.jobs import JOBS, CommandJob, add_job_arguments
 from viewer.commands._batch.planning import Request
 from viewer.commands._batch.results import check_results, name_in_shard
-from viewer.commands._batch.submitted import submission_job
 from viewer.commands._diff.inputs import input_files
 from viewer.commands._scene import parse_bytes
 from viewer.commands._usage import Parser
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
+from viewer.media.unfinished import new_prefix
 from viewer.models import named_files, use_model_folder
 from viewer.phrases import listed, printable
 from viewer.rig.smpl_family import GENDERS
 from viewer.version import VERSION
-
-__all__ = ["request_of"]
 
 _NOT_RESULTS = ("files", "output", "force", "model_path", "json")
 """Arguments that do not affect the content of the outputs."""
@@ -81,7 +98,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     check_results(name, request.table, request.overview, may_replace, output)
     job: Job = CommandJob(name, command, tuple(fixed), tuple(request.shared))
     if name == "diff":
-        job = submission_job(job, command.reference, arguments.expect)
+        job = _submission_job(job, command.reference, arguments.expect)
     return request, job
 
 
@@ -145,3 +162,85 @@ def _files_in(command: argparse.Namespace) -> Iterator[str]:
                 for gender in ("", *GENDERS) if name == "model" else ("",):
                     found = named_files(text, gender)
                     yield from (str(path) for path in found if os.path.isfile(path))
+
+
+@dataclass(frozen=True)
+class _SubmissionJob:
+    """A job that opens submissions; files and recordings are passed on.
+
+    ``job``: compares the files.
+    ``expected``, ``alike``: patterns of the files; see ``choose``.
+    ``temporary``: folder for unpacked files, which is removed when the batch ends, even if a worker
+      was killed.
+    """
+
+    job: Job
+    expected: tuple[str, ...]
+    alike: tuple[str, ...]
+    temporary: str
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item in this process."""
+        result = self._compared(item)
+        errors = [one["error"] for one in comparisons(result) if one.get("error")]
+        # Otherwise, the message would be about an image missing because the comparison failed.
+        return replace(result, message=printable(errors[0], 2000)) if errors else result
+
+    def _compared(self, item: Item) -> Result:
+        path = item.files[0]
+        if not is_archive(path) and (not os.path.isdir(path) or is_recording(path)):
+            return self.job(item)
+        with ExitStack() as stack:
+            entered: list[Submission] = []
+
+            def enter(_: Item) -> None:
+                # Errors caused by an archive or a full disk affect this item only.
+                one = opened(path, self.expected, self.alike, Path(self.temporary))
+                entered.append(stack.enter_context(one))
+
+            failed = attempt(item, enter)
+            if not entered:
+                return failed
+            (found,) = entered
+            files = "+".join(map(str, found.files))
+            result = replace(self.job(replace(item, files=(files,))), item=item)
+        if found.base is None:
+            return result
+        shown = (f"{found.base}{os.sep}", f"{path}/")
+        return replace(
+            result,
+            message=result.message.replace(*shown),
+            text=result.text.replace(*shown),
+            values=_replaced(result.values, *shown),
+            diagnostics=_replaced(result.diagnostics, *shown),
+        )
+
+
+def _submission_job(job: Job, reference: str, expected: list[str]) -> _SubmissionJob:
+    """Return the job of ``batch diff``.
+
+    ``job``: compares files with the reference.
+    ``reference``: the argument; without patterns, submissions need files of the same kinds.
+    ``expected``: patterns of the files in each submission.
+    """
+    alike = patterns_of(input_files(reference))
+    return _SubmissionJob(job, tuple(expected), tuple(alike), _temporary_folder())
+
+
+@cache
+def _temporary_folder() -> str:
+    """Return a folder that is removed when this process ends."""
+    folder = tempfile.mkdtemp(prefix=new_prefix(tempfile.gettempdir(), "viewer-batch"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _replaced(value: Any, old: str, new: str) -> Any:
+    """Return JSON data with a substring replaced in all strings."""
+    if isinstance(value, str):
+        return value.replace(old, new)
+    if isinstance(value, dict):
+        return {key: _replaced(one, old, new) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_replaced(one, old, new) for one in value]
+    return value
