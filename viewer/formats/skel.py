@@ -18,13 +18,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import field
-from pathlib import Path
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.formats._skel.keywords import KEYWORDS, UNLIMITED
+from viewer.formats._skel.writing import write as write
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_infinite, is_number, to_number
 from viewer.rig.arrays import Floats
@@ -81,13 +81,6 @@ def read(source: Source) -> Figure:
     source.remember("joints", lambda joint: joints[joint].start)
     skeleton, dofs = _skeleton(source, joints)
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
-
-
-def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
-    """Write a figure's skeleton; see ``viewer.formats._skel.writing``."""
-    from viewer.formats._skel import writing
-
-    return writing.write(figure, path)
 
 
 def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
