@@ -15,7 +15,7 @@ from measure import interleaved, median_ratio, report
 from PIL import Image
 
 from viewer.formats import Source
-from viewer.formats._gltf.node_file import read_nodes
+from viewer.formats.gltf import read_nodes
 from viewer.loading import load
 from viewer.rendering.offscreen import render
 from viewer.rendering.options import DisplayOptions

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from measure import interleaved, report
 
-from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeTree, Primitive
-from viewer.formats._nodes.figures import figure_group
+from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeTree, Primitive
+from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._source import Source
 
 COUNT = 100_000

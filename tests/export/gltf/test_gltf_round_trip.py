@@ -17,8 +17,8 @@ from PIL import Image
 
 import viewer
 from viewer.export import export, export_clips, export_figures
-from viewer.formats._gltf.node_file import read_nodes
 from viewer.formats._source import Source
+from viewer.formats.gltf import read_nodes
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh

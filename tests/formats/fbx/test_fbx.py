@@ -12,9 +12,9 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._fbx.contents import node_file
-from viewer.formats._fbx.message import packed, unpacked
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._scene_graph.content import NodeFile
+from viewer.formats.fbx.contents import node_file
+from viewer.formats.fbx.message import packed, unpacked
 
 needs_ufbx = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")
 
@@ -136,7 +136,7 @@ def test_failed_child_process_is_reported_on_one_line(
 def test_missing_library_is_reported_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("viewer.formats._fbx.child.find_spec", lambda name: None)
+    monkeypatch.setattr("viewer.formats.fbx.contents.find_spec", lambda name: None)
     with pytest.raises(FormatError) as caught:
         node_file(Source.open(write_strip(tmp_path)))
     assert caught.value.diagnostic is not None

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from viewer.formats import Source
-from viewer.formats._fbx.materials import materials_of
+from viewer.formats.fbx.contents import materials_of
 from viewer.media.image import encode_png
 
 GREY = encode_png(np.full((1, 1, 4), 128, dtype=np.uint8))

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.formats._fbx.contents import target_weights
+from viewer.formats.fbx.contents import target_weights
 from viewer.rig.captures.carried_view import view_in
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.instances import pose_actors

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from viewer.formats._fbx import worker
-from viewer.formats._fbx.message import unpacked
+from viewer.formats.fbx import worker
+from viewer.formats.fbx.message import unpacked
 
 
 def test_objects_of_the_library_live_until_the_process_exits(

@@ -13,8 +13,8 @@ import pytest
 
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._gltf.node_file import read_nodes
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._scene_graph.content import NodeFile
+from viewer.formats.gltf import read_nodes
 
 CODES = {"b": 5120, "B": 5121, "h": 5122, "H": 5123, "I": 5125, "f": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}

@@ -5,8 +5,8 @@ import pytest
 from formats.gltf.files import File, source_of
 
 from viewer.errors import FormatError
-from viewer.formats._gltf.accessors import Accessors
-from viewer.formats._gltf.document import open_document
+from viewer.formats.gltf.accessors import Accessors
+from viewer.formats.gltf.document import open_document
 
 
 def accessors(file: File) -> Accessors:

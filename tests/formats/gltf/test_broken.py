@@ -9,7 +9,7 @@ from formats.gltf.files import source_of, warned
 from viewer.diagnostics import Collector
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import Source, read
-from viewer.formats._gltf.node_file import read_nodes
+from viewer.formats.gltf import read_nodes
 
 
 def refusals(files: Iterable[bytes]) -> list[str]:

@@ -11,8 +11,8 @@ from formats.gltf.files import File, glb, read, refused, source_of, warned
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._gltf.json_text import parsed
-from viewer.formats._gltf.node_file import read_nodes
+from viewer.formats.gltf import read_nodes
+from viewer.formats.gltf.container import parsed
 
 TEXT = b'{"asset": {"version": "2.0"}, "nodes": [{"name": "a"}]}'
 
@@ -149,7 +149,7 @@ def test_syntax_errors_have_a_line_number() -> None:
 
 
 def test_json_above_half_a_gigabyte_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr("viewer.formats._gltf.json_text._MOST_BYTES", 50)
+    monkeypatch.setattr("viewer.formats.gltf.container._MOST_BYTES", 50)
     assert refused(TEXT) == ("F001.gltf-text", "")
     assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
 
@@ -209,7 +209,7 @@ def test_data_uris_are_decoded(uri: str) -> None:
     file.root["bufferViews"] = [{"buffer": 0, "byteLength": 8}]
     accessor = {"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR"}
     file.root["accessors"] = [accessor]
-    from viewer.formats._gltf.document import open_document
+    from viewer.formats.gltf.document import open_document
 
     document = open_document(source_of(json.dumps(file.root).encode()))
     assert document.accessors.floats(0, ("SCALAR",), "")[:, 0].tolist() == [0.0, 1.0]

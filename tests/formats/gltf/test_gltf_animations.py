@@ -12,8 +12,8 @@ from viewer.cli import run
 from viewer.diagnostics import Collector
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._gltf.node_file import read_nodes
-from viewer.formats._nodes.content import NodeChannel
+from viewer.formats._scene_graph.content import NodeChannel
+from viewer.formats.gltf import read_nodes
 
 
 def only(file: File) -> NodeChannel:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from formats.gltf.files import TRIANGLE, File, read, refused, skinned, source_of, warned
 
-from viewer.formats._gltf.node_file import read_nodes
-from viewer.formats._nodes.content import Primitive
+from viewer.formats._scene_graph.content import Primitive
+from viewer.formats.gltf import read_nodes
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
 

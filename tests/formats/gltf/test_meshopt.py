@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from formats.gltf.files import File, read, refused
 
-from viewer.formats._meshopt.attributes import decoded_attributes
-from viewer.formats._meshopt.filters import filtered
-from viewer.formats._meshopt.indices import decoded_indices, decoded_triangles
+from viewer.formats.gltf.meshopt import (
+    decoded_attributes,
+    decoded_indices,
+    decoded_triangles,
+    filtered,
+)
 
 N = np.arange(20)
 SHORTS = np.stack([N * N, -3 * N, N * 7919 % 32768, 0 * N + 5], axis=1).astype("<i2")

@@ -8,8 +8,8 @@ from formats.gltf.files import File, read, refused, source_of, warned
 
 from viewer.diagnostics import Collector
 from viewer.formats import Source
-from viewer.formats._gltf.node_file import read_nodes
-from viewer.formats._nodes.content import NodeTree
+from viewer.formats._scene_graph.content import NodeTree
+from viewer.formats.gltf import read_nodes
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 
 HALF = math.sqrt(0.5)

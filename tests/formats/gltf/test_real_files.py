@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from viewer.formats import Source
-from viewer.formats._gltf.node_file import read_nodes
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._scene_graph.content import NodeFile
+from viewer.formats.gltf import read_nodes
 
 
 def opened(folder: Path, name: str) -> NodeFile:

@@ -12,12 +12,15 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
-from viewer.formats._gltf.document import open_document
-from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness
-from viewer.formats._gltf_materials.images import DecodedImage
-from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, reading_materials
-from viewer.formats._gltf_materials.textures import Slot, transform_matrix
 from viewer.formats._source import Source
+from viewer.formats.gltf.document import open_document
+from viewer.formats.gltf.materials import (
+    DEFAULT_MATERIAL,
+    Glossiness,
+    from_glossiness,
+    reading_materials,
+)
+from viewer.formats.gltf.textures import DecodedImage, Slot, transform_matrix
 
 PIXELS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [9, 8, 7]]], dtype=np.uint8)
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from viewer.formats._gltf.document import open_document
-from viewer.formats._gltf_materials.materials import reading_materials
 from viewer.formats._source import Source
+from viewer.formats.gltf.document import open_document
+from viewer.formats.gltf.materials import reading_materials
 from viewer.rig.material import Material
 
 SHADERS = ["VRM/MToon", "VRM/UnlitTexture", "VRM_USE_GLTFSHADER", 5]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree, Primitive
+from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeSkin, NodeTree, Primitive
 from viewer.formats._source import Source
 
 Local = Mapping[int, np.ndarray]

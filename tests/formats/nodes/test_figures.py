@@ -16,8 +16,8 @@ from tests.formats.nodes.node_files import (
     vertices,
 )
 from viewer.errors import FormatError
-from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin
-from viewer.formats._nodes.figures import figure_group
+from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeSkin
+from viewer.formats._scene_graph.figures import figure_group
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.scene import figure_pose

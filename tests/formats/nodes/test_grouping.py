@@ -8,9 +8,9 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from tests.formats.nodes.node_files import file_of, mesh, skin, source, tree_of, triangle
-from viewer.formats._nodes.content import NodeAnimation, NodeCamera, NodeFile, NodeTree
-from viewer.formats._nodes.figures import figure_group
-from viewer.formats._nodes.grouping import group_nodes
+from viewer.formats._scene_graph.content import NodeAnimation, NodeCamera, NodeFile, NodeTree
+from viewer.formats._scene_graph.figures import figure_group
+from viewer.formats._scene_graph.grouping import group_nodes
 from viewer.loading.assembly import assemble
 from viewer.loading.contents import Contents
 from viewer.rig.figure_group import FigureGroup

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from viewer.formats._nodes.morph_targets import MorphTargets
+from viewer.formats._scene_graph.content import MorphTargets
 
 UP = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 2, 0]], dtype=np.float32)
 ASIDE = np.array([[1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]], dtype=np.float32)

@@ -14,10 +14,15 @@ from tests.formats.nodes.node_files import (
     triangle,
     vertices,
 )
-from viewer.formats._nodes import surfaces
-from viewer.formats._nodes.content import NodeAnimation, NodeChannel, NodeSkin, Primitive
-from viewer.formats._nodes.figures import figure_group
-from viewer.formats._nodes.morph_targets import MorphTargets
+from viewer.formats._scene_graph import surfaces
+from viewer.formats._scene_graph.content import (
+    MorphTargets,
+    NodeAnimation,
+    NodeChannel,
+    NodeSkin,
+    Primitive,
+)
+from viewer.formats._scene_graph.figures import figure_group
 from viewer.rig.material import Material
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import deform

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
-from viewer.formats._gltf_materials.textures import transform_matrix
+from viewer.formats.gltf.textures import transform_matrix
 from viewer.rig.material import Material, Outline, Rim, Texture
 from viewer.rig.material_binds import MaterialBinds
 

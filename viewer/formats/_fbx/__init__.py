@@ -1,1 +1,0 @@
-"""Reading of ``.fbx`` in a child process, and the contents that it sends."""

@@ -1,1 +1,0 @@
-"""Violations of the glTF specification that have no effect on reading, reported only by lint."""

@@ -1,1 +1,0 @@
-"""Materials of glTF files: their surfaces, textures and images."""

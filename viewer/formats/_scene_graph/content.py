@@ -1,0 +1,484 @@
+"""Contents of a file of nodes, as its reader returns them before figures are created.
+
+Nothing is converted: names, transforms, weights and keys are as in the file, in its unit and axes.
+Readers guarantee that indices are valid, numbers are finite, and the parents form a forest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import field
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Phrase
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.constraints.constraint import Constraint
+from viewer.rig.file_record import StoredTextures
+from viewer.rig.material import Material
+from viewer.rig.mesh import PartView
+from viewer.rig.motion.transform_clip import Interpolation, TransformPath
+from viewer.rig.springs.springs import Springs
+
+REACH = 1e18
+"""Largest coordinate that can be drawn: the squares of lengths must fit into single precision."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeTree:
+    """All nodes of a file, in file order, as parallel arrays.
+
+    Attributes
+    ----------
+    names : tuple of N str
+        As in the file; may repeat or be empty.
+    parents : (N,) int32
+        -1 for a root; a parent may come after its children.
+    translations, rotations, scales : (N, 3), (N, 4), (N, 3)
+        Local transform T R S; unit quaternions (x, y, z, w).
+    matrices : dict of (4, 4)
+        Local matrices of nodes that shear and therefore cannot be expressed as T R S. Their rows in
+        the three arrays above contain the identity.
+    meshes, skins, cameras : (N,) int32
+        Indices of each node's mesh, skin and camera, -1 for none.
+    shape_weights : dict of (S,)
+        Morph target weights of the nodes that override those of their mesh.
+    extras, extensions : dict
+        Application data and extensions by node, as parsed from JSON.
+    """
+
+    names: tuple[str, ...]
+    parents: Ints
+    translations: Floats
+    rotations: Floats
+    scales: Floats
+    meshes: Ints
+    skins: Ints
+    cameras: Ints
+    matrices: Mapping[int, Floats] = field(default_factory=dict)
+    shape_weights: Mapping[int, Floats] = field(default_factory=dict)
+    extras: Mapping[int, Any] = field(default_factory=dict)
+    extensions: Mapping[int, Any] = field(default_factory=dict)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, N."""
+        return len(self.names)
+
+    def with_mesh(self, mesh: int) -> list[int]:
+        """Return the nodes that show a mesh."""
+        return np.flatnonzero(self.meshes == mesh).tolist()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Primitive:
+    """Triangles with one material; no other primitive uses the vertices.
+
+    Attributes
+    ----------
+    positions : (V, 3)
+        Mesh space, file units.
+    triangles : (T, 3) int32
+        Counter-clockwise from outside.
+    normals : (V, 3) or None
+        None if the file has none: the surface is flat shaded (glTF) or smoothed by the importer.
+    uvs : tuple of (V, 2)
+        Texture coordinate sets, v = 0 at the bottom row of the image.
+    colors : (V, 4) or None
+        Linear vertex colours with opacity, which multiply the material's base colour.
+    joints, weights : (V, K) int32, (V, K) or None
+        Influences of all sets in one table: indices into the skin's joints. Weights are as
+        stored, unused slots are 0.
+    dqs_fractions : (V,) or None
+        Fraction of dual quaternion skinning of each vertex, for skins with the method ``"mix"``.
+    material : int
+        Index into ``NodeFile.materials``, -1 for none.
+    targets : MorphTargets or None
+        Offsets of the positions for each morph target of the mesh.
+    normal_targets : MorphTargets or None
+        Offsets of the normals; None if the file has none.
+    pointer : str
+        JSON pointer to it; empty for files without JSON.
+    tangents : callable or None
+        Returns the directions of u in mesh space and the signs of the directions of v, (V, 4), or
+        None if they are invalid.
+    """
+
+    positions: Floats
+    triangles: Ints
+    normals: Floats | None = None
+    uvs: tuple[Floats, ...] = ()
+    colors: Floats | None = None
+    joints: Ints | None = None
+    weights: Floats | None = None
+    dqs_fractions: Floats | None = None
+    material: int = -1
+    targets: MorphTargets | None = None
+    normal_targets: MorphTargets | None = None
+    pointer: str = ""
+    tangents: Callable[[], Floats | None] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeMesh:
+    """Primitives that share one name and one list of morph targets.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    primitives : tuple of Primitive
+        In file order; empty if the file has only points or lines.
+    target_names : tuple of S str
+        Names of the morph targets; empty strings without a name.
+    shape_weights : (S,)
+        Default weights of the morph targets.
+    extras : Any
+        Application data, as parsed from JSON; None if there is none.
+    """
+
+    name: str
+    primitives: tuple[Primitive, ...]
+    target_names: tuple[str, ...] = ()
+    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    extras: Any = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeSkin:
+    """Joints that deform meshes.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    joints : (M,) int32
+        Node of each joint.
+    inverse_bind : (M, 4, 4)
+        Mesh-to-joint matrices at bind time; identities if the file has none.
+    method : "lbs", "dqs" or "mix"
+        Skinning method requested by the file.
+    """
+
+    name: str
+    joints: Ints
+    inverse_bind: Floats
+    method: Literal["lbs", "dqs", "mix"] = "lbs"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeChannel:
+    """Keys of one property of one node; see ``viewer.rig.motion.transform_clip``.
+
+    Attributes
+    ----------
+    node : int
+        Node that moves.
+    path : str
+        ``"translation"``, ``"rotation"``, ``"scale"`` or ``"weights"``.
+    times : (N,)
+        Seconds, increasing.
+    values : (N, C)
+        C = 3, 4 (quaternions, not necessarily of unit length), 3, or S.
+    interpolation : str
+        ``"step"``, ``"linear"`` or ``"cubic"``.
+    tangents : (N, 2, C) or None
+        Incoming and outgoing slopes per second; only for ``"cubic"``.
+    """
+
+    node: int
+    path: TransformPath
+    times: Floats
+    values: Floats
+    interpolation: Interpolation = "linear"
+    tangents: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeAnimation:
+    """A named animation, whose keys are read when it is first played.
+
+    Attributes
+    ----------
+    name : str
+        As in the file; may repeat or be empty.
+    start, end : float
+        Seconds of the first and the last key.
+    nodes : frozenset of int
+        Nodes that it moves.
+    read : callable
+        Returns the channels; called at most once, may raise a ``FormatError``.
+    pointer : str
+        JSON pointer to it; empty for files without JSON.
+    extras : Any
+        Application data, as parsed from JSON; None if there is none.
+    """
+
+    name: str
+    start: float
+    end: float
+    nodes: frozenset[int]
+    read: Callable[[], tuple[NodeChannel, ...]]
+    pointer: str = ""
+    extras: Any = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeCamera:
+    """A perspective or orthographic camera that looks along -z of its node, y up.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    vertical_angle : float or None
+        Vertical field of view in radians; None for an orthographic camera.
+    aspect : float or None
+        Width divided by height, if the file specifies it.
+    height : float
+        Height of an orthographic camera's view, file units.
+    near, far : float or None
+        Distances of the clipping planes, file units; None if there is none.
+    """
+
+    name: str
+    vertical_angle: float | None
+    aspect: float | None = None
+    height: float = 0.0
+    near: float | None = None
+    far: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeExpression:
+    """A facial expression: a weighted sum of morph targets; see ``viewer.rig.expressions``.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    binds : tuple of (int, int, float)
+        Node, morph target of its mesh, and the weight of that target at weight 1.
+    is_binary : bool
+        Whether it is always either fully on or off.
+    kind : str
+        Key of ``PROCEDURAL``; empty for other expressions.
+    overrides : dict of str
+        Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
+    materials : tuple of (int, str, (4,))
+        Material, kind and target of each change of a material; see ``MaterialBinds``.
+    preset : str
+        Name in VRM 1.0; empty if there is none.
+    """
+
+    name: str
+    binds: tuple[tuple[int, int, float], ...]
+    is_binary: bool = False
+    kind: str = ""
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    materials: tuple[tuple[int, str, Floats], ...] = ()
+    preset: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeFile:
+    """Everything in a file of nodes.
+
+    Attributes
+    ----------
+    name : str
+        The file's name without its suffix.
+    tree : NodeTree
+        All nodes.
+    roots : tuple of int
+        Root nodes of the scene that is shown.
+    meshes, skins, materials, animations, cameras : tuple
+        In file order; referred to by index.
+    up : "y" or "z"
+        Up axis of the file.
+    unit : str
+        Unit of length, a key of ``viewer.rig.units.METRES``; empty if unknown.
+    extensions : dict
+        Parsed JSON of the root's extensions, such as ``VRMC_vrm``.
+    extras : Any
+        Application data of the root, as parsed from JSON; None if there is none.
+    asset : dict
+        Generator, copyright and the like.
+    scene : dict
+        Name and application data of the scene that is shown, as parsed from JSON.
+    unkept : callable
+        Returns the members of the file that are not read, such as ``images.extras``.
+    lost_nodes : tuple of str
+        Names of the nodes that are neither joints, meshes nor cameras.
+    contents : callable
+        Returns what the file holds, as parts of a message; empty if unknown.
+    humanoid : dict of int
+        Node of each human bone, by its name in VRM 1.0; empty if the file states none.
+    expressions : tuple of NodeExpression
+        Facial expressions.
+    constraints : tuple of Constraint
+        Nodes (instead of joints) that follow others, in the order of evaluation.
+    part_views : dict of PartView
+        The views in which the meshes of some nodes are drawn.
+    springs : Springs or None
+        Spring nodes (instead of joints).
+    named_nodes : frozenset of int
+        Further nodes that must become joints, because extensions refer to them.
+    toon : dict
+        Toon and unlit extensions of materials by index, as parsed from JSON.
+    textures : StoredTextures or None
+        Textures as the file lists them.
+    facts : tuple of (str, str)
+        Further properties for ``viewer info``, each a heading and a text.
+    has_pointers : bool
+        Whether elements have JSON pointers, such as ``/nodes/3``.
+    """
+
+    name: str
+    tree: NodeTree
+    roots: tuple[int, ...]
+    meshes: tuple[NodeMesh, ...] = ()
+    skins: tuple[NodeSkin, ...] = ()
+    materials: tuple[Material, ...] = ()
+    animations: tuple[NodeAnimation, ...] = ()
+    cameras: tuple[NodeCamera, ...] = ()
+    up: Literal["y", "z"] = "y"
+    unit: str = "m"
+    extensions: Mapping[str, Any] = field(default_factory=dict)
+    extras: Any = None
+    asset: Mapping[str, Any] = field(default_factory=dict)
+    scene: Mapping[str, Any] = field(default_factory=dict)
+    unkept: Callable[[], tuple[str, ...]] = tuple
+    lost_nodes: tuple[str, ...] = ()
+    contents: Callable[[], tuple[Phrase, ...]] = tuple
+    humanoid: Mapping[str, int] = field(default_factory=dict)
+    expressions: tuple[NodeExpression, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    part_views: Mapping[int, PartView] = field(default_factory=dict)
+    springs: Springs | None = None
+    named_nodes: frozenset[int] = frozenset()
+    toon: Mapping[int, Any] = field(default_factory=dict)
+    textures: StoredTextures | None = None
+    facts: tuple[tuple[str, str], ...] = ()
+    has_pointers: bool = False
+
+
+Moved: TypeAlias = tuple[NDArray[np.intp], Floats]
+
+
+class MorphTargets:
+    """Offsets of the positions or normals of V vertices for each of S morph targets.
+
+    Parameters
+    ----------
+    n_vertices : int
+        V.
+    offsets : iterable of S (V, 3) or None
+        As in the file, of any floating-point type, possibly parts of the file's bytes; None for a
+        target that moves nothing. They are converted when they are first used.
+    rows : (V,) int, optional
+        Vertices of the offsets that are used; all if omitted.
+    """
+
+    __slots__ = ("_parts", "_rows", "n_vertices")
+
+    def __init__(
+        self,
+        n_vertices: int,
+        offsets: Iterable[NDArray[Any] | None],
+        rows: NDArray[np.integer] | None = None,
+    ) -> None:
+        self.n_vertices, self._rows = n_vertices, rows
+        self._parts: list[NDArray[Any] | Moved | None] = [*offsets]
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+    def moved(self, target: int) -> Moved:
+        """Return the vertices that a target moves, and their offsets: (M,), (M, 3)."""
+        part = self._parts[target]
+        if not isinstance(part, tuple):
+            self._parts[target] = part = self._compressed(part)
+        return part
+
+    def _compressed(self, offsets: NDArray[Any] | None) -> Moved:
+        if offsets is None:
+            return np.zeros(0, dtype=np.intp), np.zeros((0, 3))
+        offsets = offsets if self._rows is None else offsets[self._rows]
+        x, y, z = offsets.T
+        vertices = np.flatnonzero((x != 0.0) | (y != 0.0) | (z != 0.0))
+        return vertices, offsets[vertices].astype(np.float64)
+
+    def weighted(self, weights: Floats) -> Floats:
+        """Return the sum of all targets, w_s d_s: (V, 3)."""
+        total = np.zeros((self.n_vertices, 3))
+        for target in np.flatnonzero(weights).tolist():
+            vertices, offsets = self.moved(target)
+            if len(vertices) == self.n_vertices:
+                total += weights[target] * offsets
+            else:
+                total[vertices] += weights[target] * offsets
+        return total
+
+    def dense(self) -> Floats:
+        """Return the offsets of all vertices: (S, V, 3)."""
+        result = np.zeros((len(self), self.n_vertices, 3))
+        for target in range(len(self)):
+            vertices, offsets = self.moved(target)
+            result[target, vertices] = offsets
+        return result
+
+
+def path_to_root(parents: Sequence[int] | Ints, node: int) -> list[int]:
+    """Return a node and its ancestors, ending with its root.
+
+    >>> path_to_root([-1, 0, 1, 0], 2)
+    [2, 1, 0]
+    """
+    path = [node]
+    while (above := int(parents[path[-1]])) >= 0:
+        path.append(above)
+    return path
+
+
+def roots_of(parents: Ints) -> Ints:
+    """Return the root of each node (N,), by pointer doubling, in O(N log N) for any depth.
+
+    >>> roots_of(np.array([-1, 0, 1, -1], dtype=np.int32)).tolist()
+    [0, 0, 0, 3]
+    """
+    above: Ints = np.where(parents < 0, np.arange(len(parents), dtype=np.int32), parents)
+    while True:
+        next_above = above[above]
+        if np.array_equal(next_above, above):
+            return above
+        above = next_above
+
+
+def descendants(parents: Ints, node: int) -> Bools:
+    """Return whether each node is a given one or below it: (N,), by pointer doubling.
+
+    >>> descendants(np.array([-1, 0, 1, 0], dtype=np.int32), 1).tolist()
+    [False, True, True, False]
+    """
+    above: Ints = np.where(parents < 0, np.arange(len(parents), dtype=np.int32), parents)
+    found: Bools = np.arange(len(parents)) == node
+    while True:
+        next_above = above[above]
+        found = found | found[above]
+        if np.array_equal(next_above, above):
+            return found
+        above = next_above
+
+
+def with_ancestors(parents: Sequence[int], nodes: Iterable[int]) -> set[int]:
+    """Return nodes and their ancestors; each node is visited once."""
+    found: set[int] = set()
+    for node in nodes:
+        while node >= 0 and node not in found:
+            found.add(node)
+            node = parents[node]
+    return found

@@ -1,0 +1,406 @@
+"""Figures made from the contents of a file of nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.formats._scene_graph.bindings import bind_rigid, bind_skins, inverse_binds
+from viewer.formats._scene_graph.content import REACH, NodeFile, with_ancestors
+from viewer.formats._scene_graph.grouping import Members, group_nodes, is_skinned, scene_order
+from viewer.formats._scene_graph.joints import Joints, make_joints, rest_worlds, skeleton_of
+from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
+from viewer.formats._scene_graph.shapes import blend_shapes_of, shape_columns
+from viewer.formats._scene_graph.surfaces import (
+    Piece,
+    mesh_of,
+    pieces_of,
+    skin_of,
+    tangents_of,
+    used_materials,
+)
+from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.figure_group import FigureGroup
+from viewer.rig.file_record import FileRecord, VrmRecord
+from viewer.rig.motion.animation import Animation
+from viewer.rig.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from viewer.formats._source import Source
+
+_MOST_VERTICES = 1 << 27
+
+
+def figure_group(file: NodeFile, source: Source) -> FigureGroup:
+    """Return the figures and cameras of a file of nodes.
+
+    Figure space is the space of the file's scene. Every relevant node is a ball joint about its
+    rest pose; see ``group_nodes`` for the division into figures.
+
+    Parameters
+    ----------
+    file : NodeFile
+        The contents, as read.
+    source : Source
+        Records notes.
+
+    Raises
+    ------
+    FormatError
+        If the file has nothing to show, or more vertices than fit into memory.
+    """
+    groups = group_nodes(file)
+    if not groups:
+        contents = file.contents()
+        if contents and not source.diagnostics.errors:
+            raise source.fault("F008.contents", contents=contents)
+        raise source.fault("F002.no-figure")
+    _check_vertices(file, groups, source)
+    readers = read_once(file.animations)
+    order = scene_order(file) if file.cameras else []
+    cameras = moved_cameras(file, groups, order)
+    written = set[int]().union(*(_above(file, own) for own in cameras))
+    file = replace(file, lost_nodes=_lost_nodes(file, groups, written))
+    found = [
+        _figure(file, members, readers, source, _above(file, own))
+        for members, own in zip(groups, cameras, strict=True)
+    ]
+    _note_normals([piece for each in found for piece in each.pieces], source)
+    _note_weights([piece for each in found for piece in each.pieces], source)
+    shown = {node for each in found for node in each.moved}
+    _note_others(file, shown | written, source)
+    _note_methods(file, groups, source)
+    carriers = [
+        Carrier(each.record, each.joints, own) for each, own in zip(found, cameras, strict=True)
+    ]
+
+    def animations(joints: Joints) -> tuple[Animation, ...]:
+        return animations_of(file.animations, readers, joints.own, {})
+
+    views, left_out = views_of(file.tree, order, file.cameras, carriers, animations)
+    if left_out:
+        source.warn("F007.orthographic", names=left_out)
+    return FigureGroup(file.name, tuple(each.figure for each in found), views)
+
+
+def _lost_nodes(file: NodeFile, groups: list[Members], written: set[int]) -> tuple[str, ...]:
+    """Return the names of the nodes that are neither joints, meshes, cameras nor above these.
+
+    ``written``: nodes above cameras that they move.
+    """
+    kept = written | {node for members in groups for node in (*members.nodes, *members.meshes)}
+    lost = [n for n in scene_order(file) if n not in kept and file.tree.cameras[n] < 0]
+    extras = file.tree.extras
+    return tuple(
+        (file.tree.names[n] or f"node {n}") + (" (with extras)" if n in extras else "")
+        for n in lost
+        if file.has_pointers
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """A figure, its record and joints, its primitives, and the nodes that move it."""
+
+    figure: Figure
+    record: FileRecord
+    joints: Joints
+    pieces: list[Piece]
+    moved: set[int]
+
+
+def _above(file: NodeFile, cameras: set[int]) -> set[int]:
+    """Return the nodes of some cameras and the nodes above them."""
+    return with_ancestors(file.tree.parents.tolist(), cameras)
+
+
+def _figure(
+    file: NodeFile, members: Members, readers: list[Reader], source: Source, beside: set[int]
+) -> _Made:
+    """Return one figure, which plays the animations of some nodes beside it, too."""
+    joints = make_joints(file.tree, members.nodes)
+    worlds = _worlds(joints, source)
+    bindings = bind_skins(joints, worlds, {index: file.skins[index] for index in members.skins})
+    bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
+    pieces = pieces_of(file, members.meshes, bindings)
+    matrices = inverse_binds(bindings)
+    _check_positions(joints, worlds, matrices, pieces, source)
+    columns = shape_columns(file, members.meshes, readers)
+    record = record_of(file, joints, members.meshes, columns, pieces)
+    figure = Figure(
+        name=members.name or file.name,
+        mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
+        skeleton=skeleton_of(joints, file.humanoid, file.constraints, file.springs),
+        skin=skin_of(file, pieces, matrices) if pieces else None,
+        up=file.up,
+        unit=file.unit,
+        blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
+        facts=_facts_of(file, pieces),
+        animations=animations_of(file.animations, readers, joints.own, columns, beside),
+        record=record,
+    )
+    _remember_pointers(source, figure.skeleton, file, members, joints, pieces)
+    return _Made(figure, record, joints, pieces, joints.own.keys() | columns.keys())
+
+
+def _worlds(joints: Joints, source: Source) -> Floats:
+    """Return the rest transforms of the joints of nodes; refuse those that are out of reach."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        worlds = rest_worlds(joints)
+    far = ~(np.abs(worlds) <= REACH).all(axis=(1, 2))
+    if far.any():
+        joint = int(far.argmax())
+        found = worlds[joint].flat[int((~(np.abs(worlds[joint]) <= REACH)).argmax())]
+        raise source.fault("F003.joint-reach", joint=joints.names[joint], limit=REACH, found=found)
+    return worlds
+
+
+def _check_positions(
+    joints: Joints, worlds: Floats, inverse_bind: Floats, pieces: list[Piece], source: Source
+) -> None:
+    """Refuse vertices that the rest pose moves out of reach."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        palette = np.abs(worlds @ inverse_bind[: len(worlds)]).max(axis=(1, 2), initial=0.0)
+    palette = np.concatenate([palette, np.zeros(len(inverse_bind) - len(worlds))])
+    for piece in pieces:
+        with np.errstate(over="ignore", invalid="ignore"):
+            reach = np.abs(piece.baked).max() * np.abs(piece.primitive.positions).max(initial=1.0)
+            far = ~(reach * palette[piece.influences.joints] <= REACH)
+        if far.any():
+            joint = int(piece.influences.joints[far.argmax()])
+            name = joints.names[joint]
+            raise source.fault("F003.bind-reach", joint=name, limit=REACH)
+
+
+def _is_skinned(file: NodeFile, node: int) -> bool:
+    return is_skinned(file.meshes[int(file.tree.meshes[node])], int(file.tree.skins[node]))
+
+
+def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
+    """Refuse a file whose meshes, repeated at many nodes, would exhaust the memory."""
+    sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
+    meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
+    count = sum(sizes[mesh] for mesh in meshes)
+    if count > _MOST_VERTICES:
+        raise source.fault("F002.many-vertices", most=_MOST_VERTICES, found=count)
+
+
+def _note_normals(pieces: list[Piece], source: Source) -> None:
+    """Report primitives without normals, and the number of vertices that flat shading adds."""
+    split = [piece for piece in pieces if piece.shading == "flat"]
+    added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
+    if added:
+        source.warn("F007.flat-normals", n=len(split), vertices=added)
+    smooth = [piece for piece in pieces if piece.shading == "smooth"]
+    if smooth:
+        source.warn("F007.smooth-normals", n=len(smooth))
+
+
+def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
+    """Report animated nodes that belong to no figure, such as those of cameras.
+
+    The transform of a node with a skinned mesh has no effect.
+    """
+    moved = set[int]().union(*(each.nodes for each in file.animations))
+    others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
+    if others:
+        names = [file.tree.names[node] or f"node {node}" for node in others]
+        source.warn("F007.animated-others", n=len(names), names=names)
+
+
+def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
+    """Report skins that the file deforms by a method other than LBS."""
+    used = (file.skins[skin] for members in groups for skin in members.skins)
+    others: dict[str, list[str]] = {}
+    for skin in used:
+        if skin.method != "lbs":
+            others.setdefault(skin.method, []).append(skin.name)
+    for method, names in others.items():
+        source.warn("F007.skinning-method", names=names, n=len(names), method=method)
+
+
+def _note_weights(pieces: list[Piece], source: Source) -> None:
+    """Record sums of weights that are not 1, and vertices without weights, located at the first."""
+    odd = [piece for piece in pieces if piece.influences.n_deviating]
+    if odd:
+        n = sum(piece.influences.n_deviating for piece in odd)
+        most = max(piece.influences.deviation for piece in odd)
+        source.warn("W001.divided", _weights_of(odd[0]), n=n, most=most)
+    unbound = [piece for piece in pieces if piece.influences.n_unbound]
+    if unbound:
+        n = sum(piece.influences.n_unbound for piece in unbound)
+        source.warn("W004.first-joint", _weights_of(unbound[0]), n=n)
+
+
+def _weights_of(piece: Piece) -> str | None:
+    """Return the JSON pointer to the weights of a primitive; None if there is none."""
+    pointer = piece.primitive.pointer
+    return f"{pointer}/attributes/WEIGHTS_0" if pointer else None
+
+
+def record_of(
+    file: NodeFile,
+    joints: Joints,
+    nodes: list[int],
+    columns: Mapping[int, Ints],
+    pieces: list[Piece],
+) -> FileRecord:
+    """Return the record of one figure.
+
+    Parameters
+    ----------
+    file : NodeFile
+        The file, with its asset, nodes and meshes.
+    joints : Joints
+        The joints of the figure.
+    nodes : list of int
+        Nodes with a mesh, one per part.
+    columns : mapping of (S,) int32
+        Blend shapes of each node's morph targets.
+    pieces : list of Piece
+        The primitives of the figure.
+    """
+    extras = file.tree.extras
+    meshes = [file.meshes[int(file.tree.meshes[node])] for node in nodes]
+    none = np.zeros(0, dtype=np.int32)
+    skins = {int(file.tree.skins[node]) for node in nodes} - {-1}
+    return FileRecord(
+        copyright=str(file.asset.get("copyright") or ""),
+        extras=file.extras,
+        joint_extras={joint: extras[node] for node, joint in joints.own.items() if node in extras},
+        part_extras={
+            part: extras[node]
+            for part, node in enumerate(nodes)
+            if node in extras and node not in joints.own
+        },
+        mesh_extras={
+            part: mesh.extras for part, mesh in enumerate(meshes) if mesh.extras is not None
+        },
+        mesh_names=tuple(mesh.name for mesh in meshes),
+        skin_names=tuple(file.skins[skin].name for skin in sorted(skins)),
+        part_shapes=tuple(columns.get(node, none) for node in nodes),
+        target_names=tuple(mesh.target_names for mesh in meshes),
+        scene=file.scene,
+        tangents=partial(tangents_of, pieces),
+        unkept=file.unkept,
+        lost_nodes=file.lost_nodes,
+        vrm=_vrm_record(file, joints, nodes, pieces),
+        has_skin=any(
+            is_skinned(mesh, int(file.tree.skins[node]))
+            for mesh, node in zip(meshes, nodes, strict=True)
+        ),
+    )
+
+
+def _vrm_record(
+    file: NodeFile, joints: Joints, nodes: list[int], pieces: list[Piece]
+) -> VrmRecord | None:
+    """Return the VRM properties of the figure that has the humanoid; None for others."""
+    versions = [n for n, name in ((1, "VRMC_vrm"), (0, "VRM")) if name in file.extensions]
+    if not versions or not any(node in joints.own for node in file.humanoid.values()):
+        return None
+    return VrmRecord(
+        version=versions[0],
+        extensions=file.extensions,
+        joints=joints.own,
+        parts={node: part for part, node in enumerate(nodes)},
+        meshes={node: int(file.tree.meshes[node]) for node in nodes},
+        materials=tuple(used_materials(pieces)),
+        toon=file.toon,
+        textures=file.textures,
+    )
+
+
+_ATTRIBUTES = {"positions": "POSITION", "normals": "NORMAL", "weights": "WEIGHTS_0"}
+
+
+def _remember_pointers(
+    source: Source,
+    skeleton: Skeleton | None,
+    file: NodeFile,
+    members: Members,
+    joints: Joints,
+    pieces: list[Piece],
+) -> None:
+    """Register the JSON pointers of nodes, skin joints and primitives, if the file has any.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    skeleton : Skeleton
+        The figure's skeleton.
+    file : NodeFile
+        Its contents.
+    members : Members
+        The nodes of the figure.
+    joints : Joints
+        The joints of the figure.
+    pieces : list of Piece
+        The primitives of the figure.
+    """
+    if not file.has_pointers:
+        return
+    first_vertices = np.cumsum([0, *(piece.n_vertices for piece in pieces)])
+    first_triangles = np.cumsum([0, *(len(piece.triangles) for piece in pieces)])
+
+    def pointer_of(kind: str, index: int) -> str:
+        if kind in ("joints", "bindings"):
+            return _joint(file, members, joints.nodes[index], kind)
+        if kind == "triangles":
+            piece = int(np.searchsorted(first_triangles, index, "right")) - 1
+            return pieces[piece].primitive.pointer
+        if kind in _ATTRIBUTES:
+            piece = int(np.searchsorted(first_vertices, index, "right")) - 1
+            return f"{pieces[piece].primitive.pointer}/attributes/{_ATTRIBUTES[kind]}"
+        return ""
+
+    source.remember_pointers(skeleton, pointer_of)
+
+
+def _joint(file: NodeFile, members: Members, node: int, kind: str) -> str:
+    """Return the pointer to a joint's node, or to its entry in a skin; empty if it is auxiliary."""
+    if node < 0:
+        return ""
+    for index in members.skins if kind == "bindings" else ():
+        places = np.flatnonzero(file.skins[index].joints == node)
+        if len(places):
+            return f"/skins/{index}/joints/{places[0]}"
+    return f"/nodes/{node}"
+
+
+_ASSET = ("version", "generator", "copyright")
+_LONGEST = 200  # maximum number of characters of a fact
+
+
+def _facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]:
+    """Return the facts about a figure and its file, each a heading and a text.
+
+    Parameters
+    ----------
+    file : NodeFile
+        The file, whose asset information is reported.
+    pieces : list of Piece
+        The primitives of the figure.
+    """
+    facts = [
+        (key, str(file.asset[key])[:_LONGEST]) for key in _ASSET if file.asset.get(key) is not None
+    ]
+    licence = file.asset.get("license") or file.asset.get("licence")
+    extras = file.asset.get("extras")
+    if licence is None and isinstance(extras, dict):
+        licence = extras.get("license") or extras.get("licence")
+    if isinstance(licence, str):
+        facts.append(("licence", licence[:_LONGEST]))
+    sums = max((piece.influences.deviation for piece in pieces), default=0.0)
+    # Smaller deviations are rounding errors of float32.
+    if sums > 1e-6:
+        facts.append(("weight sums", f"within {sums:.2g} of 1, divided by their sum"))
+    return (*facts, *file.facts)

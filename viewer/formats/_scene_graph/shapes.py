@@ -1,0 +1,275 @@
+"""Morph targets of the meshes of a figure, as its blend shapes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._scene_graph.content import NodeExpression, NodeFile, NodeMesh
+from viewer.formats._scene_graph.motions import Reader
+from viewer.formats._scene_graph.surfaces import (
+    Piece,
+    normal_matrix,
+    normal_scales,
+    part_name,
+    used_materials,
+)
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.bodies.deferred_offsets import DeferredOffsets
+from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
+from viewer.rig.material_binds import MaterialBinds
+
+
+def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> dict[int, Ints]:
+    """Return the blend shapes that correspond to each node's morph targets.
+
+    Nodes are parts of one face and share their blend shapes if they have the same target names, the
+    same default weights, and the same keys in all animations. Only animations of such nodes
+    are read.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its meshes.
+    nodes : list of int
+        Nodes with a mesh.
+    readers : list of callable
+        Functions that return the channels of each animation.
+
+    Returns
+    -------
+    dict of (S,) int32
+        Blend shapes by node, for nodes with morph targets.
+    """
+    shaped = [node for node in nodes if _mesh(file, node).target_names]
+    looks = {node: _look(file, node) for node in shaped}
+    counts = Counter(looks.values())
+    known: dict[tuple[object, ...], Ints] = {}
+    columns: dict[int, Ints] = {}
+    count = 0
+    for node in shaped:
+        names = _mesh(file, node).target_names
+        # Targets without names do not necessarily correspond.
+        is_alone = counts[looks[node]] == 1 or not all(names)
+        key = (node,) if is_alone else (*looks[node], _keys(file, node, readers))
+        if key not in known:
+            known[key] = np.arange(count, count + len(names), dtype=np.int32)
+            count += len(names)
+        columns[node] = known[key]
+    return columns
+
+
+def _look(file: NodeFile, node: int) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Return the names and the default weights of a node's morph targets."""
+    return _mesh(file, node).target_names, tuple(_defaults(file, node).tolist())
+
+
+def _keys(file: NodeFile, node: int, readers: list[Reader]) -> tuple[object, ...]:
+    """Return all keys of a node's morph targets in a form that can be compared."""
+    found: list[object] = []
+    for number, (animation, read) in enumerate(zip(file.animations, readers, strict=True)):
+        if node not in animation.nodes:
+            continue
+        try:
+            channels = read()
+        except FormatError:
+            # The error is raised when the animation is played; until then its keys are unknown.
+            return (node,)
+        for channel in channels:
+            if channel.node == node and channel.path == "weights":
+                tangents = None if channel.tangents is None else channel.tangents.tobytes()
+                values = channel.times.tobytes(), channel.values.tobytes(), tangents
+                found.append((number, channel.interpolation, *values))
+    return tuple(found)
+
+
+def _mesh(file: NodeFile, node: int) -> NodeMesh:
+    return file.meshes[int(file.tree.meshes[node])]
+
+
+def _defaults(file: NodeFile, node: int) -> Floats:
+    """Return the weights of a node's morph targets in the rest pose."""
+    given = file.tree.shape_weights.get(node)
+    return _mesh(file, node).shape_weights if given is None else given
+
+
+def blend_shapes_of(
+    file: NodeFile, columns: dict[int, Ints], pieces: list[Piece]
+) -> BlendShapes | None:
+    """Return the blend shapes of a figure; offsets are assembled on first use.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its meshes.
+    columns : dict of (S,) int32
+        From ``shape_columns``.
+    pieces : list of Piece
+        The primitives, whose targets are transformed to binding space.
+    """
+    slots = {material: slot for slot, material in enumerate(used_materials(pieces))}
+    if not columns and not any(_binds_of(each, slots) for each in file.expressions):
+        return None
+    owners: dict[int, int] = {}
+    for node, own in columns.items():
+        for column in own.tolist():
+            owners.setdefault(column, node)
+    targets = [_target(file, columns, column, node) for column, node in sorted(owners.items())]
+    counts = Counter(target.name for target in targets)
+    count = sum(piece.n_vertices for piece in pieces)
+    mixed, sums = _expressions(file, columns, len(targets), slots)
+    shape = len(targets) + len(mixed), count, 3
+
+    def offsets(of_normals: bool) -> DeferredOffsets:
+        return DeferredOffsets(
+            shape,
+            lambda: _offsets(columns, pieces, count, of_normals, sums),
+            lambda weights: _sum(columns, pieces, count, of_normals, sums, weights),
+        )
+
+    has_normals = any(piece.shading == "file" for piece in pieces)
+    names = (t.name if counts[t.name] == 1 else t.full_name for t in targets)
+    return BlendShapes(
+        names=(*names, *(each.name for each in mixed)),
+        offsets=offsets(of_normals=False),
+        groups=("morph",) * shape[0],
+        # In glTF, a target without normals leaves them unchanged; flat normals follow the surface.
+        normal_offsets=offsets(of_normals=True) if has_normals else None,
+        rest_weights=np.array([*(target.weight for target in targets), *(0.0 for _ in mixed)]),
+        rules=_rules(mixed, len(targets)) if mixed else None,
+        material_binds=_material_binds(mixed, len(targets), slots),
+    )
+
+
+def _binds_of(
+    expression: NodeExpression, slots: Mapping[int, int]
+) -> list[tuple[int, str, Floats]]:
+    """Return the changes of materials that a figure has, by the index in its mesh."""
+    return [
+        (slots[index], kind, target)
+        for index, kind, target in expression.materials
+        if index in slots
+    ]
+
+
+def _material_binds(
+    mixed: list[NodeExpression], first: int, slots: Mapping[int, int]
+) -> MaterialBinds | None:
+    """Return the changes of materials by expressions, whose blend shapes begin at ``first``."""
+    rows = [
+        (shape, *bind) for shape, each in enumerate(mixed, first) for bind in _binds_of(each, slots)
+    ]
+    if not rows:
+        return None
+    shapes, materials, kinds, targets = zip(*rows, strict=True)
+    return MaterialBinds(np.array(shapes), np.array(materials), kinds, np.array(targets))
+
+
+def _expressions(
+    file: NodeFile, columns: dict[int, Ints], n_targets: int, slots: Mapping[int, int]
+) -> tuple[list[NodeExpression], Floats]:
+    """Return the figure's expressions, and their weights of its S morph targets: (E, S)."""
+    found: list[NodeExpression] = []
+    sums: list[Floats] = []
+    for each in file.expressions:
+        row = np.zeros(n_targets)
+        for node, index, weight in each.binds:
+            if node in columns:
+                # An expression binds each of the nodes that share a target.
+                column = columns[node][index]
+                row[column] = max(row[column], weight, key=abs)
+        if row.any() or _binds_of(each, slots):
+            found.append(each)
+            sums.append(row)
+    return found, np.array(sums).reshape(len(found), n_targets)
+
+
+def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
+    """Return the rules of expressions that follow ``first`` morph targets."""
+    kinds = [*PROCEDURAL]
+    return ExpressionRules(
+        rows=np.arange(first, first + len(mixed), dtype=np.int32),
+        is_binary=np.array([each.is_binary for each in mixed]),
+        kinds=np.array([kinds.index(each.kind) if each.kind else -1 for each in mixed]),
+        overrides=np.array(
+            [
+                [OVERRIDES.index(each.overrides.get(kind, "none")) for kind in kinds]
+                for each in mixed
+            ]
+        ),
+        presets=tuple(each.preset for each in mixed),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Target:
+    """Name, name prefixed by its part's name, and default weight of a morph target."""
+
+    name: str
+    full_name: str
+    weight: float
+
+
+def _target(file: NodeFile, columns: dict[int, Ints], column: int, node: int) -> _Target:
+    index = int(np.flatnonzero(columns[node] == column)[0])
+    name = _mesh(file, node).target_names[index] or f"target {index}"
+    part = part_name(file, node) or f"#{node}"
+    return _Target(name, f"{part}.{name}", float(_defaults(file, node)[index]))
+
+
+def _offsets(
+    columns: dict[int, Ints], pieces: list[Piece], count: int, of_normals: bool, sums: Floats
+) -> Floats:
+    """Return the offsets of all vertices, or of their normals, in binding space: (S + E, V, 3).
+
+    ``sums`` (E, S) are the weights of the expressions, which follow the S morph targets.
+    """
+    offsets = np.zeros((sums.shape[1], count, 3))
+    first = 0
+    for piece in pieces:
+        rows = slice(first, first + piece.n_vertices)
+        first += piece.n_vertices
+        primitive, own = piece.primitive, columns.get(piece.node)
+        targets = primitive.normal_targets if of_normals else primitive.targets
+        if own is None or targets is None:
+            continue
+        values = targets.dense()[:, piece.sources]
+        if of_normals:
+            offsets[own, rows] = values @ normal_matrix(piece) * normal_scales(piece)
+        else:
+            offsets[own, rows] = values @ piece.baked[:3, :3].T
+    if not len(sums):
+        return offsets
+    return np.concatenate([offsets, np.einsum("es,sva->eva", sums, offsets)])
+
+
+def _sum(
+    columns: dict[int, Ints],
+    pieces: list[Piece],
+    count: int,
+    of_normals: bool,
+    sums: Floats,
+    weights: Floats,
+) -> Floats:
+    """Return the weighted sum of ``_offsets``, without the array: (V, 3)."""
+    n_targets = sums.shape[1]
+    weights = weights[:n_targets] + weights[n_targets:] @ sums
+    total, first = np.zeros((count, 3)), 0
+    for piece in pieces:
+        rows = slice(first, first + piece.n_vertices)
+        first += piece.n_vertices
+        primitive, own = piece.primitive, columns.get(piece.node)
+        targets = primitive.normal_targets if of_normals else primitive.targets
+        if own is None or targets is None:
+            continue
+        values = targets.weighted(weights[own])[piece.sources]
+        if of_normals:
+            total[rows] = values @ normal_matrix(piece) * normal_scales(piece)
+        else:
+            total[rows] = values @ piece.baked[:3, :3].T
+    return total

@@ -1,0 +1,397 @@
+"""One mesh and skin made from all meshes of a figure, in its binding space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.formats._scene_graph.bindings import Bindings
+from viewer.formats._scene_graph.content import NodeFile, Primitive
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.vectors import moved_tangents
+from viewer.rig.mesh import Mesh, PartView, triangle_areas, vertex_normals
+from viewer.rig.skin import Skin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A primitive of the mesh of one node, as part of a figure.
+
+    Attributes
+    ----------
+    node, part : int
+        Node of the mesh, and index of the figure's part.
+    primitive : Primitive
+        As in the file.
+    baked : (4, 4)
+        Mesh space to binding space.
+    influences : Influences
+        Influences of the V vertices.
+    sources : (V,) int32
+        Original vertex of each vertex in the primitive, because flat shading splits vertices.
+    triangles : (T, 3) int32
+        Indices of the piece's vertices, counter-clockwise from outside in binding space.
+    normals : (V, 3)
+        Mesh space.
+    shading : "file", "flat" or "smooth"
+        Origin of the normals.
+    """
+
+    node: int
+    part: int
+    primitive: Primitive
+    baked: Floats
+    influences: Influences
+    sources: Ints
+    triangles: Ints
+    normals: Floats
+    shading: str
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, V."""
+        return len(self.sources)
+
+
+def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piece]:
+    """Return the primitives of a figure, part by part.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its meshes and skins.
+    nodes : list of int
+        Nodes with a mesh; each is a part.
+    bindings : Bindings
+        Bindings of all their skins, and of nodes whose mesh no skin moves.
+    """
+    pieces: list[Piece] = []
+    shadings: dict[int, Shading] = {}  # by identity of the primitive, which many nodes may share
+    for part, node in enumerate(nodes):
+        skin = int(file.tree.skins[node])
+        for primitive in file.meshes[int(file.tree.meshes[node])].primitives:
+            if len(primitive.triangles) == 0:
+                continue
+            if skin >= 0 and primitive.joints is not None:
+                baked = bindings.baked[skin]
+                influences = divided(primitive, bindings.slots[skin])
+            else:
+                joint, baked = bindings.rigid[node]
+                influences = _on_joint(len(primitive.positions), joint)
+            if id(primitive) not in shadings:
+                shadings[id(primitive)] = _shading(primitive)
+            shading = shadings[id(primitive)]
+            pieces.append(_piece(node, part, primitive, baked, influences, shading))
+    return pieces
+
+
+def _shading(primitive: Primitive) -> Shading:
+    """Return the normals of a primitive, split between its faces if the file has none."""
+    if primitive.normals is None:
+        return flat_shaded(primitive.positions, primitive.triangles)
+    sources = np.arange(len(primitive.positions), dtype=np.int32)
+    return sources, primitive.triangles, primitive.normals, False
+
+
+def _piece(
+    node: int,
+    part: int,
+    primitive: Primitive,
+    baked: Floats,
+    influences: Influences,
+    shading: Shading,
+) -> Piece:
+    """Return one piece; triangles that a reflection reverses are flipped back."""
+    sources, triangles, normals, is_flat = shading
+    kind = "file" if primitive.normals is not None else "flat" if is_flat else "smooth"
+    if is_flat:
+        influences = _counted_as(_of_rows(influences, sources), influences)
+    if np.linalg.det(baked[:3, :3]) < 0.0:
+        triangles = triangles[:, ::-1]
+    return Piece(node, part, primitive, baked, influences, sources, triangles, normals, kind)
+
+
+def _counted_as(split: Influences, whole: Influences) -> Influences:
+    """Return the influences of split vertices, with the statistics of the file's vertices."""
+    found = whole.deviation, whole.n_deviating, whole.n_unbound
+    return Influences(split.counts, split.joints, split.weights, *found)
+
+
+def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
+    """Return the mesh of a figure; primitives without an attribute get neutral values.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its meshes and materials.
+    nodes : list of int
+        Nodes with a mesh, one per part.
+    pieces : list of Piece
+        Their primitives.
+    """
+    firsts = np.cumsum([0, *(piece.n_vertices for piece in pieces)])
+    starts = zip(pieces, firsts, strict=False)
+    triangles = np.concatenate([piece.triangles + first for piece, first in starts])
+    counts = [len(piece.triangles) for piece in pieces]
+    used = used_materials(pieces)
+    slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
+    uvs = _uv_sets(pieces)
+    return Mesh(
+        positions=np.concatenate([_positions(piece) for piece in pieces]),
+        normals=np.concatenate([_normals(piece) for piece in pieces]),
+        triangles=triangles.astype(np.int32),
+        uvs=uvs[0] if uvs else None,
+        other_uvs=uvs[1:],
+        colors=_filled(pieces, lambda primitive: primitive.colors, np.ones(4)),
+        materials=tuple(file.materials[material] for material in used),
+        triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
+        parts=tuple(part_name(file, node) for node in nodes),
+        triangle_parts=np.repeat([piece.part for piece in pieces], counts),
+        part_views=_part_views(file, nodes),
+    )
+
+
+def used_materials(pieces: list[Piece]) -> list[int]:
+    """Return the materials of a figure, as indices into the file's materials."""
+    return sorted({piece.primitive.material for piece in pieces} - {-1})
+
+
+def _part_views(file: NodeFile, nodes: list[int]) -> tuple[PartView, ...]:
+    if not any(node in file.part_views for node in nodes):
+        return ()
+    return tuple(file.part_views.get(node, "auto") for node in nodes)
+
+
+def part_name(file: NodeFile, node: int) -> str:
+    """Return the name of a node's part: the name of the node or, if it has none, of its mesh."""
+    return file.tree.names[node] or file.meshes[int(file.tree.meshes[node])].name
+
+
+def _positions(piece: Piece) -> Floats:
+    """Return the positions in binding space, p' = A p; equal ones stay equal."""
+    positions = piece.primitive.positions[piece.sources]
+    if np.array_equal(piece.baked, np.eye(4)):
+        return positions
+    # A matrix product may round equal rows differently, which would open seams.
+    x, y, z = positions.T[:, :, None]
+    right, up, back, shift = piece.baked[:3].T
+    return np.asarray(x * right + y * up + z * back + shift, dtype=np.float64)
+
+
+def _normals(piece: Piece) -> Floats:
+    """Return the normals in binding space."""
+    return piece.normals @ normal_matrix(piece) * normal_scales(piece)
+
+
+def normal_matrix(piece: Piece) -> Floats:
+    """Return A^-1, (3, 3), which multiplies rows of normals: n' = A^-T n."""
+    return np.asarray(np.linalg.inv(piece.baked[:3, :3]), dtype=np.float64)
+
+
+def normal_scales(piece: Piece) -> Floats:
+    """Return factors that give transformed normals the lengths they have in the file: (V, 1)."""
+    moved = np.linalg.norm(piece.normals @ normal_matrix(piece), axis=1)
+    lengths = np.linalg.norm(piece.normals, axis=1)
+    scales: Floats = np.where(moved > 0.0, lengths / np.where(moved > 0.0, moved, 1.0), 1.0)
+    return scales[:, None]
+
+
+def tangents_of(pieces: list[Piece]) -> Floats | None:
+    """Return the tangents in binding space, t' = A t; see ``FileRecord.tangents``."""
+    rows = [_tangents(piece) for piece in pieces]
+    if all(each is None for each in rows):
+        return None
+    return np.concatenate([
+        np.zeros((piece.n_vertices, 4)) if each is None else each
+        for piece, each in zip(pieces, rows, strict=True)
+    ])  # fmt: skip
+
+
+def _tangents(piece: Piece) -> Floats | None:
+    read = piece.primitive.tangents
+    # Tangents refer to the normals of the file.
+    stored = None if read is None or piece.shading != "file" else read()
+    return None if stored is None else moved_tangents(stored[piece.sources], piece.baked[:3, :3])
+
+
+def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
+    """Return every set of texture coordinates that a primitive has: (V, 2) each."""
+    count = max(len(piece.primitive.uvs) for piece in pieces)
+
+    def of(index: int) -> Callable[[Primitive], Floats | None]:
+        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
+
+    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
+    return tuple(values for values in sets if values is not None)
+
+
+def _filled(
+    pieces: list[Piece], values_of: Callable[[Primitive], Floats | None], neutral: Floats
+) -> Floats | None:
+    """Return values per vertex, neutral for primitives without any; None if all lack them."""
+    given = [values_of(piece.primitive) for piece in pieces]
+    if all(values is None for values in given):
+        return None
+    rows = [
+        np.tile(neutral, (piece.n_vertices, 1)) if values is None else values[piece.sources]
+        for piece, values in zip(pieces, given, strict=True)
+    ]
+    return np.concatenate(rows)
+
+
+def skin_of(file: NodeFile, pieces: list[Piece], inverse_bind: Floats) -> Skin:
+    """Return the skin of a figure."""
+    fractions = np.concatenate([_dqs_fractions(file, piece) for piece in pieces])
+    counts = np.concatenate([piece.influences.counts for piece in pieces])
+    return Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.concatenate([piece.influences.joints for piece in pieces]),
+        weights=np.concatenate([piece.influences.weights for piece in pieces]),
+        inverse_bind=inverse_bind,
+        dqs_fractions=fractions if fractions.any() else None,
+    )
+
+
+def _dqs_fractions(file: NodeFile, piece: Piece) -> Floats:
+    """Return the fraction of DQS at each vertex of a piece: (V,)."""
+    number = int(file.tree.skins[piece.node])
+    skin = file.skins[number] if number >= 0 and piece.primitive.joints is not None else None
+    if skin is not None and skin.method == "mix" and piece.primitive.dqs_fractions is not None:
+        return piece.primitive.dqs_fractions[piece.sources]
+    return np.full(piece.n_vertices, float(skin is not None and skin.method == "dqs"))
+
+
+_NO_SUM = 1e-12  # minimum sum of weights that is scaled to 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Influences:
+    """A flat list of influences, vertex by vertex.
+
+    Attributes
+    ----------
+    counts : (V,)
+        Number of influences of each vertex.
+    joints, weights : (N,) int32, (N,)
+        Joint of the figure and weight of each; the weights of a vertex sum to 1.
+    deviation : float
+        Largest deviation of a sum of weights from 1 before normalisation.
+    n_deviating : int
+        Number of sums that deviate by more than the rounding of 8-bit weights.
+    n_unbound : int
+        Number of vertices without any weight.
+    """
+
+    counts: Ints
+    joints: Ints
+    weights: Floats
+    deviation: float = 0.0
+    n_deviating: int = 0
+    n_unbound: int = 0
+
+
+def _on_joint(n_vertices: int, joint: int) -> Influences:
+    """Return the influences of vertices that follow one joint rigidly."""
+    counts, joints = np.ones(n_vertices, np.int32), np.full(n_vertices, joint, np.int32)
+    return Influences(counts, joints, np.ones(n_vertices))
+
+
+def divided(primitive: Primitive, slots: Ints) -> Influences:
+    """Return a skinned primitive's influences, normalised to sums of 1 (glTF 2.0, 3.7.3.1).
+
+    A vertex without weights follows the joint of its first slot, as in Blender and three.js.
+
+    Parameters
+    ----------
+    primitive : Primitive
+        A primitive with (V, K) joints and weights.
+    slots : (M,) int32
+        Joint of the figure for each joint of the skin.
+
+    Returns
+    -------
+    Influences
+        Influences whose weight is not 0.
+    """
+    assert primitive.joints is not None and primitive.weights is not None
+    weights = primitive.weights.astype(np.float64)
+    sums = weights.sum(axis=1)
+    unbound = np.abs(sums) < _NO_SUM
+    weights[unbound] = 0.0
+    weights[unbound, :1] = 1.0
+    weights /= np.where(unbound, 1.0, sums)[:, None]
+    used = weights != 0.0
+    deviations = np.abs(sums - 1.0)[~unbound]
+    # Each of K weights is rounded to a multiple of 1 / 255.
+    rounding = 0.5 / 255.0 * weights.shape[1] + 1e-6
+    return Influences(
+        np.count_nonzero(used, axis=1).astype(np.int32),
+        slots[primitive.joints[used]],
+        weights[used],
+        float(deviations.max(initial=0.0)),
+        int(np.count_nonzero(deviations > rounding)),
+        int(np.count_nonzero(unbound)),
+    )
+
+
+def _of_rows(influences: Influences, rows: Ints) -> Influences:
+    """Return the influences of the given vertices, which may repeat."""
+    starts = np.concatenate([[0], np.cumsum(influences.counts)])
+    counts = influences.counts[rows]
+    firsts = np.concatenate([[0], np.cumsum(counts)])
+    index = np.repeat(starts[rows] - firsts[:-1], counts) + np.arange(firsts[-1])
+    return Influences(counts, influences.joints[index], influences.weights[index])
+
+
+Shading: TypeAlias = tuple[Ints, Ints, Floats, bool]
+"""Result of ``flat_shaded``."""
+_MOST_TRIANGLES = 200_000
+
+# Grid cells per unit of normal components: faces within half a degree share a normal.
+_CELLS = 128
+
+
+def flat_shaded(positions: Floats, triangles: Ints) -> Shading:
+    """Split vertices between faces with different normals.
+
+    Coplanar faces keep a common vertex, so a cube has 24 vertices. Large primitives are shaded
+    smoothly instead, because they could become six times as large.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices, counter-clockwise from outside.
+
+    Returns
+    -------
+    sources : (R,) int32
+        Original of each split vertex; vertices without triangles are included.
+    triangles : (T, 3) int32
+        Indices into the split vertices.
+    normals : (R, 3)
+        Unit normals.
+    is_flat : bool
+        Whether the vertices were split.
+    """
+    if len(triangles) > _MOST_TRIANGLES:
+        sources = np.arange(len(positions), dtype=np.int32)
+        return sources, triangles, vertex_normals(positions, triangles), False
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    doubled = 2.0 * triangle_areas(positions, triangles)
+    normals /= np.where(doubled == 0.0, 1.0, doubled)[:, None]
+    cells = np.rint(normals * _CELLS).astype(np.int64) + _CELLS
+    side = 2 * _CELLS + 1
+    directions = (cells[:, 0] * side + cells[:, 1]) * side + cells[:, 2]
+    corners = triangles.ravel().astype(np.int64)
+    pairs = corners * side**3 + np.repeat(directions, 3)
+    unique, inverse = np.unique(pairs, return_inverse=True)
+    unused = np.setdiff1d(np.arange(len(positions)), corners)
+    sources = np.concatenate([unique // side**3, unused]).astype(np.int32)
+    split = inverse.reshape(-1, 3).astype(np.int32)
+    return sources, split, vertex_normals(positions[sources], split), True

@@ -1,1 +1,0 @@
-"""VRM 0.x and 1.0: properties of humanoid characters in glTF files."""

@@ -1,0 +1,474 @@
+"""Animations of a glTF document: names, ranges and nodes. Keys are read on first playback."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import field, replace
+from functools import partial
+from operator import le
+from typing import Any, cast
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._scene_graph.content import NodeAnimation, NodeChannel, NodeMesh, NodeTree
+from viewer.formats.gltf.document import Document
+from viewer.formats.gltf.elements import Element, Table
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, Interpolation, TransformPath
+
+_SAME_TIME = 1e-4  # rounding error of times in JSON, seconds
+
+
+@dataclass(slots=True)
+class _Unused:
+    """Channels without visible effect."""
+
+    n: int = 0
+    names: dict[str, None] = field(default_factory=dict)
+    pointer: str = ""
+
+
+def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation, ...]:
+    """Return the animations that are valid, except for keys that are read later.
+
+    An invalid animation is omitted with a warning. The keys of the first one are read, because it
+    is played by default; if errors are only recorded, all keys are read.
+    """
+    table = document.table("animations")
+    unused = _Unused()
+    found: list[NodeAnimation] = []
+    for index in range(len(table)):
+        try:
+            animation = _animation(document, targets, table[index], unused)
+            reads = not found or document.source.diagnostics.keeps_errors
+            found.append(_checked(animation) if reads else animation)
+        except FormatError as problem:
+            _leave_out(document, problem, index)
+    if unused.n:
+        names = list(unused.names)
+        document.source.warn("F007.gltf-channels", unused.pointer, n=unused.n, names=names)
+    return tuple(found)
+
+
+def _leave_out(document: Document, problem: FormatError, index: int) -> None:
+    if document.source.diagnostics.keeps_errors:
+        document.source.diagnostics.add(problem.diagnostic)
+        return
+    pointer = problem.diagnostic.pointer or f"/animations/{index}"
+    document.source.warn("G005.animation", pointer, problem=problem.diagnostic.message)
+
+
+def _checked(animation: NodeAnimation) -> NodeAnimation:
+    channels = animation.read()
+    return replace(animation, read=lambda: channels)
+
+
+def _animation(
+    document: Document, targets: Targets, animation: Element, unused: _Unused
+) -> NodeAnimation:
+    """Return an animation whose keys have not been read yet."""
+    channels, samplers = animation.table("channels"), animation.table("samplers")
+    plain = _plain_channels(channels.items, samplers.items, targets)
+    nodes, inputs = plain or _any_channels(document, targets, animation, unused)
+    start, end = _range(document, animation, inputs)
+    read = partial(_channels, document, targets, animation, (start, end))
+    name, pointer = animation.text("name"), animation.pointer
+    extras = animation.values.get("extras")
+    return NodeAnimation(name, start, end, frozenset(nodes), read, pointer, extras)
+
+
+def _channels(
+    document: Document, targets: Targets, animation: Element, declared: tuple[float, float]
+) -> tuple[NodeChannel, ...]:
+    """Return the channels of an animation; warn if the declared range is wrong."""
+    channels = _read_channels(document, targets, animation)
+    start, end = declared
+    first = min((float(channel.times[0]) for channel in channels), default=start)
+    last = max((float(channel.times[-1]) for channel in channels), default=end)
+    if max(abs(first - start), abs(last - end)) > _SAME_TIME:
+        animation.warn("G005.range", "samplers", start=start, end=end, first=first, last=last)
+    return channels
+
+
+def _plain_channels(
+    channels: list[Any], samplers: list[Any], targets: Targets
+) -> tuple[set[int], set[int]] | None:
+    """Return the nodes and the time accessors of channels; None if any is invalid or unusual.
+
+    Files may have tens of thousands of channels, nearly all in the form that is handled here.
+    This function takes less time than parsing the JSON.
+    """
+    try:
+        ends = [item["target"] for item in channels]
+        if not targets.moves_all(ends):
+            return None
+        used = {item["sampler"] for item in channels}
+        if set(map(type, used)) - {int} or min(used, default=0) < 0:
+            return None
+        inputs = {samplers[index]["input"] for index in used}
+    except (KeyError, TypeError, IndexError):
+        return None
+    return {end["node"] for end in ends}, inputs
+
+
+def _any_channels(
+    document: Document, targets: Targets, animation: Element, unused: _Unused
+) -> tuple[set[int], set[int]]:
+    """Return the nodes and the time accessors of channels of any form; raises FormatError."""
+    channels, samplers = animation.table("channels"), animation.table("samplers")
+    nodes: set[int] = set()
+    inputs: set[int] = set()
+    for index in range(len(channels)):
+        moved = targets.of(channels[index])
+        sampler = samplers[_sampler_of(channels[index], samplers)]
+        if moved.nodes:
+            nodes.update(moved.nodes)
+            inputs.add(sampler.index("input", len(document.accessors), "accessors"))
+        else:
+            unused.n += 1
+            unused.names.setdefault(moved.path)
+            unused.pointer = unused.pointer or channels[index].pointer
+    return nodes, inputs
+
+
+def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[float, float]:
+    """Return the times of the first and the last key in seconds, as declared by the accessors."""
+    if not inputs:
+        return 0.0, 0.0
+    accessors = document.table("accessors")
+    declared = _declared(accessors, inputs)
+    if declared is not None:
+        return declared
+    ends: list[tuple[float, float]] = []
+    for index in inputs:
+        if type(index) is not int or not 0 <= index < len(accessors):
+            samplers = animation.table("samplers")
+            for place in range(len(samplers)):
+                samplers[place].required_index("input", len(document.accessors), "accessors")
+        ends.append(_declared(accessors, {index}) or _read_range(document, animation, index))
+    return min(first for first, _ in ends), max(last for _, last in ends)
+
+
+def _declared(accessors: Table, inputs: set[int]) -> tuple[float, float] | None:
+    """Return the least minimum and the largest maximum that accessors declare.
+
+    None if any is invalid. Each of thousands of channels may have its own accessor, so the check of
+    valid ones is short.
+    """
+    try:
+        if min(inputs) < 0 or set(map(type, inputs)) != {int}:
+            return None
+        used = [accessors.items[index] for index in inputs]
+        lows, highs = ([one[end][0] for one in used] for end in ("min", "max"))
+        if not all(map(le, lows, highs)):
+            return None
+        low, high = min(lows), max(highs)
+        return (float(low), float(high)) if -math.inf < low <= high < math.inf else None
+    except (KeyError, TypeError, IndexError, OverflowError):
+        return None
+
+
+def _read_range(document: Document, animation: Element, index: int) -> tuple[float, float]:
+    """Return the first and the last time, read from the data."""
+    samplers = animation.table("samplers")
+    users = (samplers[place] for place in range(len(samplers)))
+    sampler = next(user for user in users if user.values.get("input") == index)
+    times = _read_times(document, sampler)
+    return float(times[0]), float(times[-1])
+
+
+@dataclass(slots=True)
+class _Reading:
+    """Keys of an animation read so far; channels may share them."""
+
+    document: Document
+    targets: Targets
+    samplers: Table
+    times: dict[int, Floats] = field(default_factory=dict)
+    keys: dict[tuple[int, str, int], Keys] = field(default_factory=dict)
+    n_equal: int = 0
+    """Number of keys dropped because the next key has the same time."""
+
+
+def _read_channels(
+    document: Document, targets: Targets, animation: Element
+) -> tuple[NodeChannel, ...]:
+    """Return the channels of an animation that have a visible effect.
+
+    Raises
+    ------
+    FormatError
+        If a channel or its keys are invalid.
+    """
+    channels = animation.table("channels")
+    reading = _Reading(document, targets, animation.table("samplers"))
+    found: dict[tuple[int, str], NodeChannel] = {}
+    for index in range(len(channels)):
+        channel = channels[index]
+        moved = targets.of(channel)
+        for node in moved.nodes:
+            if (node, moved.path) in found:
+                channel.warn("G005.channel-twice", "target", node=node, path=moved.path)
+            else:
+                found[node, moved.path] = _channel(reading, channel, moved, node)
+    if reading.n_equal:
+        animation.warn("G005.equal-times", "samplers", n=reading.n_equal)
+    return tuple(found.values())
+
+
+def _sampler_of(channel: Element, samplers: Table) -> int:
+    """Return the index of a channel's sampler.
+
+    Raises
+    ------
+    FormatError
+        If the channel has no sampler.
+    """
+    return channel.required_index("sampler", len(samplers), "samplers")
+
+
+def _channel(reading: _Reading, channel: Element, moved: _Moved, node: int) -> NodeChannel:
+    index = _sampler_of(channel, reading.samplers)
+    path, n_shapes = moved.transform_path, 0
+    if path == "weights":
+        n_shapes = reading.targets.n_shapes(node)
+    keys = reading.keys.get((index, path, n_shapes))
+    if keys is None:
+        sampler = reading.samplers[index]
+        times = _times(reading, sampler)
+        keys = _read_keys(reading.document, sampler, times, path, n_shapes)
+        reading.keys[index, path, n_shapes] = keys
+    return NodeChannel(node, path, keys.times, keys.values, keys.interpolation, keys.tangents)
+
+
+def _times(reading: _Reading, sampler: Element) -> Floats:
+    accessor = sampler.index("input", len(reading.document.accessors), "accessors")
+    if accessor not in reading.times:
+        times = _read_times(reading.document, sampler)
+        reading.times[accessor] = times
+        reading.n_equal += int(np.count_nonzero(times[1:] == times[:-1]))
+    return reading.times[accessor]
+
+
+_INTERPOLATIONS: dict[str, Interpolation] = {
+    "LINEAR": "linear",
+    "STEP": "step",
+    "CUBICSPLINE": "cubic",
+}
+_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+_WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
+_TINY = 1e-12  # minimum length of a quaternion with a direction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keys:
+    """Keys as in ``NodeChannel``."""
+
+    times: Floats
+    values: Floats
+    interpolation: Interpolation
+    tangents: Floats | None
+
+
+def _read_times(document: Document, sampler: Element) -> Floats:
+    """Return the times of a sampler's keys: (N,) seconds, in ascending order, N > 0.
+
+    Raises
+    ------
+    FormatError
+        If the times are missing, malformed, not finite or not in ascending order.
+    """
+    accessor = sampler.required_index("input", len(document.accessors), "accessors")
+    times = document.accessors.floats(accessor, ("SCALAR",), sampler.at("input"))[:, 0]
+    if not len(times):
+        raise sampler.fault("F002.gltf-no-keys", "input")
+    if not np.isfinite(times).all():
+        key = int((~np.isfinite(times)).argmax())
+        raise sampler.fault("F003.gltf-keys", "input", index=key, found=float(times[key]))
+    is_earlier = times[1:] < times[:-1]
+    if is_earlier.any():
+        key = int(is_earlier.argmax()) + 1
+        found, before = float(times[key]), float(times[key - 1])
+        raise sampler.fault("F002.gltf-times", "input", index=key, found=found, before=before)
+    return times
+
+
+def _read_keys(
+    document: Document, sampler: Element, times: Floats, path: TransformPath, n_shapes: int
+) -> Keys:
+    """Return the keys of a sampler.
+
+    Parameters
+    ----------
+    document : Document
+        The document.
+    sampler : Element
+        A sampler.
+    times : (N,)
+        Times of the keys; of several keys at one time, only the last is used.
+    path : str
+        Property that the sampler animates.
+    n_shapes : int
+        Number of weights per key.
+
+    Raises
+    ------
+    FormatError
+        If the values are malformed, not finite, of the wrong number, or not rotations.
+    """
+    names = tuple(_INTERPOLATIONS)
+    interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
+    accessor = sampler.required_index("output", len(document.accessors), "accessors")
+    rows = document.accessors.floats(accessor, (_KINDS[path],), sampler.at("output"))
+    width = _WIDTHS.get(path, n_shapes)
+    per_key = 3 if interpolation == "cubic" else 1
+    expected = len(times) * per_key * width
+    if rows.size != expected:
+        # The count is in elements of the accessor: vectors, or single weights.
+        raise _wrong_count(sampler, expected // rows.shape[1], len(rows), len(times))
+    keys = rows.reshape(len(times), per_key, width)
+    _check_finite(sampler, keys)
+    if path == "rotation":
+        keys = _rotations(sampler, keys, _is_whole(document, accessor))
+    # Each key has an in-tangent, value and out-tangent; tangents are slopes per second (3.11.3.3).
+    tangents = keys[:, (0, 2)] if per_key == 3 else None
+    return _without_equal(Keys(times, keys[:, per_key // 2], interpolation, tangents))
+
+
+def _without_equal(keys: Keys) -> Keys:
+    """Return the last of several keys at one time, because exporters repeat the final key."""
+    is_last = keys.times[1:] > keys.times[:-1]
+    if is_last.all():
+        return keys
+    is_kept = np.append(is_last, True)
+    tangents = None if keys.tangents is None else keys.tangents[is_kept]
+    return Keys(keys.times[is_kept], keys.values[is_kept], keys.interpolation, tangents)
+
+
+def _wrong_count(sampler: Element, expected: int, found: int, keys: int) -> FormatError:
+    return sampler.fault("F002.gltf-outputs", "output", expected=expected, found=found, keys=keys)
+
+
+def _check_finite(sampler: Element, keys: Floats) -> None:
+    bad = ~np.isfinite(keys)
+    if bad.any():
+        key, place, column = (int(axis[0]) for axis in np.nonzero(bad))
+        found = float(keys[key, place, column])
+        raise sampler.fault("F003.gltf-keys", "output", index=key, found=found)
+
+
+def _is_whole(document: Document, accessor: int) -> bool:
+    return document.accessors[accessor].values.get("componentType") != 5126
+
+
+def _rotations(sampler: Element, keys: Floats, is_whole: bool) -> Floats:
+    """Return quaternions of unit length; splines with floating-point keys are left unchanged."""
+    middle = keys.shape[1] // 2
+    lengths = np.linalg.norm(keys[:, middle], axis=1)
+    if (lengths < _TINY).any():
+        raise sampler.fault("F002.gltf-rotation", "output", index=int((lengths < _TINY).argmax()))
+    return keys if middle and not is_whole else keys / lengths[:, None, None]
+
+
+_NODE_POINTER = re.compile(r"/nodes/([0-9]{1,9})/(translation|rotation|scale|weights)")
+_MESH_POINTER = re.compile(r"/meshes/([0-9]{1,9})/weights")
+_INDEX = re.compile(r"/[0-9]+")
+_OF_NODES = frozenset(TRANSFORM_PATHS) - {"weights"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Moved:
+    """Target of a channel.
+
+    Attributes
+    ----------
+    path : str
+        Entry of ``TRANSFORM_PATHS``; for other targets, a name for messages.
+    nodes : tuple of int
+        Nodes that the channel animates; empty if it has no visible effect.
+    """
+
+    path: str
+    nodes: tuple[int, ...]
+
+    @property
+    def transform_path(self) -> TransformPath:
+        """Path of a channel that animates nodes."""
+        return cast("TransformPath", self.path)
+
+
+class Targets:
+    """Nodes that channels can animate.
+
+    Parameters
+    ----------
+    tree : NodeTree
+        All nodes.
+    meshes : tuple of NodeMesh
+        All meshes, whose morph targets have weights.
+    """
+
+    def __init__(self, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
+        self._tree, self._meshes = tree, meshes
+        self._with_shapes = {
+            node
+            for node, mesh in enumerate(tree.meshes.tolist())
+            if mesh >= 0 and meshes[mesh].target_names
+        }
+
+    def n_shapes(self, node: int) -> int:
+        """Return the number of morph targets of a node's mesh."""
+        mesh = int(self._tree.meshes[node])
+        return len(self._meshes[mesh].target_names) if mesh >= 0 else 0
+
+    def moves(self, node: Any, path: Any) -> bool:
+        """Return whether a channel of this node and path, as in the file, has a visible effect."""
+        if type(node) is not int or not 0 <= node < self._tree.n_nodes:
+            return False
+        return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
+
+    def moves_all(self, ends: list[Any]) -> bool:
+        """Return whether all channels with these targets, as in the file, have a visible effect.
+
+        Files have tens of thousands of them, most of which are transforms. A target that is not an
+        object, or lacks a member, raises a ``TypeError`` or ``KeyError``.
+        """
+        nodes, paths = {end["node"] for end in ends}, {end["path"] for end in ends}
+        if set(map(type, nodes)) == {int} and paths.issubset(_OF_NODES):
+            return min(nodes) >= 0 and max(nodes) < self._tree.n_nodes
+        return all(self.moves(end["node"], end["path"]) for end in ends)
+
+    def of(self, channel: Element) -> _Moved:
+        """Return the target of a channel.
+
+        Raises
+        ------
+        FormatError
+            If the channel has no target, or refers to a missing node.
+        """
+        target = channel.part("target")
+        if target is None:
+            raise channel.wrong("target", "an object")
+        path = target.text("path")
+        if path == "pointer":
+            return self._pointed(target)
+        node = target.index("node", self._tree.n_nodes, "nodes")
+        return _Moved(path, (node,) if self.moves(node, path) else ())
+
+    def _pointed(self, target: Element) -> _Moved:
+        """Return the target of a JSON pointer (KHR_animation_pointer)."""
+        extension = target.extension("KHR_animation_pointer")
+        pointer = "" if extension is None else extension.text("pointer")
+        if match := _NODE_POINTER.fullmatch(pointer):
+            node, path = int(match[1]), match[2]
+            return _Moved(path, (node,) if self.moves(node, path) else ())
+        if match := _MESH_POINTER.fullmatch(pointer):
+            mesh = int(match[1])
+            # Weights of a node override the weights of its mesh.
+            users = (node for node in self._with_shapes if self._tree.meshes[node] == mesh)
+            nodes = (node for node in users if node not in self._tree.shape_weights)
+            return _Moved("weights", tuple(sorted(nodes)))
+        return _Moved(_INDEX.sub("", pointer).removeprefix("/")[:60] or "pointer", ())

@@ -1,0 +1,87 @@
+"""Primitives compressed with Draco (KHR_draco_mesh_compression), decoded by DracoPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.formats.gltf.document import Document
+from viewer.formats.gltf.elements import Element
+
+_NAME = "KHR_draco_mesh_compression"
+"""The extension."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DecodedPrimitive:
+    """Vertices and triangles of a compressed primitive.
+
+    Attributes
+    ----------
+    attributes : dict of (V, C)
+        Components by the name of their attribute.
+    triangles : (T, 3) int64
+        Vertex indices.
+    """
+
+    attributes: Mapping[str, NDArray[Any]]
+    triangles: NDArray[np.int64]
+
+
+def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:
+    """Return a compressed primitive; None if the uncompressed form is to be read.
+
+    If a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
+
+    Raises
+    ------
+    FormatError
+        If the extension or the data are malformed, or DracoPy is needed but not installed.
+    """
+    extension = primitive.extension(_NAME) if primitive.has("extensions") else None
+    if extension is None:
+        return None
+    try:
+        library = import_module("DracoPy")
+    except ModuleNotFoundError:
+        if _NAME not in document.root.values.get("extensionsRequired", []):
+            return None
+        raise extension.fault("F002.gltf-draco") from None
+    view = extension.required_index("bufferView", document.buffers.n_views, "bufferViews")
+    mesh = _decoded(library, extension, document.buffers.view(view).data.tobytes())
+    arrays = {int(item["unique_id"]): np.asarray(item["data"]) for item in mesh.attributes}
+    n_bytes = sum(array.size for array in arrays.values()) * 8
+    document.spend(n_bytes, extension.pointer)
+    return DecodedPrimitive(_named(extension, arrays), np.asarray(mesh.faces, dtype=np.int64))
+
+
+def _decoded(library: ModuleType, extension: Element, data: bytes) -> Any:
+    """Return the mesh in compressed data."""
+    try:
+        mesh = library.decode(data)
+    except (library.FileTypeException, MemoryError, RuntimeError, ValueError):
+        raise extension.fault("F002.gltf-compressed") from None
+    if not isinstance(mesh, library.DracoMesh):
+        raise extension.fault("F002.gltf-compressed")
+    return mesh
+
+
+def _named(extension: Element, arrays: dict[int, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the arrays by the names of their attributes."""
+    names = extension.part("attributes")
+    if names is None:
+        raise extension.wrong("attributes", "an object")
+    result = {}
+    for name in names.values:
+        number = names.whole(name)
+        if number not in arrays:
+            raise names.fault("F002.gltf-draco-id", name, found=number)
+        array = arrays[number]
+        result[name] = array if array.ndim == 2 else array.reshape(len(array), -1)
+    return result

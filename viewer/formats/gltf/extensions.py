@@ -1,0 +1,199 @@
+"""Supported extensions of glTF, and messages about others."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Phrase
+from viewer.formats._scene_graph.content import NodeTree, descendants
+from viewer.formats.gltf.document import Document
+from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
+
+_GEOMETRY = (
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "EXT_meshopt_compression",
+)
+"""Extensions of geometry and animation."""
+_CHARACTERS = (
+    "VRM",
+    "VRMC_node_constraint",
+    "VRMC_springBone",
+    "VRMC_springBone_extended_collider",
+    "VRMC_vrm",
+    "VRMC_vrm_animation",
+)
+
+# The readers of materials and textures list their own extensions.
+_ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
+
+# Lights are counted below, and hidden nodes by ``hidden_nodes``.
+_WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
+_VISIBILITY = "KHR_node_visibility"
+"""Extension of nodes that are not drawn."""
+
+# Without these, a file has the same surfaces and motions, although it may look or sound different.
+_LOOK = re.compile(r"[A-Z]+_(materials|texture|lights|image)_")
+_LOOKS = ("FB_ngon_encoding", "KHR_audio", "KHR_audio_emitter", "KHR_xmp", "MSFT_lod")
+_KEPT_EXTENSIONS = frozenset((*_GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS))
+"""Extensions whose effect is written back, although not always in the same form."""
+_KNOWN = _KEPT_EXTENSIONS | {*_WITHOUT_EFFECT, _VISIBILITY}
+"""Extensions that are read, or have no visible effect."""
+
+
+def check_extensions(document: Document) -> None:
+    """Refuse a document that needs an unknown extension; report other unknown ones once.
+
+    Raises
+    ------
+    FormatError
+        If an unknown extension is required that may change surfaces or motions.
+    """
+    required = [name for name in _names(document, "extensionsRequired") if name not in _KNOWN]
+    unknown = [name for name in required if not _changes_only_look(name)]
+    pointer = document.root.at("extensionsRequired")
+    if unknown:
+        document.source.refuse("F002.gltf-extensions", pointer, names=unknown)
+    looks = [name for name in required if name not in unknown]
+    if looks:
+        document.source.warn("F007.gltf-look", pointer, names=looks, n=len(looks))
+    optional = [name for name in _names(document, "extensionsUsed") if name not in _KNOWN]
+    optional = [name for name in optional if name not in required and not _ABOUT.match(name)]
+    if optional:
+        document.root.warn("F007.gltf-extensions", "extensionsUsed", names=optional)
+    lights = document.root.extension("KHR_lights_punctual")
+    if lights is not None and len(lights.table("lights")):
+        document.root.warn("F007.gltf-lights", "extensions", n=len(lights.table("lights")))
+
+
+def _changes_only_look(name: str) -> bool:
+    return name in _LOOKS or _LOOK.match(name) is not None
+
+
+def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
+    """Return the nodes that ``KHR_node_visibility`` hides with everything below them."""
+    extensions = tree.extensions
+    stated = [
+        node
+        for node, told in extensions.items()
+        if isinstance(told, dict)
+        and isinstance(found := told.get(_VISIBILITY), dict)
+        and found.get("visible") is False
+    ]
+    if not stated:
+        return []
+    hidden = np.zeros(tree.n_nodes, dtype=np.bool_)
+    for node in stated:
+        hidden |= descendants(tree.parents, node)
+    drawn = np.flatnonzero(hidden & (tree.meshes >= 0)).tolist()
+    if drawn:
+        names = [tree.names[node] or f"node {node}" for node in drawn]
+        document.source.warn("F007.gltf-hidden", "/nodes", n=len(drawn), names=names)
+    return drawn
+
+
+def _names(document: Document, member: str) -> list[str]:
+    items: Any = document.root.values.get(member, [])
+    if type(items) is not list or set(map(type, items)) - {str}:
+        raise document.root.wrong(member, "a list of names")
+    return list(dict.fromkeys(items))
+
+
+_EXTRAS, _EXTENSIONS = "extras", "extensions"
+
+# Lists whose items have application data that is written back.
+_KEPT = frozenset({"nodes", "meshes", "materials", "scenes", "animations"})
+
+# Lists whose items lose their names: the writer makes new ones, or names cameras after their nodes.
+_UNNAMED = frozenset({"textures", "samplers", "cameras"})
+_DRAWN = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
+_READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
+
+
+def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
+    """Return the members that are not written back, each once, such as ``images.extras``.
+
+    Parameters
+    ----------
+    root : dict
+        The document, as parsed from JSON.
+
+    >>> images = [{"extras": 1}, {"extras": 2}]
+    >>> attributes = {"POSITION": 0, "_SPEED": 1}
+    >>> meshes = [{"extras": 3, "primitives": [{"attributes": attributes}]}]
+    >>> unkept_members({"images": images, "meshes": meshes, "extras": 4})
+    ('images.extras', 'attributes._SPEED')
+    """
+    found: dict[str, None] = {}
+    for kind, listed in root.items():
+        if kind == _EXTENSIONS:
+            found |= dict.fromkeys(_extensions(kind, listed))
+        if kind == "asset":
+            found |= dict.fromkeys(_members(kind, [listed], False))
+        elif isinstance(listed, list):
+            found |= dict.fromkeys(_names_not_kept(kind, listed, root))
+            found |= dict.fromkeys(_members(kind, listed, kind in _KEPT))
+    return tuple(found)
+
+
+def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
+    """Return what a document holds, with numbers, as parts of a message."""
+    counts: Counter[str] = Counter()
+    for mesh in _objects(root.get("meshes")):
+        for primitive in _objects(mesh.get("primitives")):
+            counts[_DRAWN.get(primitive.get("mode", 4), "triangles")] += 1
+    found = {f"gltf-{kind}": counts[kind] for kind in ("points", "lines", "triangles")}
+    for kind in ("cameras", "nodes", "skins", "animations", "materials", "images"):
+        found[f"gltf-{kind}"] = len(_objects(root.get(kind)))
+    extensions = root.get(_EXTENSIONS)
+    told = extensions.get("KHR_lights_punctual") if isinstance(extensions, dict) else None
+    found["gltf-lights"] = len(_objects(told.get("lights"))) if isinstance(told, dict) else 0
+    return tuple(Phrase(key, n=n) for key, n in found.items() if n)
+
+
+def _objects(listed: Any) -> list[dict[str, Any]]:
+    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+
+
+def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:
+    """Yield the members of the objects in a list, and of the objects within these."""
+    for item in listed:
+        if not isinstance(item, dict):
+            continue
+        for name, value in item.items():
+            if name == _EXTRAS:
+                yield from () if keeps_extras else (f"{kind}.{name}",)
+            elif name == _EXTENSIONS:
+                yield from _extensions(kind, value)
+            elif name == "attributes" and isinstance(value, dict):
+                yield from (f"{name}.{each}" for each in value if not _READ.fullmatch(each))
+            elif isinstance(value, list | dict):
+                yield from _members(name, value if isinstance(value, list) else [value], False)
+
+
+def _names_not_kept(kind: str, listed: list[Any], root: dict[str, Any]) -> Iterator[str]:
+    """Yield the name of a list whose items lose names."""
+    named = {at: item["name"] for at, item in enumerate(_objects(listed)) if item.get("name")}
+    if kind == "cameras":
+        # The node's name comes first; without one, the camera keeps its own.
+        nodes = [node for node in _objects(root.get("nodes")) if node.get("name")]
+        lost = any(
+            named.get(node.get("camera", -1), node["name"]) != node["name"] for node in nodes
+        )
+    else:
+        lost = bool(named)
+    if lost and kind in _UNNAMED:
+        yield f"{kind}.name"
+
+
+def _extensions(kind: str, told: Any) -> Iterator[str]:
+    for name in told if isinstance(told, dict) else ():
+        if name not in _KEPT_EXTENSIONS:
+            yield f"{kind}.{name}"

@@ -1,0 +1,420 @@
+"""Nodes of a glTF document: their tree, transforms and contents."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._scene_graph.content import (
+    NodeCamera,
+    NodeMesh,
+    NodeSkin,
+    NodeTree,
+    Primitive,
+    roots_of,
+)
+from viewer.formats.gltf.document import Document
+from viewer.formats.gltf.elements import Element, Table, member_indices, member_rows
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.rotation import (
+    matrix_to_quaternion,
+    nearest_rotations,
+    quaternion_to_matrix,
+)
+from viewer.rig.hierarchy import cycle_members
+
+
+def read_tree(document: Document) -> NodeTree:
+    """Return all nodes of a document.
+
+    Raises
+    ------
+    FormatError
+        If a node is invalid, has two parents, or is its own ancestor.
+    """
+    table = document.table("nodes")
+    for place in range(len(table)):
+        if type(table.items[place]) is not dict:
+            table[place]  # raises the error for an item that is not an object
+    parents = _parents(table)
+    transforms: _Transforms = _node_transforms(table)
+    return NodeTree(
+        names=tuple(_names(table)),
+        parents=parents,
+        translations=transforms.translations,
+        rotations=transforms.rotations,
+        scales=transforms.scales,
+        matrices=transforms.matrices,
+        meshes=_members(document, "mesh", "meshes"),
+        skins=_members(document, "skin", "skins"),
+        cameras=_members(document, "camera", "cameras"),
+        shape_weights=_weights(table),
+        extras=_kept(table, "extras"),
+        extensions=_kept(table, "extensions"),
+    )
+
+
+def _names(table: Table) -> list[str]:
+    names = [values.get("name", "") for values in table.items]
+    if set(map(type, names)) - {str}:
+        return [table[place].text("name") for place in range(len(names))]
+    return names
+
+
+def _members(document: Document, name: str, what: str) -> Ints:
+    return member_indices(document.table("nodes"), name, len(document.table(what)), what)
+
+
+def _weights(table: Table) -> dict[int, Any]:
+    """Return the morph target weights of the nodes that have any."""
+    places = [place for place, values in enumerate(table.items) if "weights" in values]
+    return {place: table[place].numbers("weights") for place in places}
+
+
+def _kept(table: Table, name: str) -> dict[int, Any]:
+    """Return the parsed values of a member, for the nodes that have it."""
+    return {place: values[name] for place, values in enumerate(table.items) if name in values}
+
+
+def _parents(table: Table) -> Ints:
+    """Return each node's parent: (N,) int32, -1 for a root."""
+    count = len(table)
+    parents = [-1] * count
+    for place, values in enumerate(table.items):
+        if "children" not in values:
+            continue
+        for index, child in enumerate(table[place].indices("children", count, "nodes")):
+            if parents[child] == place:
+                table[place].warn("G003.child-twice", "children", found=child)
+            elif parents[child] >= 0:
+                pointer = table[place].at("children", index)
+                other = parents[child]
+                table.source.refuse("F002.gltf-parents", pointer, found=child, other=other)
+            else:
+                parents[child] = place
+    result = np.array(parents, dtype=np.int32)
+    _check_cycles(table, result)
+    return result
+
+
+def _check_cycles(table: Table, parents: Ints) -> None:
+    """Refuse nodes that are their own ancestors; if errors are only recorded, break the cycles."""
+    members = cycle_members(parents)
+    left = np.nonzero(members)[0].tolist()
+    seen: set[int] = set()
+    for first in left:
+        if first in seen:
+            continue
+        cycle = [first]
+        while (above := int(parents[cycle[-1]])) != first:
+            cycle.append(above)
+        seen.update(cycle)
+        pointer = table[int(parents[first])].at("children")
+        table.source.refuse("F002.gltf-cycle", pointer, nodes=[*reversed(cycle)])
+        parents[first] = -1
+
+
+_UNIT = 1e-3  # maximum deviation of a quaternion's length from 1 that is not reported
+_TINY = 1e-12  # minimum length of a quaternion with a direction
+
+# Relative error of T R S compared with the matrix: the rounding of a few products in float32.
+_EXACT = 1e-6
+_LAST_ROW = 1e-5  # maximum deviation of the last row from 0 0 0 1 that is due to rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Transforms:
+    """Local transforms as in ``NodeTree``."""
+
+    translations: Floats
+    rotations: Floats
+    scales: Floats
+    matrices: dict[int, Floats]
+
+
+def _node_transforms(table: Table) -> _Transforms:
+    """Return the local transforms of all nodes.
+
+    Raises
+    ------
+    FormatError
+        If a member is malformed, or a matrix is not affine.
+    """
+    count = len(table)
+    translations, scales = np.zeros((count, 3)), np.ones((count, 3))
+    rotations = np.zeros((count, 4))
+    rotations[:, 3] = 1.0
+    for name, rows in (("translation", translations), ("scale", scales)):
+        places, values = member_rows(table, name, 3)
+        rows[places] = values
+    places, values = member_rows(table, "rotation", 4)
+    rotations[places] = _unit(table, places, values)
+    result = _Transforms(translations, rotations, scales, {})
+    _put_matrices(table, result)
+    return result
+
+
+def _unit(table: Table, places: Ints, rotations: Floats) -> Floats:
+    """Return quaternions of unit length; those without a direction become the identity."""
+    lengths = np.linalg.norm(rotations, axis=1)
+    odd = np.abs(lengths - 1.0) > _UNIT
+    if odd.any():
+        first = int(odd.argmax())
+        pointer = table[int(places[first])].at("rotation")
+        n = int(odd.sum())
+        table.source.warn("G003.rotation", pointer, n=n, found=float(lengths[first]))
+    is_zero = lengths < _TINY
+    rotations = np.where(is_zero[:, None], (0.0, 0.0, 0.0, 1.0), rotations)
+    return rotations / np.where(is_zero, 1.0, lengths)[:, None]
+
+
+def _put_matrices(table: Table, result: _Transforms) -> None:
+    """Set the transforms of the nodes that have a matrix."""
+    places, columns = member_rows(table, "matrix", 16)
+    if not len(places):
+        return
+    _check_mixture(table, places)
+    matrices = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+    _check_affine(table, places, matrices)
+    rotations, scales, is_exact = _decomposed(matrices[:, :3, :3])
+    exact = places[is_exact]
+    result.translations[exact] = matrices[is_exact, :3, 3]
+    result.rotations[exact] = rotations[is_exact]
+    result.scales[exact] = scales[is_exact]
+    for place, matrix in zip(places[~is_exact].tolist(), matrices[~is_exact], strict=True):
+        result.translations[place], result.scales[place] = 0.0, 1.0
+        result.rotations[place] = 0.0, 0.0, 0.0, 1.0
+        result.matrices[place] = np.vstack([matrix[:3], (0.0, 0.0, 0.0, 1.0)])
+
+
+def _check_mixture(table: Table, places: Ints) -> None:
+    for place in places.tolist():
+        others = {"translation", "rotation", "scale"} & table.items[place].keys()
+        if others:
+            table[place].warn("G003.matrix-and", "matrix", names=sorted(others))
+
+
+def _check_affine(table: Table, places: Ints, matrices: Floats) -> None:
+    odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _LAST_ROW).any(axis=1)
+    if odd.any():
+        first = int(odd.argmax())
+        row = " ".join(f"{value:g}" for value in matrices[first, 3])
+        raise table[int(places[first])].fault("F002.gltf-affine", "matrix", found=row)
+
+
+def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
+    """Return rotations (N, 4) and scales (N, 3) of linear parts, and whether they are exact.
+
+    A reflection becomes a negative scale along x.
+    """
+    scales = np.linalg.norm(linear, axis=1)
+    scales[:, 0] *= np.where(np.linalg.det(linear) < 0.0, -1.0, 1.0)
+    # Columns of length 0 are replaced so that the matrix is a rotation.
+    columns = linear / np.where(scales == 0.0, 1.0, scales)[:, None, :]
+    turns, _ = nearest_rotations(columns)
+    rotations = matrix_to_quaternion(turns)
+    again = quaternion_to_matrix(rotations) * scales[:, None, :]
+    sizes = np.abs(linear).max(axis=(1, 2))
+    is_exact = np.abs(again - linear).max(axis=(1, 2)) <= _EXACT * sizes
+    return rotations, scales, is_exact
+
+
+def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
+    """Return the root nodes of the default scene or the first one; all if there are no scenes.
+
+    Raises
+    ------
+    FormatError
+        If the scene does not exist, or its list of nodes is malformed.
+    """
+    scenes = document.table("scenes")
+    default = document.root.index("scene", len(scenes), "scenes")
+    every = tuple(np.nonzero(tree.parents < 0)[0].tolist())
+    if not len(scenes):
+        return every
+    scene = scenes[max(default, 0)]
+    roots = _roots(scene, tree)
+    if len(scenes) > 1 and roots:
+        name = scene.text("name") or str(max(default, 0))
+        document.root.warn("F007.gltf-scenes", "scenes", n=len(scenes), found=name)
+    if not roots and every:
+        scene.warn("F007.gltf-empty-scene")
+    return roots or every
+
+
+def shown_scene(document: Document) -> dict[str, Any]:
+    """Return the name and the application data of the default scene or the first one."""
+    scenes = document.table("scenes")
+    if not len(scenes):
+        return {}
+    scene = scenes[max(document.root.index("scene", len(scenes), "scenes"), 0)]
+    name, extras = scene.text("name"), scene.values.get("extras")
+    return ({"name": name} if name else {}) | ({} if extras is None else {"extras": extras})
+
+
+def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
+    nodes = scene.indices("nodes", tree.n_nodes, "nodes")
+    children = [node for node in nodes if tree.parents[node] >= 0]
+    if children:
+        scene.warn("G003.scene-child", "nodes", n=len(children), found=children[0])
+    # Transforms of the ancestors apply, so the tree is shown from its root.
+    return tuple(dict.fromkeys(roots_of(tree.parents)[nodes].tolist()))
+
+
+_ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
+
+
+def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
+    """Return all cameras; an invalid camera gets a default field of view, with a warning."""
+    table = document.table("cameras")
+    cameras = []
+    for index in range(len(table)):
+        try:
+            cameras.append(_camera(table[index]))
+        except FormatError as problem:
+            # A figure can be shown without the file's camera.
+            pointer = problem.diagnostic.pointer
+            table.source.warn("G003.camera", pointer, problem=problem.diagnostic.message)
+            cameras.append(NodeCamera("", _ANGLE))
+    return tuple(cameras)
+
+
+def _camera(camera: Element) -> NodeCamera:
+    name = camera.text("name")
+    kind = camera.choice("type", ("perspective", "orthographic"))
+    lens = camera.part(kind)
+    if lens is None:
+        raise camera.wrong(kind, "an object")
+    if kind == "orthographic":
+        height = abs(lens.number("ymag")) * 2.0
+        width = abs(lens.number("xmag")) * 2.0
+        return NodeCamera(name, None, width / height if height else None, height)
+    angle = lens.number("yfov")
+    if not 0.0 < angle < math.pi:
+        raise lens.wrong("yfov", "an angle between 0 and pi")
+    aspect, near, far = (_positive(lens, each) for each in ("aspectRatio", "znear", "zfar"))
+    far = None if near is not None and far is not None and far <= near else far
+    return NodeCamera(name, angle, aspect, near=near, far=far)
+
+
+def _positive(lens: Element, name: str) -> float | None:
+    """Return a number above 0; None if it is missing or not above 0."""
+    found = lens.number(name) if lens.has(name) else 0.0
+    return found if found > 0.0 else None
+
+
+_EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
+_BINDING_LAST_ROW = 1e-4  # maximum deviation of the last row from 0 0 0 1 that is due to rounding
+
+
+def read_skins(document: Document) -> tuple[NodeSkin, ...]:
+    """Return all skins.
+
+    Raises
+    ------
+    FormatError
+        If a skin is malformed, refers to missing nodes, or has too few or invalid matrices.
+    """
+    table = document.table("skins")
+    skins = (partial(_skin, document, table, index) for index in range(len(table)))
+    return tuple(document.kept(skin, _EMPTY) for skin in skins)
+
+
+def _skin(document: Document, table: Table, index: int) -> NodeSkin:
+    skin = table[index]
+    n_nodes = len(document.table("nodes"))
+    joints = skin.indices("joints", n_nodes, "nodes")
+    if not joints:
+        if not skin.has("joints"):
+            raise skin.wrong("joints", "a list of nodes")
+        skin.warn("G004.no-joints", "joints")
+        return _EMPTY
+    if len(set(joints)) != len(joints):
+        skin.warn("G004.joint-twice", "joints", n=len(joints) - len(set(joints)))
+    root = skin.values.get("skeleton", 0)
+    if type(root) is not int or not 0 <= root < n_nodes:
+        skin.warn("G004.skeleton", "skeleton", found=str(root)[:20])
+    matrices = _inverse_bind(document, skin, len(joints))
+    return NodeSkin(skin.text("name"), np.array(joints, dtype=np.int32), matrices)
+
+
+def _inverse_bind(document: Document, skin: Element, n_joints: int) -> Floats:
+    """Return one matrix per joint; identities if there are none."""
+    name = "inverseBindMatrices"
+    accessor = skin.index(name, len(document.accessors), "accessors")
+    if accessor < 0:
+        return np.tile(np.eye(4), (n_joints, 1, 1))
+    found = document.accessors.count(accessor)
+    if found < n_joints:
+        raise skin.fault("F002.gltf-bind-count", name, expected=n_joints, found=found)
+    if found > n_joints:
+        skin.warn("G004.bind-count", name, expected=n_joints, found=found)
+    matrices = document.accessors.matrices(accessor, skin.at(name))[:n_joints]
+    is_finite = np.isfinite(matrices).all(axis=(1, 2))
+    if not is_finite.all():
+        raise skin.fault("F003.gltf-bind", name, joint=int((~is_finite).argmax()))
+    odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _BINDING_LAST_ROW).any(axis=1)
+    if odd.any():
+        joint = int(odd.argmax())
+        row = " ".join(f"{value:g}" for value in matrices[joint, 3])
+        raise skin.fault("F002.gltf-bind-row", name, joint=joint, found=row)
+    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0
+    return matrices
+
+
+def checked_bindings(
+    document: Document,
+    tree: NodeTree,
+    meshes: tuple[NodeMesh, ...],
+    skins: tuple[NodeSkin, ...],
+) -> tuple[NodeMesh, ...]:
+    """Return the meshes after checking their joint indices against all skins in use.
+
+    Raises
+    ------
+    FormatError
+        If a vertex refers to a joint that the skin does not have. If errors are only recorded, the
+        weight of such an influence is set to 0.
+    """
+    limits: dict[int, tuple[int, int]] = {}
+    for node in np.nonzero((tree.meshes >= 0) & (tree.skins >= 0))[0].tolist():
+        mesh, skin = int(tree.meshes[node]), int(tree.skins[node])
+        count = len(skins[skin].joints)
+        limits[mesh] = min(limits.get(mesh, (count, skin)), (count, skin))
+    result = list(meshes)
+    for mesh, (count, skin) in limits.items():
+        result[mesh] = _checked(document, meshes[mesh], count, skin)
+    return tuple(result)
+
+
+def _checked(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -> NodeMesh:
+    primitives = []
+    for primitive in mesh.primitives:
+        joints, weights = primitive.joints, primitive.weights
+        if joints is None or weights is None or int(joints.max(initial=0)) < n_joints:
+            primitives.append(primitive)
+            continue
+        bad = joints >= n_joints
+        vertex, column = (int(axis[0]) for axis in np.nonzero(bad))
+        document.source.refuse(
+            "W010.gltf-joint",
+            f"{primitive.pointer}/attributes/JOINTS_{column // 4}",
+            vertex=vertex,
+            found=int(joints[vertex, column]),
+            joints=n_joints,
+            skin=skin,
+        )
+        primitives.append(_without(primitive, bad))
+    return replace(mesh, primitives=tuple(primitives))
+
+
+def _without(primitive: Primitive, bad: np.ndarray) -> Primitive:
+    assert primitive.joints is not None and primitive.weights is not None
+    joints = np.where(bad, 0, primitive.joints)
+    return replace(primitive, joints=joints, weights=np.where(bad, 0.0, primitive.weights))

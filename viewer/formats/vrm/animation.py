@@ -1,0 +1,132 @@
+"""Motions of humanoids, ``VRMC_vrm_animation`` 1.0 (``.vrma``).
+
+::
+
+    extensions.VRMC_vrm_animation
+        humanoid.humanBones     node of each human bone; the nodes' rest pose is a T-pose
+        expressions.preset      node of each expression: x of its translation is the weight,
+        expressions.custom      0 to 1
+    animations[0]               moves these nodes
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from viewer.formats._scene_graph.content import NodeFile, path_to_root
+from viewer.formats._scene_graph.joints import make_joints, skeleton_of
+from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
+from viewer.formats._source import Source
+from viewer.formats.vrm.bones import read_humanoid
+from viewer.formats.vrm.parts import is_index, part
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.motion.evaluation import Frames, frames_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.timing import Timing, frame_at, frame_times
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.transform_keys.rate import is_regular, key_rate
+
+EXTENSION = "VRMC_vrm_animation"
+_MOST_FRAMES = 1_000_000
+
+
+def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
+    """Return the first animation of a file of motions, sampled at the rate of its keys.
+
+    Parameters
+    ----------
+    file : NodeFile
+        A file that has the extension.
+    source : Source
+        Records messages about invalid bones and unused contents.
+
+    Raises
+    ------
+    FormatError
+        If no human bone is animated, or the animation has invalid keys or more than a million
+        frames.
+    """
+    pointer = f"/extensions/{EXTENSION}"
+    told = file.extensions[EXTENSION]
+    humanoid = read_humanoid(source, file, told, 1, pointer)
+    if not humanoid:
+        raise source.fault("F002.vrma-bones", f"{pointer}/humanoid")
+    if not file.animations:
+        raise source.fault("F002.vrma-animation")
+    if len(file.animations) > 1:
+        source.warn("F007.vrma-animations", "/animations", n=len(file.animations) - 1)
+    if part(told, "lookAt") is not None:
+        source.warn("F007.vrma-look", f"{pointer}/lookAt")
+    (read, *_) = read_once(file.animations)
+    figure, clip = _moving(file, read, _with_ancestors(file, humanoid.values()), humanoid)
+    if not clip.channels:
+        raise source.fault("F002.vrma-animation")
+    rate = key_rate(clip)
+    if not is_regular(clip):
+        source.warn("F007.vrma-rate", "/animations/0", rate=rate)
+    count = frame_at(clip.end - clip.start, rate) + 1
+    if count > _MOST_FRAMES:
+        raise source.fault("F002.vrma-long", "/animations/0", most=_MOST_FRAMES, found=count)
+    times = frame_times(clip.start, clip.end, rate)
+    frames = frames_of(figure, clip, times)
+    return SkeletonMotion(
+        figure,
+        _sampled(clip.name or file.name, rate, frames),
+        expressions=_weights(file, told, read, times),
+    )
+
+
+def _moving(
+    file: NodeFile, read: Reader, nodes: list[int], humanoid: dict[str, int] | None = None
+) -> tuple[Figure, TransformClip]:
+    """Return a skeleton made of some nodes, and its motion in the first animation."""
+    joints = make_joints(file.tree, nodes)
+    figure = Figure(
+        file.name,
+        skeleton=skeleton_of(joints, humanoid),
+        up=file.up,
+        unit=file.unit,
+        facts=file.facts,
+    )
+    found = animations_of(file.animations[:1], [read], joints.own, {})
+    first = file.animations[0]
+    clip = found[0].clip() if found else TransformClip(first.name, (), first.start, first.end)
+    return figure, clip
+
+
+def _with_ancestors(file: NodeFile, nodes: Iterable[int]) -> list[int]:
+    """Return nodes and their ancestors, parents first."""
+    depths: dict[int, int] = {}
+    for node in nodes:
+        path = path_to_root(file.tree.parents, node)
+        depths.update({each: len(path) - place for place, each in enumerate(path)})
+    return sorted(depths, key=lambda node: (depths[node], node))
+
+
+def _sampled(name: str, rate: float, frames: Frames) -> SampledClip:
+    timing = Timing(rate, np.arange(frames.n_frames, dtype=np.int32))
+    translations = frames.translations if frames.translations.any() else None
+    return SampledClip(name, timing, frames.rotations, translations)
+
+
+def _weights(file: NodeFile, told: object, read: Reader, times: Floats) -> dict[str, Floats]:
+    """Return the weights of the expressions, (N,) each."""
+    nodes: dict[str, int] = {}
+    for kind in ("preset", "custom"):
+        listed = part(told, "expressions", kind)
+        for name, each in listed.items() if isinstance(listed, dict) else ():
+            if is_index(node := part(each, "node"), file.tree.n_nodes):
+                nodes[name] = node
+    if not nodes:
+        return {}
+    order = list(dict.fromkeys(nodes.values()))
+    # Ancestors are ignored, because the weight is the local translation.
+    figure, clip = _moving(file, read, order)
+    moved = frames_of(figure, clip, times).translations
+    places = np.array([file.tree.translations[node] for node in order]) + moved
+    return {name: np.clip(places[:, order.index(n), 0], 0.0, 1.0) for name, n in nodes.items()}

@@ -1,0 +1,64 @@
+"""Nodes of human bones in VRM files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from viewer.formats._scene_graph.content import NodeFile
+from viewer.formats._source import Source
+from viewer.formats.vrm.parts import is_index, part
+from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
+
+_OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
+
+
+def read_humanoid(
+    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+) -> dict[str, int]:
+    """Return the node of each human bone, by its name in VRM 1.0.
+
+    Parameters
+    ----------
+    source : Source
+        Records messages about invalid bones, which are ignored.
+    file : NodeFile
+        The file, with its nodes.
+    told : mapping
+        The extension with the humanoid.
+    version : int
+        0 or 1.
+    pointer : str
+        JSON pointer to the extension.
+    """
+    found: dict[str, int] = {}
+    for _, bone, node in given_bones(told, version):
+        if not is_index(node, file.tree.n_nodes):
+            source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
+        elif bone in HUMAN_BONES or bone in SPINE_BONES:
+            found.setdefault(bone, node)
+        else:
+            source.warn("G006.bone", f"{pointer}/humanoid/humanBones", bone=bone)
+    return found
+
+
+def given_bones(told: Mapping[str, Any], version: int) -> list[tuple[str, str, Any]]:
+    """Return the place of each stated human bone in its list, its name in VRM 1.0, and its node."""
+    bones = part(told, "humanoid", "humanBones")
+    if version == 0 and isinstance(bones, list):
+        rows = [(str(place), part(each, "bone"), each) for place, each in enumerate(bones)]
+        return [(at, modern_bone(b), part(each, "node")) for at, b, each in rows if type(b) is str]
+    named = bones.items() if version == 1 and isinstance(bones, dict) else ()
+    return [(bone, bone, part(each, "node")) for bone, each in named]
+
+
+def modern_bone(bone: str) -> str:
+    """Return the name in VRM 1.0 of a human bone of VRM 0.x.
+
+    >>> modern_bone("leftThumbProximal"), modern_bone("hips")
+    ('leftThumbMetacarpal', 'hips')
+    """
+    for old, new in _OLD_THUMB.items():
+        if bone.endswith(old):
+            return bone.removesuffix(old) + new
+    return bone

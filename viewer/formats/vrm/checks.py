@@ -1,0 +1,103 @@
+"""Requirements of VRM characters: version, meta data, human bones, and weights of expressions.
+
+Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from viewer.formats._source import Source
+from viewer.formats.vrm.bones import given_bones
+from viewer.formats.vrm.parts import listed, part
+from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
+
+_MODERN = "1.0"
+MOST_WEIGHT = {0: 100.0, 1: 1.0}
+"""Largest weight of a morph target in an expression, by version."""
+_REQUIRED_META = ("name", "authors", "licenseUrl")
+
+
+def check_character(source: Source, extensions: Mapping[str, Any], version: int) -> None:
+    """Report what a VRM character lacks or states twice; each place has a JSON pointer.
+
+    Parameters
+    ----------
+    source : Source
+        Records the messages.
+    extensions : mapping
+        Extensions of the root, with the character.
+    version : int
+        0 for the extension ``VRM``, 1 for ``VRMC_vrm``.
+    """
+    key = "VRMC_vrm" if version == 1 else "VRM"
+    told, at = extensions[key], f"/extensions/{key}"
+    if isinstance(extensions.get("VRM"), dict) and version == 1:
+        source.warn("G008.versions", "/extensions/VRM")
+    if version == 1:
+        stated = told.get("specVersion")
+        if stated is None:
+            source.warn("G008.no-version", at)
+        elif stated != _MODERN:
+            source.warn("G008.version", f"{at}/specVersion", found=str(stated))
+    meta = told.get("meta")
+    if not isinstance(meta, dict):
+        source.warn("G008.no-meta", at)
+    elif version == 1 and (missing := [name for name in _REQUIRED_META if not meta.get(name)]):
+        source.warn("G008.meta", f"{at}/meta", names=missing)
+    _check_bones(source, told, version, f"{at}/humanoid/humanBones")
+    for bind, place, name in weighted_binds(told, version):
+        if not is_weight(weight := bind["weight"], version):
+            most = MOST_WEIGHT[version]
+            source.warn("G008.weight", f"{at}/{place}", name=name, most=most, found=str(weight))
+
+
+def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str) -> None:
+    """Check that all required bones occur, each once and with its own node."""
+    given = given_bones(told, version)
+    if missing := [bone for bone in REQUIRED_BONES if bone not in {bone for _, bone, _ in given}]:
+        source.warn("G008.bones", at, n=len(missing), names=missing)
+    owners: dict[Any, str] = {}
+    seen: set[str] = set()
+    for place, bone, node in given:
+        if bone in seen:
+            source.warn("G008.bone-twice", f"{at}/{place}", bone=bone)
+        elif type(node) is int and node in owners:
+            other = owners[node]
+            source.warn("G008.one-node", f"{at}/{place}", bone=bone, other=other, node=node)
+        else:
+            owners[node] = bone
+        seen.add(bone)
+    for found in source.diagnostics:
+        if found.key == "G001.repeated" and version == 1:
+            for bone in found.values["names"]:
+                if bone in HUMAN_BONES or bone in SPINE_BONES:
+                    source.warn("G008.bone-twice", f"{at}/{bone}", bone=bone)
+
+
+def is_weight(weight: Any, version: int) -> bool:
+    """Return whether the weight of a morph target in an expression is within its limits."""
+    is_number = isinstance(weight, int | float) and not isinstance(weight, bool)
+    return is_number and 0.0 <= weight <= MOST_WEIGHT[version]
+
+
+def weighted_binds(
+    told: Mapping[str, Any], version: int
+) -> Iterator[tuple[dict[str, Any], str, str]]:
+    """Yield the binds of morph targets, the place of each weight, and its expression's name."""
+    if version == 0:
+        for index, each in enumerate(listed(told, "blendShapeMaster", "blendShapeGroups")):
+            for row, bind in enumerate(listed(each, "binds")):
+                if part(bind, "weight") is not None:
+                    place = f"blendShapeMaster/blendShapeGroups/{index}/binds/{row}/weight"
+                    yield bind, place, str(part(each, "name"))
+        return
+    for kind in ("preset", "custom"):
+        named = part(told, "expressions", kind)
+        for name, each in named.items() if isinstance(named, dict) else ():
+            for row, bind in enumerate(listed(each, "morphTargetBinds")):
+                if part(bind, "weight") is not None:
+                    text = str(name).replace("~", "~0").replace("/", "~1")
+                    place = f"expressions/{kind}/{text}/morphTargetBinds/{row}/weight"
+                    yield bind, place, str(name)

@@ -1,0 +1,67 @@
+"""Access to nested properties of parsed JSON of any structure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+
+
+def part(told: Any, *names: str) -> Any:
+    """Return a nested property; None if it is missing or an outer value is not an object.
+
+    Parameters
+    ----------
+    told : Any
+        Parsed JSON.
+    *names : str
+        Keys from the outside to the inside.
+
+    >>> part({"a": {"b": 1}}, "a", "b"), part({"a": []}, "a", "b")
+    (1, None)
+    """
+    value = told
+    for name in names:
+        value = value.get(name) if isinstance(value, dict) else None
+    return value
+
+
+def listed(told: Any, *names: str) -> list[Any]:
+    """Return a nested list; an empty one if it is missing or not a list."""
+    found = part(told, *names)
+    return found if isinstance(found, list) else []
+
+
+def is_index(value: Any, count: int) -> bool:
+    """Return whether a value is an integer from 0 to ``count - 1``."""
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < count
+
+
+_LARGEST = 1e6
+
+
+def value_of(told: Any, default: float) -> float | None:
+    """Return a number; the default if it is missing, None if it is invalid.
+
+    >>> value_of(None, 2.0), value_of(1, 2.0), value_of("a", 2.0)
+    (2.0, 1.0, None)
+    >>> value_of(10**400, 2.0), value_of(float("nan"), 2.0)
+    (None, None)
+    """
+    if told is None:
+        return default
+    is_number = isinstance(told, int | float) and not isinstance(told, bool)
+    # Numbers far outside a plausible range would overflow in products.
+    return float(told) if is_number and abs(told) < _LARGEST else None
+
+
+def rows_of(told: Any, default: tuple[float, ...]) -> Floats | None:
+    """Return a vector with as many numbers as the default; None if it is invalid."""
+    if told is None:
+        return np.array(default)
+    if not isinstance(told, list) or len(told) != len(default):
+        return None
+    values = [value_of(each, 0.0) for each in told]
+    return None if None in values else np.array(values, dtype=np.float64)

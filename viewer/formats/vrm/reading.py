@@ -1,0 +1,307 @@
+"""Humanoid bones, expressions and permissions of a VRM file.
+
+Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0. Version 0
+names the joints of a thumb differently, states the weights of expressions in percent, and binds
+them to meshes instead of nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from viewer.formats._scene_graph.content import NodeExpression, NodeFile
+from viewer.formats._scene_graph.surfaces import part_name
+from viewer.formats._source import Source
+from viewer.formats.vrm.bones import read_humanoid
+from viewer.formats.vrm.checks import check_character
+from viewer.formats.vrm.constraints import read_constraints
+from viewer.formats.vrm.materials import modern_binds, old_binds
+from viewer.formats.vrm.parts import is_index, listed, part, value_of
+from viewer.formats.vrm.springs import read_springs
+from viewer.rig.expressions import OLD_PRESETS, OVERRIDES, PROCEDURAL
+from viewer.rig.mesh import PartView
+from viewer.rig.springs.springs import Springs
+
+_PERCENT = 100.0
+_OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
+
+# Heading of each property, and the property's names in versions 1.0 and 0.x.
+_META = {
+    "title": ("name", "title"),
+    "authors": ("authors", "author"),
+    "model version": ("version",),
+    "copyright": ("copyrightInformation",),
+    "contact": ("contactInformation",),
+    "references": ("references", "reference"),
+    "licence": ("licenseUrl", "licenseName"),
+    "other licence": ("otherLicenseUrl",),
+    "licences of others": ("thirdPartyLicenses",),
+    "other permissions": ("otherPermissionUrl",),
+    "may be used by": ("avatarPermission", "allowedUserName"),
+    "commercial use": ("commercialUsage", "commercialUssageName"),
+    "credit": ("creditNotation",),
+    "redistribution": ("allowRedistribution",),
+    "modification": ("modification",),
+    "violent use": ("allowExcessivelyViolentUsage", "violentUssageName"),
+    "sexual use": ("allowExcessivelySexualUsage", "sexualUssageName"),
+    "political or religious use": ("allowPoliticalOrReligiousUsage",),
+    "antisocial use": ("allowAntisocialOrHateUsage",),
+}
+_LONGEST = 200  # maximum number of characters of a property
+
+
+def with_vrm(file: NodeFile, source: Source) -> NodeFile:
+    """Return a file with the humanoid, expressions and constraints of its VRM extensions, if any.
+
+    Parameters
+    ----------
+    file : NodeFile
+        As read by the glTF reader.
+    source : Source
+        Records messages.
+
+    Raises
+    ------
+    FormatError
+        If constraints of nodes depend on each other.
+    """
+    file = replace(
+        file,
+        constraints=read_constraints(file.tree, source),
+        springs=read_springs(file, source),
+        named_nodes=_named_nodes(file.extensions, file.tree.n_nodes),
+    )
+    for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
+        told = file.extensions.get(key)
+        if isinstance(told, dict):
+            pointer = f"/extensions/{key}"
+            check_character(source, file.extensions, version)
+            file = replace(
+                file,
+                humanoid=read_humanoid(source, file, told, version, pointer),
+                expressions=_expressions(source, file, told, version, pointer),
+                part_views={
+                    **_read_part_views(file, told, version, pointer, source),
+                    **file.part_views,
+                },
+            )
+            return replace(file, facts=(*_facts(told), *_contents(file)))
+    return replace(file, facts=_contents(file))
+
+
+def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
+    """Return facts about parts that are drawn in only one view, and about constraints."""
+    names = file.tree.names
+    shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
+    facts = [
+        (heading, ", ".join(part_name(file, node) for node, view in file.part_views.items()
+                            if view == wanted))
+        for heading, wanted in shown.items()
+    ]  # fmt: skip
+    facts.append((
+        "constraints",
+        ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
+    ))  # fmt: skip
+    if file.springs is not None:
+        facts.append(("springs", _springs(file.springs)))
+    return tuple((heading, _shortened(text)) for heading, text in facts if text)
+
+
+def _springs(springs: Springs) -> str:
+    parts = (
+        (springs.n_chains, "chain"),
+        (springs.n_joints, "joint"),
+        (springs.colliders.n_colliders, "collider"),
+    )
+    return ", ".join(f"{count} {word}{'s' * (count != 1)}" for count, word in parts if count)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
+def _expressions(
+    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+) -> tuple[NodeExpression, ...]:
+    """Return the expressions that change shapes or materials; report changes without effect."""
+    if version == 0:
+        groups = listed(told, "blendShapeMaster", "blendShapeGroups")
+        named = [(_old_name(each), each) for each in groups if isinstance(each, dict)]
+        at = f"{pointer}/blendShapeMaster/blendShapeGroups"
+    else:
+        kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
+        named = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
+        at = f"{pointer}/expressions"
+    found, undrawn = [], list[str]()
+    materials = listed(told, "materialProperties")
+    for name, each in named:
+        if not isinstance(each, dict):
+            continue
+        binds = _binds(source, file, each, version, at)
+        if version == 0:
+            changes, lost = old_binds(each, materials[: len(file.materials)])
+        else:
+            changes, lost = modern_binds(each, len(file.materials))
+        undrawn += [f"{name}: {one}" for one in lost]
+        if binds or changes:
+            found.append(replace(_expression(str(name), each, binds), materials=tuple(changes)))
+    if undrawn:
+        source.warn("F007.vrm-materials", at, names=undrawn)
+    return tuple(found)
+
+
+def _expression(
+    name: str, told: Mapping[str, Any], binds: tuple[tuple[int, int, float], ...]
+) -> NodeExpression:
+    overrides = {}
+    for kind, key in _OVERRIDES.items():
+        effect = told.get(key, "none")
+        overrides[kind] = effect if effect in OVERRIDES else "none"
+    kinds = [kind for kind, names in PROCEDURAL.items() if name in names]
+    preset = str(told.get("presetName") or "").lower()
+    return NodeExpression(
+        name,
+        binds,
+        is_binary=told.get("isBinary") is True,
+        kind=kinds[0] if kinds else "",
+        overrides=overrides,
+        preset=OLD_PRESETS.get(preset, ""),
+    )
+
+
+def _old_name(told: Mapping[str, Any]) -> str:
+    """Return the name of an expression of VRM 0.x, or that of its preset if it has none."""
+    return str(told.get("name") or told.get("presetName") or "unnamed")
+
+
+def _binds(
+    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+) -> tuple[tuple[int, int, float], ...]:
+    """Return node, morph target and weight of each bind of an expression."""
+    binds: list[tuple[int, int, float]] = []
+    for each in listed(told, "binds" if version == 0 else "morphTargetBinds"):
+        index, told_weight = part(each, "index"), part(each, "weight")
+        weight = None if told_weight is None else value_of(told_weight, 0.0)
+        if version == 0:
+            mesh, scale = part(each, "mesh"), 1.0 / _PERCENT
+            is_mesh = is_index(mesh, len(file.meshes))
+            nodes = file.tree.with_mesh(mesh) if is_mesh else []
+        else:
+            node, scale = part(each, "node"), 1.0
+            nodes = [node] if is_index(node, file.tree.n_nodes) else []
+        valid = [node for node in nodes if _has_target(file, node, index)]
+        if not valid or weight is None:
+            source.warn("G006.bind", pointer, found=index)
+            continue
+        binds += [(node, index, weight * scale) for node in valid]
+    return tuple(binds)
+
+
+def _has_target(file: NodeFile, node: int, index: Any) -> bool:
+    mesh = int(file.tree.meshes[node])
+    return mesh >= 0 and is_index(index, len(file.meshes[mesh].target_names))
+
+
+def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return the properties of the model for ``viewer info``, each a heading and a text."""
+    meta = told.get("meta")
+    facts = [("VRM", _shortened(str(told.get("specVersion") or "0.x")))]
+    for heading, keys in _META.items():
+        value = next((part(meta or {}, key) for key in keys if part(meta or {}, key)), None)
+        if value is None and any(part(meta or {}, key) is False for key in keys):
+            value = False
+        if isinstance(value, bool):
+            facts.append((heading, "allowed" if value else "not allowed"))
+        elif isinstance(value, list):
+            facts.append((heading, _shortened(", ".join(map(str, value)))))
+        elif value:
+            facts.append((heading, _shortened(str(value))))
+    return tuple(facts)
+
+
+_SINGLE = {"node", "center", "firstPersonBone"}
+_LISTS = {"bones"}
+
+
+def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
+    """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` name.
+
+    Parameters
+    ----------
+    extensions : mapping
+        Extensions of the root, as parsed from JSON.
+    n_nodes : int
+        Number of nodes; other indices are ignored.
+
+    >>> told = {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1, 9], "center": 2}]}}}
+    >>> sorted(named_nodes(told, 3))
+    [1, 2]
+    """
+    found: set[int] = set()
+    stack: list[Any] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
+    while stack:
+        told = stack.pop()
+        if isinstance(told, list):
+            stack += told
+        elif isinstance(told, dict):
+            for name, value in told.items():
+                given = value if name in _LISTS and isinstance(value, list) else [value]
+                if name in _SINGLE or name in _LISTS:
+                    found.update(each for each in given if is_index(each, n_nodes))
+                else:
+                    stack.append(value)
+    return frozenset(found)
+
+
+_VIEWS: dict[str, PartView] = {
+    "auto": "auto",
+    "both": "both",
+    "thirdpersononly": "third-person",
+    "firstpersononly": "first-person",
+}
+
+
+def _read_part_views(
+    file: NodeFile, told: Mapping[str, Any], version: int, pointer: str, source: Source
+) -> dict[int, PartView]:
+    """Return the view in which each annotated node's mesh is drawn.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Nodes and meshes.
+    told : mapping
+        The VRM extension.
+    version : int
+        0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), 1 nodes
+        (``type: "firstPersonOnly"``).
+    pointer : str
+        JSON pointer to the extension.
+    source : Source
+        Records messages about invalid annotations, which are ignored.
+    """
+    listed = part(told, "firstPerson", "meshAnnotations")
+    found: dict[int, PartView] = {}
+    for index, each in enumerate(listed if isinstance(listed, list) else ()):
+        view = part(each, "firstPersonFlag" if version == 0 else "type")
+        known = _VIEWS.get(view.lower()) if isinstance(view, str) else None
+        nodes = _nodes(file, each, version)
+        if known is None or not nodes:
+            at = f"{pointer}/firstPerson/meshAnnotations/{index}"
+            source.warn("G006.first-person", at, found=str(view))
+            continue
+        found.update(dict.fromkeys(nodes, known))
+    return found
+
+
+def _nodes(file: NodeFile, each: Any, version: int) -> list[int]:
+    """Return the nodes whose mesh is annotated."""
+    if version == 0:
+        mesh = part(each, "mesh")
+        has_mesh = is_index(mesh, len(file.meshes))
+        return file.tree.with_mesh(mesh) if has_mesh else []
+    node = part(each, "node")
+    has_node = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0
+    return [node] if has_node else []

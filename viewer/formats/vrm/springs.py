@@ -1,0 +1,314 @@
+"""Chains of spring joints: ``VRMC_springBone`` 1.0 and ``secondaryAnimation``.
+
+::
+
+    VRMC_springBone (1.0)
+        springs         joints (node, stiffness, dragForce, gravityPower, gravityDir, hitRadius),
+                        center (node), colliderGroups; each joint points at the next one
+        colliderGroups  colliders
+        colliders       node, shape: sphere (offset, radius) or capsule (offset, tail, radius);
+                        VRMC_springBone_extended_collider replaces the shape: also inside, or
+                        plane (offset, normal)
+
+Version 0.x is in ``old_springs.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.formats._scene_graph.content import NodeFile, NodeTree
+from viewer.formats._source import Source
+from viewer.formats.vrm.parts import is_index, listed, part, rows_of, value_of
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.springs.springs import INSIDE, OUTSIDE, PLANE, Colliders, Springs
+
+_EXTENSION = "VRMC_springBone"
+EXTENDED = "VRMC_springBone_extended_collider"
+_DOWN = (0.0, -1.0, 0.0)
+
+
+def read_springs(file: NodeFile, source: Source) -> Springs | None:
+    """Return the spring joints of a file as node indices; None if there are none.
+
+    Parameters
+    ----------
+    file : NodeFile
+        The file, with its extensions.
+    source : Source
+        Records messages about invalid chains and colliders, which are ignored.
+    """
+    told = file.extensions.get(_EXTENSION)
+    old = part(file.extensions, "VRM", "secondaryAnimation")
+    if isinstance(told, dict):
+        shapes, groups = _shapes(file, told, source)
+        chains = [*_chains(file, told, groups, source)]
+    elif isinstance(old, dict):
+        shapes, groups = _old_shapes(file, old)
+        chains = [*_old_chains(file, old, groups, source)]
+    else:
+        return None
+    found: dict[int, _SpringJoint] = {}
+    for chain in chains:
+        for joint in chain:
+            found.setdefault(joint.node, joint)
+    return _springs([*found.values()], shapes, len(chains)) if found else None
+
+
+def _springs(joints: list[_SpringJoint], shapes: list[Shape], n_chains: int) -> Springs:
+    return Springs(
+        joints=np.array([each.node for each in joints], np.int32),
+        tails=np.array([each.tail for each in joints]),
+        stiffness=np.array([each.stiffness for each in joints]),
+        drags=np.array([each.drag for each in joints]),
+        gravities=np.array([each.gravity for each in joints]),
+        radii=np.array([each.radius for each in joints]),
+        centers=np.array([each.center for each in joints], np.int32),
+        colliders=Colliders(
+            np.array([each.node for each in shapes], np.int32),
+            np.array([each.offset for each in shapes]).reshape(-1, 3),
+            np.array([each.tail for each in shapes]).reshape(-1, 3),
+            np.array([each.radius for each in shapes]),
+            np.array([each.kind for each in shapes], np.int32),
+        ),
+        obstacles=tuple(each.obstacles for each in joints),
+        n_chains=n_chains,
+    )
+
+
+def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[Shape], list[tuple[int, ...]]]:
+    """Return the colliders of version 1.0, and the colliders of each group."""
+    places: dict[int, int] = {}
+    shapes: list[Shape] = []
+    for index, each in enumerate(listed(told, "colliders")):
+        extended = part(each, "extensions", EXTENDED, "shape")
+        told_shape = part(each, "shape") if extended is None else extended
+        shape = _shape(part(each, "node"), told_shape, file.tree.n_nodes)
+        if shape is None:
+            at = f"/extensions/{_EXTENSION}/colliders/{index}"
+            source.warn("G006.collider", at)
+        else:
+            places[index] = len(shapes)
+            shapes.append(shape)
+    groups = [listed(each, "colliders") for each in listed(told, "colliderGroups")]
+    return shapes, [
+        tuple(places[index] for index in group if isinstance(index, int) and index in places)
+        for group in groups
+    ]
+
+
+def _shape(node: Any, told: Any, n_nodes: int) -> Shape | None:
+    """Return a collider of version 1.0, possibly an extended one; None if it is invalid."""
+    kinds = [kind for kind in ("sphere", "capsule", "plane") if isinstance(part(told, kind), dict)]
+    if not is_index(node, n_nodes) or len(kinds) != 1:
+        return None
+    given = part(told, kinds[0])
+    offset = rows_of(part(given, "offset"), (0.0, 0.0, 0.0))
+    tail = rows_of(part(given, "tail"), (0.0, 0.0, 0.0)) if kinds[0] == "capsule" else offset
+    radius = value_of(part(given, "radius"), 0.0)
+    if offset is None or tail is None or radius is None:
+        return None
+    if kinds[0] == "plane":
+        normal = rows_of(part(given, "normal"), (0.0, 0.0, 1.0))
+        if normal is None or not normal.any():
+            return None
+        return Shape(node, offset, offset + normal, 0.0, PLANE)
+    return Shape(node, offset, tail, radius, INSIDE if part(given, "inside") is True else OUTSIDE)
+
+
+def _chains(
+    file: NodeFile, told: Any, groups: list[tuple[int, ...]], source: Source
+) -> Iterator[list[_SpringJoint]]:
+    """Yield the chains of version 1.0."""
+    for index, spring in enumerate(listed(told, "springs")):
+        chain = _chain(file.tree, spring, listed(spring, "joints"), groups)
+        if chain is None:
+            source.warn("G006.spring", f"/extensions/{_EXTENSION}/springs/{index}")
+        elif chain:
+            yield chain
+
+
+def _chain(
+    tree: NodeTree, spring: Any, joints: list[Any], groups: list[tuple[int, ...]]
+) -> list[_SpringJoint] | None:
+    """Return the joints of a chain that point at the next one; None if it is invalid."""
+    nodes = [part(each, "node") for each in joints]
+    if not all(is_index(node, tree.n_nodes) for node in nodes):
+        return None
+    obstacles = _obstacles_of(spring, groups)
+    center = part(spring, "center")
+    chain = []
+    for told, node, following in zip(joints, nodes, nodes[1:], strict=False):
+        tail = _tail_between(tree, node, following)
+        down = rows_of(part(told, "gravityDir"), _DOWN)
+        values = [
+            value_of(part(told, name), default)
+            for name, default in (
+                *(("stiffness", 1.0), ("dragForce", 0.5)),
+                *(("gravityPower", 0.0), ("hitRadius", 0.0)),
+            )
+        ]
+        if tail is None or down is None or None in values:
+            return None
+        stiffness, drag, power, radius = (float(value or 0.0) for value in values)
+        if tail.any():
+            at = center if is_index(center, tree.n_nodes) else -1
+            chain.append(
+                _SpringJoint(node, tail, stiffness, drag, power * down, radius, at, obstacles)
+            )
+    return chain
+
+
+@dataclass(frozen=True, slots=True)
+class _SpringJoint:
+    """One spring joint, and the settings of its chain."""
+
+    node: int
+    tail: Floats
+    stiffness: float
+    drag: float
+    gravity: Floats
+    radius: float
+    center: int
+    obstacles: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A sphere, capsule or plane, as in ``Colliders``."""
+
+    node: int
+    offset: Floats
+    tail: Floats
+    radius: float
+    kind: int = OUTSIDE
+
+
+def _obstacles_of(spring: Any, groups: list[tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the colliders of a chain's groups, each once."""
+    chosen = [g for g in listed(spring, "colliderGroups") if is_index(g, len(groups))]
+    return tuple(dict.fromkeys(index for group in chosen for index in groups[group]))
+
+
+def _tail_between(tree: NodeTree, head: int, tail: int) -> Floats | None:
+    """Return the origin of a node in the space of an ancestor; None if the node is not below it."""
+    place, node = np.zeros(3), tail
+    while node != head:
+        if node < 0:
+            return None
+        matrix = _node_matrix(tree, node)
+        place = matrix[:3, :3] @ place + matrix[:3, 3]
+        node = int(tree.parents[node])
+    return place
+
+
+def _node_world(tree: NodeTree, node: int) -> Floats:
+    """Return the matrix from a node to the scene: (4, 4)."""
+    matrix = np.eye(4)
+    while node >= 0:
+        matrix = _node_matrix(tree, node) @ matrix
+        node = int(tree.parents[node])
+    return matrix
+
+
+def _node_matrix(tree: NodeTree, node: int) -> Floats:
+    """Return the matrix from a node to its parent: (4, 4)."""
+    if node in tree.matrices:
+        return tree.matrices[node]
+    matrix = np.eye(4)
+    matrix[:3, :3] = quaternion_to_matrix(tree.rotations[node]) * tree.scales[node]
+    matrix[:3, 3] = tree.translations[node]
+    return matrix
+
+
+# Spring chains of VRM 0.x, ``VRM.secondaryAnimation``.
+#
+# ::
+#
+#     boneGroups      bones (nodes), stiffiness, dragForce, gravityPower, gravityDir, hitRadius,
+#                     center (node), colliderGroups; all nodes below a bone belong to the chain,
+#                     each
+#                     points at its first child, and the last one 7 cm further
+#     colliderGroups  node, colliders (offset, radius)
+#
+# Vectors are in Unity's axes, whose z axis is reversed.
+
+_END = 0.07  # distance from the last joint to the swinging point, metres
+_TO_OURS = np.array([1.0, 1.0, -1.0])
+
+
+def _old_shapes(file: NodeFile, told: Any) -> tuple[list[Shape], list[tuple[int, ...]]]:
+    """Return the colliders of version 0.x, and the colliders of each group."""
+    shapes: list[Shape] = []
+    groups: list[tuple[int, ...]] = []
+    for each in listed(told, "colliderGroups"):
+        first, node = len(shapes), part(each, "node")
+        for given in listed(each, "colliders") if is_index(node, file.tree.n_nodes) else ():
+            offset = _vector(part(given, "offset"), (0.0, 0.0, 0.0))
+            radius = value_of(part(given, "radius"), 0.0)
+            if offset is not None and radius is not None:
+                shapes.append(Shape(node, offset, offset, radius))
+        groups.append(tuple(range(first, len(shapes))))
+    return shapes, groups
+
+
+def _old_chains(
+    file: NodeFile, told: Any, groups: list[tuple[int, ...]], source: Source
+) -> Iterator[list[_SpringJoint]]:
+    """Yield the chains of version 0.x, one for each root bone."""
+    tree = file.tree
+    children: dict[int, list[int]] = {}
+    for node, parent in enumerate(tree.parents.tolist()):
+        children.setdefault(parent, []).append(node)
+    for index, group in enumerate(listed(told, "boneGroups")):
+        down = _vector(part(group, "gravityDir"), _DOWN)
+        names = ("stiffiness", "dragForce", "gravityPower", "hitRadius")
+        values = [value_of(part(group, name), 0.0) for name in names]
+        bones = listed(group, "bones")
+        is_valid = all(is_index(bone, tree.n_nodes) for bone in bones)
+        if down is None or None in values or not is_valid:
+            at = f"/extensions/VRM/secondaryAnimation/boneGroups/{index}"
+            source.warn("G006.spring", at)
+            continue
+        stiffness, drag, power, radius = (float(value or 0.0) for value in values)
+        center = part(group, "center")
+        at_node = center if is_index(center, tree.n_nodes) else -1
+        rest = (stiffness, drag, power * down, radius, at_node, _obstacles_of(group, groups))
+        for bone in bones:
+            tails = [*_tails(tree, children, bone)]
+            chain = [_SpringJoint(node, tail, *rest) for node, tail in tails if tail.any()]
+            if chain:
+                yield chain
+
+
+def _tails(
+    tree: NodeTree, children: dict[int, list[int]], bone: int
+) -> Iterator[tuple[int, Floats]]:
+    """Yield a bone and all nodes below it, parents first, with the swinging point of each."""
+    stack = [bone]
+    while stack:
+        node = stack.pop()
+        below = children.get(node, [])
+        stack += below[::-1]
+        if below:
+            yield node, _node_matrix(tree, below[0])[:3, 3]
+            continue
+        world, parent = _node_world(tree, node), int(tree.parents[node])
+        away = world[:3, 3] - (_node_world(tree, parent)[:3, 3] if parent >= 0 else 0.0)
+        length = float(np.linalg.norm(away))
+        if length > 0.0 and abs(np.linalg.det(world[:3, :3])) > 0.0:
+            tail = np.linalg.solve(world[:3, :3], away * (_END / length))
+            yield node, np.asarray(tail, dtype=np.float64)
+
+
+def _vector(told: Any, default: tuple[float, ...]) -> Floats | None:
+    """Return a vector of version 0.x in our axes; None if it is invalid."""
+    if told is None:
+        return np.array(default) * _TO_OURS
+    found = rows_of([part(told, axis) or 0.0 for axis in "xyz"], default)
+    return None if found is None else found * _TO_OURS
