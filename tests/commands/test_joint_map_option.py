@@ -8,7 +8,7 @@ from formats.bvh_text import person
 
 from viewer.cli import run
 from viewer.formats import Source
-from viewer.formats._text.joint_map import read_joint_map
+from viewer.formats._joint_map import read_joint_map
 from viewer.loading import MotionSettings, bundled_body, load
 
 

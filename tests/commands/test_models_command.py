@@ -10,7 +10,7 @@ from formats.anny.anny_package import files
 
 from viewer import models
 from viewer.cli import run as main
-from viewer.formats._anny.targets import ACTIONS
+from viewer.formats.anny import ACTIONS
 from viewer.models.catalog import CATALOG
 from viewer.models.download import add_model
 from viewer.progress import Cancelled, receiving

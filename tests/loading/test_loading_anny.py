@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.formats._anny.targets import ACTIONS
+from viewer.formats.anny import ACTIONS
 from viewer.loading import MotionSettings
 
 

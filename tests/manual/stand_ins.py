@@ -34,7 +34,7 @@ from media.small_videos import counting, write
 from PIL import Image
 
 from viewer.cli import run
-from viewer.formats._anny.targets import ACTIONS
+from viewer.formats.anny import ACTIONS
 from viewer.loading import bundled_body
 from viewer.media.video import VideoSink
 from viewer.resources import resource

@@ -12,7 +12,7 @@ from pathlib import Path
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.formats import FORMATS, SUFFIXES
-from viewer.formats._smpl.published import published_names
+from viewer.formats._published_models import published_names
 from viewer.phrases import counted, listed, printable
 
 __all__ = ["Inputs", "find_inputs", "is_recording", "natural_key"]

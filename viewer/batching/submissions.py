@@ -20,8 +20,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES, Source
-from viewer.formats._archive.stored_file import StoredFile
-from viewer.formats._archive.zip_directory import DAMAGE, MAX_RATIO, SMALL
+from viewer.formats._archive.zip import DAMAGE, MAX_RATIO, SMALL, StoredFile
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import printable
 

@@ -252,7 +252,7 @@ def _joint_map(arguments: argparse.Namespace) -> JointMap | None:
     """Return the requested match of joints; raises FormatError if its file cannot be read."""
     if arguments.joint_map is None:
         return None
-    from viewer.formats._text.joint_map import read_joint_map
+    from viewer.formats._joint_map import read_joint_map
 
     return read_joint_map(Source.open(arguments.joint_map, size_limit(arguments)))
 

@@ -78,7 +78,7 @@ from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 if TYPE_CHECKING:
-    from viewer.formats._bvh.streaming import BvhStream
+    from viewer.formats.bvh.streaming import BvhStream
 
 _OPTIMIZED = (".glb", ".gltf", ".vrm")
 
@@ -291,7 +291,7 @@ def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[N
     if arguments.save_joint_map is None:
         yield
         return
-    from viewer.formats._text.joint_map import joint_map_text
+    from viewer.formats._joint_map import joint_map_text
     from viewer.media.saving import save_text
     from viewer.rig.retargeting.driven_clip import full_map
 
@@ -351,7 +351,7 @@ def convert_streamed(
     if not _is_streamable(arguments, output):
         return None
     from viewer.export.bvh.streaming import Parts, export_parts
-    from viewer.formats._bvh.streaming import Irregular
+    from viewer.formats.bvh.streaming import Irregular
 
     try:
         options = motion_options(arguments, skinning)
@@ -419,7 +419,7 @@ class _Request:
 
 def _opened(arguments: argparse.Namespace, options: MotionOptions) -> _Request | None:
     """Return the request, or None if the file must be read as a whole."""
-    from viewer.formats._bvh.streaming import open_stream
+    from viewer.formats.bvh.streaming import open_stream
 
     source = Source.open(scene_files(arguments)[0], size_limit(arguments))
     path = source.path

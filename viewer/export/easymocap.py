@@ -39,8 +39,7 @@ from viewer.export._gaps import kept_gaps, kept_note
 from viewer.export._losses.between import rate_note, resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
-from viewer.formats._text.decimals import fixed
-from viewer.formats._text.number_text import row_texts
+from viewer.formats._text.number_text import fixed, row_texts
 from viewer.interrupts import hold, poll
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import printable

@@ -15,7 +15,7 @@ from viewer.errors import RigError
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.posed import PoseLosses
 from viewer.formats import Source, all_or_none, free_path, keeping_written, read, write
-from viewer.formats._skel.keywords import KEYWORDS
+from viewer.formats.skel import KEYWORDS
 from viewer.formats.skin import lost_parts
 from viewer.media.image import encode_png
 from viewer.media.saving import as_words

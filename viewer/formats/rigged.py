@@ -21,8 +21,10 @@ are not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -31,23 +33,22 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part
 from viewer.errors import FormatError, RigError
-from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.checking import archive_of, corners_of, finite
 from viewer.formats._archive.values import Archive
-from viewer.formats._rigged.materials import texts
-from viewer.formats._rigged.mesh import mesh_arrays, read_mesh
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
 from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.arrays import Bytes, Deferred, Floats
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
 from viewer.rig.hierarchy import cycle_members
+from viewer.rig.material import TEXTURES, Material, Outline, Rim, Texture
+from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
-
-__all__ = ["figure_arrays", "read", "save"]
 
 _VERSION = 1
 _MOST_HANDS = 2
@@ -83,7 +84,7 @@ def read(source: Source) -> Figure:
         count = skeleton.n_joints
         return Figure(
             name=archive.text("name") or source.path.stem,
-            mesh=read_mesh(archive),
+            mesh=_read_mesh(archive),
             skeleton=skeleton,
             skin=_skin(archive, count),
             up="z" if up == "z" else "y",
@@ -302,7 +303,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         arrays[key] = getattr(skeleton, key)
     if figure.correctives is not None:
         arrays["correctives"] = figure.correctives.values().astype(np.float32)
-    arrays |= mesh_arrays(mesh) | _layout_arrays(figure.pose_layout)
+    arrays |= _mesh_arrays(mesh) | _layout_arrays(figure.pose_layout)
     for index, hand in enumerate(figure.hands):
         arrays[f"hand_{index}_side"] = np.array(hand.side)
         for key in ("joints", "components", "mean"):
@@ -337,3 +338,254 @@ def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[Any]]:
         "layout_is_euler": layout.is_euler,
         "layout_counts": np.array([layout.n_numbers, layout.translation, layout.scale]),
     }
+
+
+# Meshes of rigged figures as arrays of an ``.npz``.
+#
+# ::
+#
+#     positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
+#     second_uvs (U, 2)   uvs_2 (U, 2) …                           other texture coordinates
+#     colors (V, 4)   part_names (P,)   triangle_parts (T,)
+#     triangle_materials (T,)   and the materials, see ``materials.py``
+
+
+def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a mesh with its materials; normals are not stored."""
+    arrays: dict[str, NDArray[Any] | None] = {
+        "positions": mesh.positions,
+        "triangles": mesh.triangles,
+        "uvs": mesh.uvs,
+        "uv_triangles": mesh.uv_triangles,
+        "colors": mesh.colors,
+    }
+    arrays |= dict(zip(_more_uvs(len(mesh.other_uvs)), mesh.other_uvs, strict=True))
+    found = {key: array for key, array in arrays.items() if array is not None}
+    if mesh.parts:
+        found |= {"part_names": np.array(mesh.parts), "triangle_parts": mesh.part_indices}
+    return found | _material_arrays(mesh)
+
+
+def _read_mesh(archive: Archive) -> Mesh:
+    """Return the mesh of an archive.
+
+    Raises
+    ------
+    FormatError
+        If an array is missing or invalid.
+    RigError
+        If arrays do not match each other.
+    """
+    positions = _finite_array(archive, "positions", (None, 3), "positions")
+    listed = archive.array("triangles", (None, 3)).values()
+    triangles = corners_of(archive, "triangles", listed, len(positions))
+    positions = neutral_positions(positions, triangles)
+    materials = _read_materials(archive)
+    return Mesh(
+        positions=positions,
+        normals=vertex_normals(positions, triangles),
+        triangles=triangles,
+        uvs=_finite_array(archive, "uvs", (None, 2)) if archive.has("uvs") else None,
+        uv_triangles=_optional(archive, "uv_triangles", (None, 3)),
+        other_uvs=tuple(_finite_array(archive, key, (None, 2)) for key in _present_uvs(archive)),
+        colors=_finite_array(archive, "colors", (None, 4)) if archive.has("colors") else None,
+        parts=texts(archive, "part_names") if archive.has("part_names") else (),
+        triangle_parts=_optional(archive, "triangle_parts", (None,)),
+        materials=materials,
+        triangle_materials=_optional(archive, "triangle_materials", (None,)) if materials else None,
+    )
+
+
+def _more_uvs(number: int) -> list[str]:
+    """Return the keys of the sets of texture coordinates after the first."""
+    return ["second_uvs", *(f"uvs_{index}" for index in range(2, number + 1))][:number]
+
+
+def _present_uvs(archive: Archive) -> list[str]:
+    """Return the keys of the sets of texture coordinates after the first that an archive has."""
+    return next(
+        _more_uvs(number) for number in count() if not archive.has(_more_uvs(number + 1)[-1])
+    )
+
+
+def _finite_array(
+    archive: Archive, key: str, shape: tuple[int | None, ...], part: Part = ""
+) -> Floats:
+    return finite(archive, key, archive.array(key, shape).values(), part)
+
+
+def _optional(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any] | None:
+    """Return an array; None if the archive does not have it."""
+    return archive.array(key, shape).values() if archive.has(key) else None
+
+
+# Materials of rigged meshes as arrays of an ``.npz``.
+#
+# ::
+#
+#     material_names (M,)   material_textures (M,)   image_0 (H, W, 4) …            base colours
+#     material_records (M,): JSON, other fields of each material that differ from the default
+#     picture_0 (H, W, 4) …                          images of the other textures, without
+#     duplicates
+#
+# The rim light and the outline of a toon material are objects in its record, with their textures.
+
+_PLAIN_MATERIAL, _PLAIN_TEXTURE = Material(), Texture("")
+_LOOKS: dict[str, Callable[..., Any]] = {"rim": Rim, "outline": Outline}
+_NUMBERS = tuple(
+    field.name for field in fields(Material) if field.name not in ("name", *TEXTURES, *_LOOKS)
+)
+_PLACING = ("channel", "uv_set", "transform", "wrap", "is_smooth", "minification")
+_RECORDS = "material_records"
+
+
+def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
+    """Return the arrays that describe a mesh's materials; an empty dict if it has no material."""
+    if not mesh.materials:
+        return {}
+    arrays: dict[str, NDArray[Any]] = {
+        "material_names": np.array([material.name for material in mesh.materials]),
+        "material_textures": np.array([material.texture or "" for material in mesh.materials]),
+        "triangle_materials": mesh.material_indices,
+    }
+    pictures: dict[int, tuple[int, Bytes]] = {}
+    for index, material in enumerate(mesh.materials):
+        if material.image is not None:
+            arrays[f"image_{index}"] = material.image
+    records = [_record(material, pictures) for material in mesh.materials]
+    if any(records):
+        arrays[_RECORDS] = np.array([json.dumps(record) for record in records])
+    return arrays | {f"picture_{number}": image for number, image in pictures.values()}
+
+
+def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[str, Any]:
+    """Return the fields that differ from their defaults, as plain data."""
+    record: dict[str, Any] = {}
+    for name in _NUMBERS:
+        if getattr(material, name) != getattr(_PLAIN_MATERIAL, name):
+            record[name] = getattr(material, name)
+    for name, texture in material.textures.items():
+        placing = _placing(texture, None if name == "base_texture" else pictures)
+        if placing:
+            record[name] = placing
+    for name in _LOOKS:
+        look = getattr(material, name)
+        if look is not None:
+            values = {field.name: getattr(look, field.name) for field in fields(look)}
+            record[name] = {
+                key: _placing(value, pictures) if isinstance(value, Texture) else value
+                for key, value in values.items()
+                if value is not None
+            }
+    return record
+
+
+def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) -> dict[str, Any]:
+    """Return the fields of a texture that differ from their defaults, as plain data.
+
+    ``pictures``: extended by its image; None if name and image are stored elsewhere.
+    """
+    placing: dict[str, Any] = {}
+    for part in _PLACING:
+        value = np.asarray(getattr(texture, part)).tolist()
+        if value != np.asarray(getattr(_PLAIN_TEXTURE, part)).tolist():
+            placing[part] = value
+    if pictures is not None:
+        placing["name"] = texture.name
+        if texture.image is not None:
+            number = pictures.setdefault(id(texture.image), (len(pictures), texture.image))[0]
+            placing["picture"] = number
+    return placing
+
+
+def _read_materials(archive: Archive) -> tuple[Material, ...]:
+    """Return the materials of an archive.
+
+    Raises
+    ------
+    FormatError
+        If arrays do not match each other, or a record does not describe a material.
+    """
+    if not archive.has("material_names"):
+        return ()
+    names, textures = texts(archive, "material_names"), texts(archive, "material_textures")
+    if len(names) != len(textures):
+        raise archive.fault(
+            "F002.value", item="material_textures", expected=len(names), found=len(textures)
+        )
+    materials = []
+    for index, (name, texture) in enumerate(zip(names, textures, strict=True)):
+        image = _picture(archive, f"image_{index}")
+        has_texture = texture or image is not None
+        materials.append(Material(name, Texture(texture, image) if has_texture else None))
+    if not archive.has(_RECORDS):
+        return tuple(materials)
+    records = texts(archive, _RECORDS)
+    if len(records) != len(names):
+        raise archive.fault("F002.value", item=_RECORDS, expected=len(names), found=len(records))
+    pictures: dict[str, Bytes | None] = {}
+    return tuple(
+        _completed(archive, material, records[index], index, pictures)
+        for index, material in enumerate(materials)
+    )
+
+
+def _completed(
+    archive: Archive,
+    material: Material,
+    text: str,
+    index: int,
+    pictures: dict[str, Bytes | None],
+) -> Material:
+    """Return a material with the fields of its record."""
+    try:
+        record = json.loads(text)
+        found = {name: _tuples(record.pop(name)) for name in _NUMBERS if name in record}
+        for name in TEXTURES:
+            if name not in record:
+                continue
+            base = material.base_texture if name == "base_texture" else None
+            found[name] = _placed(archive, base or Texture(""), record.pop(name), pictures)
+        for name, kind in _LOOKS.items():
+            if name in record:
+                found[name] = kind(
+                    **{
+                        key: _placed(archive, Texture(""), value, pictures)
+                        if isinstance(value, dict)
+                        else _tuples(value)
+                        for key, value in record.pop(name).items()
+                    }
+                )
+        return replace(material, **found, **record)
+    except (ValueError, TypeError, AttributeError, RecursionError, RigError) as problem:
+        raise archive.fault(
+            "F002.rig-material", item=_RECORDS, index=index, problem=str(problem)[:200]
+        ) from None
+
+
+def _placed(
+    archive: Archive, texture: Texture, record: Any, pictures: dict[str, Bytes | None]
+) -> Texture:
+    """Return a texture with the fields of its record."""
+    placing = {part: _tuples(value) for part, value in record.items()}
+    number = placing.pop("picture", None)
+    if number is not None:
+        key = f"picture_{int(number)}"
+        if key not in pictures:
+            pictures[key] = _picture(archive, key)
+        placing["image"] = pictures[key]
+    return replace(texture, **placing)
+
+
+def _tuples(value: Any) -> Any:
+    """Return a JSON value with tuples in place of lists."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _picture(archive: Archive, key: str) -> Bytes | None:
+    return archive.array(key, (None, None, 4)).values() if archive.has(key) else None
+
+
+def texts(archive: Archive, key: str) -> tuple[str, ...]:
+    """Return an array of strings."""
+    return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))

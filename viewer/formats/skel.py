@@ -18,26 +18,25 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Part, Phrase
-from viewer.formats._skel.keywords import KEYWORDS, UNLIMITED
-from viewer.formats._skel.writing import write as write
+from viewer.errors import UnsupportedFormatError
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import is_infinite, is_number, to_number
+from viewer.formats._text.numbers import LARGEST, is_infinite, is_number, to_number
+from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.skeleton import DOF_KINDS, Skeleton
-
-__all__ = ["read", "write"]
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
 _VECTORS = {b"offset": 3, b"boxmin": 3, b"boxmax": 3, b"pose": 3}
 _LIMITS = {b"rotxlimit": 0, b"rotylimit": 1, b"rotzlimit": 2}
 _JOINT = b"balljoint"
-
-Word = re.Match[bytes]
+_Word = re.Match[bytes]
 
 
 @dataclass(slots=True)
@@ -104,7 +103,7 @@ class _Parser:
     def __init__(self, source: Source) -> None:
         self.source = source
         self.words = source.words()
-        self.word: Word | None = None
+        self.word: _Word | None = None
         self.found: list[_Joint] = []
         self.open: list[int] = []
         self.extra_braces = 0
@@ -185,7 +184,7 @@ class _Parser:
             return []
         return values
 
-    def _refuse(self, keyword: Word, expected: int, found: int) -> None:
+    def _refuse(self, keyword: _Word, expected: int, found: int) -> None:
         """Record an error in an item with a wrong number of values, and skip the item."""
         from viewer.formats._text.words import number_key
 
@@ -215,7 +214,7 @@ class _Parser:
             self._advance()
             on_line = on_line and self._is_beside(last)
 
-    def _is_beside(self, last: Word) -> bool:
+    def _is_beside(self, last: _Word) -> bool:
         """Return whether the current word is on the same line as the previous one."""
         if self.word is None:
             return False
@@ -269,7 +268,7 @@ class _Parser:
             self.source.warn("F006.extra-braces", n=self.extra_braces)
 
 
-def _text(word: Word | None) -> bytes | None:
+def _text(word: _Word | None) -> bytes | None:
     return None if word is None else word.group()
 
 
@@ -309,8 +308,8 @@ def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
 
 def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
     """Remove limits of +-100000, which mean "none", and contradictory limits; in place."""
-    limits[limits[:, 0] <= -UNLIMITED, 0] = -np.inf
-    limits[limits[:, 1] >= UNLIMITED, 1] = np.inf
+    limits[limits[:, 0] <= -_UNLIMITED, 0] = -np.inf
+    limits[limits[:, 1] >= _UNLIMITED, 1] = np.inf
     wrong = np.flatnonzero(limits[:, 0] > limits[:, 1])
     if len(wrong):
         joint, axis = joints[wrong[0] // 3], int(wrong[0] % 3)
@@ -327,3 +326,130 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
             joint=_called(joint),
         )
         limits[wrong] = -np.inf, np.inf
+
+
+_DEEPEST = 32  # maximum number of tabs at the beginning of a line
+
+
+def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
+    """Write a figure's skeleton.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
+    path : str or Path
+        File, replaced only when the whole text has been written.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the format stores every property of a skeleton that it accepts.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If the format cannot store the skeleton.
+    OutputError
+        If the file cannot be written.
+    """
+    if figure.skeleton is None:
+        raise _unsupported("F002.skel-none", figure=figure.name)
+    _check_dofs(figure.skeleton)
+    _check_numbers(figure.skeleton)
+    _check_names(figure.skeleton)
+    save_text(path, "".join(_lines(figure.skeleton)))
+    return []
+
+
+def _check_dofs(skeleton: Skeleton) -> None:
+    unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
+    unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
+    if not (unturned and unscaled):
+        raise _unsupported("F002.skel-rest")
+    rotations = np.arange(6, 3 * skeleton.n_joints + 3)
+    table = np.concatenate([np.arange(6), np.tile([3, 4, 5], skeleton.n_joints - 1)])
+    owners = np.concatenate([np.zeros(6, int), 1 + (rotations - 6) // 3])
+    if not (
+        np.array_equal(skeleton.dof_kinds, table) and np.array_equal(skeleton.dof_joints, owners)
+    ):
+        raise _unsupported("F002.skel-dofs")
+    if skeleton.rest_dofs[:3].any() or np.isfinite(skeleton.dof_limits[:3]).any():
+        raise _unsupported("F002.skel-root")
+
+
+def _check_numbers(skeleton: Skeleton) -> None:
+    limits = skeleton.dof_limits
+    finite = np.isfinite(limits)
+    if (finite & np.stack([limits[:, 0] <= -_UNLIMITED, limits[:, 1] >= _UNLIMITED], 1)).any():
+        raise _unsupported("F002.skel-limits", most=_UNLIMITED)
+    arrays = [skeleton.rest_translations, skeleton.boxes, skeleton.rest_dofs, limits[finite]]
+    if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
+        raise _unsupported("F002.skel-numbers", most=LARGEST)
+
+
+def _check_names(skeleton: Skeleton) -> None:
+    ancestors: list[int] = []
+    for joint, parent in enumerate(skeleton.parents):
+        while ancestors and ancestors[-1] != parent:
+            ancestors.pop()
+        if parent >= 0 and not ancestors:
+            raise _unsupported("F002.skel-order", joint=joint_label(skeleton, joint))
+        ancestors.append(joint)
+    for name in skeleton.names:
+        words = as_words(name)
+        if words is None or KEYWORDS & set(words):
+            raise _unsupported("F002.skel-name", name=name)
+
+
+def _unsupported(key: str, **values: Any) -> UnsupportedFormatError:
+    return UnsupportedFormatError(Diagnostic(key, values=values))
+
+
+def _lines(skeleton: Skeleton) -> list[str]:
+    lines: list[str] = []
+    open_joints: list[int] = []
+
+    def close_until(parent: int) -> None:
+        while open_joints and open_joints[-1] != parent:
+            open_joints.pop()
+            lines.append(_indent(open_joints) + "}\n")
+
+    for joint, parent in enumerate(skeleton.parents):
+        close_until(parent)
+        indent = _indent(open_joints)
+        lines.append(" ".join(filter(None, [f"{indent}balljoint", skeleton.names[joint], "{\n"])))
+        lines.extend(f"{indent}\t{item}\n" for item in _items(skeleton, joint))
+        open_joints.append(joint)
+    close_until(-1)
+    return lines
+
+
+def _indent(open_joints: list[int]) -> str:
+    # A fully indented chain of n joints would take n^2 bytes.
+    return "\t" * min(len(open_joints), _DEEPEST)
+
+
+def _items(skeleton: Skeleton, joint: int) -> list[str]:
+    items = [f"offset {_numbers(skeleton.rest_translations[joint])}"]
+    if skeleton.boxes is not None:
+        low, high = skeleton.boxes[joint]
+        items += [f"boxmin {_numbers(low)}", f"boxmax {_numbers(high)}"]
+    rows = slice(3 + 3 * joint, 6 + 3 * joint)
+    for axis, limits in zip("xyz", skeleton.dof_limits[rows], strict=True):
+        if np.isfinite(limits).any():
+            written = np.nan_to_num(limits, posinf=_UNLIMITED, neginf=-_UNLIMITED)
+            items.append(f"rot{axis}limit {_numbers(written)}")
+    return [*items, f"pose {_numbers(skeleton.rest_dofs[rows])}"]
+
+
+def _numbers(values: Floats) -> str:
+    return " ".join(map(repr, values.tolist()))
+
+
+_UNLIMITED = 100_000.0
+"""CSE169's value for "no limit", which some files contain."""
+KEYWORDS = frozenset(
+    (b"offset", b"boxmin", b"boxmax", b"pose", b"rotxlimit", b"rotylimit", b"rotzlimit")
+) | {b"balljoint"}
+"""Words that begin an item of a joint, and cannot be part of a name."""

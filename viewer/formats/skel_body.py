@@ -18,7 +18,7 @@ import numpy as np
 
 from viewer.formats._archive.checking import archive_of, corners_of, finite
 from viewer.formats._archive.values import Archive
-from viewer.formats._smpl.published import published_name
+from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints

@@ -20,35 +20,27 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
 from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
 from viewer.formats._neutral import neutral_positions
-from viewer.formats._smpl.parts import (
-    IGNORED,
-    model_hands,
-    model_keypoints,
-    model_shapes,
-    model_symmetry,
-    model_uvs,
-)
-from viewer.formats._smpl.published import published_name
-from viewer.formats._smpl.quaternion_models import coordinate_regressor, quaternion_correctives
+from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
+from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.bodies.animals import Animal, animal_of, upright_axis
+from viewer.rig.bodies.quaternion_feature import QuaternionFeature
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.hands import Hand
 from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, skin_from_entries
 from viewer.rig.smpl_family import Member, ShapeSpace, gender_of, member_of
-
-__all__ = ["KEYS", "read"]
 
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Required keys, which identify such a model."""
@@ -89,7 +81,7 @@ def read(source: Source) -> Figure:
     member = member_of(tuple(parents.tolist()))
     animal = animal_of(parents.tolist())
     names = _names(member, animal, len(parents))
-    shapes = model_shapes(source, archive, mesh.n_vertices, member, used)
+    shapes = _model_shapes(source, archive, mesh.n_vertices, member, used)
     correctives, title = _correctives(source, archive, mesh.n_vertices, len(parents), used)
     title = title or (member.title if member else animal.title if animal else "")
     space = _shape_space(source, archive, title, used)
@@ -103,10 +95,10 @@ def read(source: Source) -> Figure:
         blend_shapes=shapes,
         correctives=correctives,
         joint_regressor=regressor,
-        hands=model_hands(archive, member, used),
+        hands=_model_hands(archive, member, used),
         pose_layout=_layout(len(parents)),
-        keypoints=model_keypoints(source, archive, mesh, used),
-        symmetry=model_symmetry(source, archive, mesh.n_vertices, used),
+        keypoints=_model_keypoints(source, archive, mesh, used),
+        symmetry=_model_symmetry(source, archive, mesh.n_vertices, used),
         facts=_facts(archive, title, space.gender, shapes, correctives, used),
         shape_space=space,
     )
@@ -140,7 +132,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
     positions = neutral_positions(positions, triangles)
     used += ["v_template", "f"]
-    uvs, uv_triangles = model_uvs(source, archive, len(triangles), used)
+    uvs, uv_triangles = _model_uvs(source, archive, len(triangles), used)
     return Mesh(
         positions=positions,
         normals=vertex_normals(positions, triangles),
@@ -204,7 +196,7 @@ def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]
     value = archive.get("J_regressor")
     if not isinstance(value, Opaque) and getattr(value, "shape", None) == shape:
         used.append("J_regressor")
-        return coordinate_regressor(archive, archive.sparse("J_regressor", shape), n_joints)
+        return _coordinate_regressor(archive, archive.sparse("J_regressor", shape), n_joints)
     matrix = _matrix(archive, "J_regressor", (n_joints, n_vertices))
     joints, vertices, numbers = matrix.entries()
     weights = finite(archive, "J_regressor", numbers, "joints", joints)
@@ -272,7 +264,7 @@ def _correctives(
     if not archive.has("posedirs"):
         source.warn("F007.smpl-posedirs")
         return None, ""
-    other = quaternion_correctives(archive, n_vertices, n_joints)
+    other = _quaternion_correctives(archive, n_vertices, n_joints)
     if other is not None:
         used.append("posedirs")
         return other
@@ -305,8 +297,8 @@ def _facts(
     groups = [] if shapes is None else list(shapes.groups)
     counts = [f"{groups.count(group)} {group}" for group in ("shape", "expression")]
     ignored = [key for key in archive.keys if key not in used]
-    unknown = [printable(key, 40) for key in ignored if key not in IGNORED]
-    known = [key for key in ignored if key in IGNORED]
+    unknown = [printable(key, 40) for key in ignored if key not in _IGNORED]
+    known = [key for key in ignored if key in _IGNORED]
     facts = [
         ("model", title or "a model in SMPL's layout"),
         *([("gender", gender)] if gender else []),
@@ -319,3 +311,163 @@ def _facts(
     if unknown:
         facts.append(("keys unknown", ", ".join(unknown)))
     return tuple(facts)
+
+
+_NOT_NEEDED = (
+    "J bs_style bs_type J_regressor_prior weights_prior pose_training_info trans pose betas "
+    "v_shaped v_posed r hands_coeffs hands_coeffsl hands_coeffsr dynamic_lmk_faces_idx "
+    "dynamic_lmk_bary_coords joint2num part2num allow_pickle gender"
+)
+_IGNORED = frozenset(_NOT_NEEDED.split())
+"""Keys of models that are not needed for posing."""
+_SHAPES = 300  # number of shapes, before the expressions, of models with at least 400 columns
+_FEW_SHAPES = 10  # number of shapes of older models
+
+
+def _model_shapes(
+    source: Source, archive: Archive, n_vertices: int, member: Member | None, used: list[str]
+) -> BlendShapes | None:
+    """Return shape and expression directions, read on first use."""
+    if not archive.has("shapedirs"):
+        source.warn("F007.smpl-shapedirs")
+        return None
+    array = archive.array("shapedirs", (n_vertices, 3, "S"))
+    count = array.shape[2]
+    n_shapes = count
+    if member is not None and member.has_expressions:
+        n_shapes = _SHAPES if count >= _SHAPES + 100 else min(_FEW_SHAPES, count)
+
+    def load() -> Floats:
+        rows = np.moveaxis(array.values(), 2, 0)
+        return finite(archive, "shapedirs", np.ascontiguousarray(rows, np.float64))
+
+    used.append("shapedirs")
+    if count == 0:
+        return None
+    names = _shape_names(archive, n_shapes, used)
+    names += tuple(f"expression {k}" for k in range(count - n_shapes))
+    groups = ("shape",) * n_shapes + ("expression",) * (count - n_shapes)
+    return BlendShapes(names, Deferred((count, n_vertices, 3), np.float64, load), groups)
+
+
+def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
+    """Return the names of the coefficients if the file has them, as the bundled body does."""
+    if archive.has("shape_names"):
+        values = archive.array("shape_names", (count,), "SU").values()
+        used.append("shape_names")
+        return tuple(str(name) for name in values.tolist())
+    return tuple(f"shape {k}" for k in range(count))
+
+
+def _model_hands(archive: Archive, member: Member | None, used: list[str]) -> tuple[Hand, ...]:
+    """Return the hands whose components are in the file."""
+    hands = []
+    for side, first in member.hands if member else ():
+        components, mean = f"hands_components{side[:1]}", f"hands_mean{side[:1]}"
+        if archive.has(components) and archive.has(mean):
+            joints = np.arange(first, first + 15, dtype=np.int32)
+            rows = finite(archive, components, archive.array(components, (None, 45)).values())
+            middle = finite(archive, mean, archive.array(mean, (45,)).values())
+            hands.append(Hand(side, joints, rows, middle))
+            used += [components, mean]
+    return tuple(hands)
+
+
+def _model_uvs(
+    source: Source, archive: Archive, n_triangles: int, used: list[str]
+) -> tuple[Floats | None, Ints | None]:
+    """Return texture coordinates and their triangles, if the file has both."""
+    if not (archive.has("vt") and archive.has("ft")):
+        return None, None
+    uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
+    corners = archive.array("ft", (n_triangles, 3)).values()
+    if not are_indices(corners, len(uvs)):
+        source.warn("F007.smpl-uvs")
+        return None, None
+    used += ["vt", "ft"]
+    return uvs, corners.astype(np.int32)
+
+
+def _model_symmetry(
+    source: Source, archive: Archive, n_vertices: int, used: list[str]
+) -> Ints | None:
+    """Return each vertex's mirror counterpart, if the file has a valid map."""
+    if not archive.has("vert_sym_idxs"):
+        return None
+    partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
+    if not are_indices(partners, n_vertices):
+        source.warn("F007.smpl-symmetry-range")
+        return None
+    indices = partners.astype(np.int32)
+    if (indices[indices] != np.arange(n_vertices)).any():
+        source.warn("F007.smpl-symmetry")
+        return None
+    used.append("vert_sym_idxs")
+    return indices
+
+
+def _model_keypoints(
+    source: Source, archive: Archive, mesh: Mesh, used: list[str]
+) -> Keypoints | None:
+    """Return the static face landmarks as keypoints."""
+    if not (archive.has("lmk_faces_idx") and archive.has("lmk_bary_coords")):
+        return None
+    faces = archive.array("lmk_faces_idx", ("L",)).values()
+    shares = archive.array("lmk_bary_coords", (len(faces), 3)).values()
+    weights = finite(archive, "lmk_bary_coords", shares)
+    if not are_indices(faces, mesh.n_triangles):
+        source.warn("F007.smpl-landmarks")
+        return None
+    used += ["lmk_faces_idx", "lmk_bary_coords"]
+    return Keypoints(
+        names=tuple(f"landmark {number}" for number in range(len(faces))),
+        joints=np.full(len(faces), -1, dtype=np.int32),
+        vertices=mesh.triangles[faces.astype(np.int64)],
+        weights=weights,
+    )
+
+
+_STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STAR
+
+
+def _coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> JointRegressor:
+    """Return SUPR's regressor: rows are coordinates of joints, the last column is a constant."""
+    rows, columns, numbers = matrix.entries()
+    weights = finite(archive, "J_regressor", numbers, "joints", rows // 3)
+    last = matrix.shape[1] - 1
+    constant = columns == last
+    bias = np.bincount(rows[constant], weights[constant], minlength=3 * n_joints)
+    rows, columns, weights = rows[~constant], columns[~constant], weights[~constant]
+    return JointRegressor(
+        n_joints,
+        (rows // 3).astype(np.int32),
+        (columns // 3).astype(np.int32),
+        weights,
+        axes=np.stack([rows % 3, columns % 3], axis=1).astype(np.int32),
+        bias=bias.astype(np.float64, copy=False).reshape(-1, 3),
+    )
+
+
+def _quaternion_correctives(
+    archive: Archive, n_vertices: int, n_joints: int
+) -> tuple[Correctives, str] | None:
+    """Return correctives that quaternions drive, and the model's title; None for SMPL's.
+
+    STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR has
+    four for each joint.
+    """
+    array = archive.array("posedirs")
+    kinds = {
+        4 * (n_joints - 1) + 1: (QuaternionFeature(n_joints, False, _STAR_SHAPE), "STAR"),
+        4 * n_joints: (QuaternionFeature(n_joints, True), "SUPR"),
+    }
+    count = array.shape[-1] if len(array.shape) == 3 else 0
+    if array.shape != (n_vertices, 3, count) or count not in kinds or n_joints < 2:
+        return None
+
+    def load() -> np.ndarray:
+        rows = np.ascontiguousarray(np.moveaxis(array.values(), 2, 0), np.float64)
+        return finite(archive, "posedirs", rows)
+
+    feature, title = kinds[count]
+    return Correctives(Deferred((count, n_vertices, 3), np.float64, load), feature), title

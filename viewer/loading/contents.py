@@ -233,7 +233,7 @@ def _video_rate(settings: MotionSettings) -> float | None:
     """Return the frame rate of the video of a capture's camera, if one is given."""
     if settings.video is None:
         return None
-    from viewer.formats._footage.video_images import video_rate
+    from viewer.formats._video_images import video_rate
 
     return video_rate(settings.video)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.formats._easymocap.images import ImageFolders, find_images
-from viewer.formats._footage.video_images import VideoImages
+from viewer.formats._video_images import VideoImages
+from viewer.formats.easymocap.images import ImageFolders, find_images
 from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.camera_images import CameraImages
 from viewer.rig.captures.camera_view import CameraView

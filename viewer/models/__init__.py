@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
-from viewer.formats._smpl.published import published_name
+from viewer.formats._published_models import published_name
 from viewer.interrupts import deferred
 from viewer.models.bundled import BUNDLED
 from viewer.phrases import printable

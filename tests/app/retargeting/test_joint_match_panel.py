@@ -25,7 +25,7 @@ from viewer.app.retargeting.match_actions import (
     match_joint,
 )
 from viewer.formats import Source
-from viewer.formats._text.joint_map import read_joint_map
+from viewer.formats._joint_map import read_joint_map
 from viewer.rig.retargeting.driven_clip import driven_clip
 
 SIZE = (1000, 900)

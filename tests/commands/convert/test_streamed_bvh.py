@@ -11,7 +11,7 @@ from viewer.cli import run
 from viewer.commands import convert as streamed_bvh
 from viewer.commands._progress import Progress
 from viewer.formats import Source
-from viewer.formats._bvh import streaming
+from viewer.formats.bvh import streaming
 
 FRAMES = 300
 PART = 3000  # bytes: about ten frames

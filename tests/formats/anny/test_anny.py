@@ -20,7 +20,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, read
-from viewer.formats._anny.targets import ACTIONS
+from viewer.formats.anny import ACTIONS
 from viewer.loading import MotionSettings
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import rest_joints, shaped

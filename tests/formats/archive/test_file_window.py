@@ -11,12 +11,10 @@ from formats.npz_bytes import cost
 from numpy.testing import assert_array_equal
 
 from viewer.errors import FormatError
-from viewer.formats._archive.file_window import FileWindow
 from viewer.formats._archive.opening import open_archive
-from viewer.formats._archive.stored_file import StoredFile
-from viewer.formats._pickle.machine import Machine
+from viewer.formats._archive.zip import FileWindow, StoredFile
+from viewer.formats._pickle.machine import Machine, run
 from viewer.formats._pickle.reading import named_archive
-from viewer.formats._pickle.steps import run
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 

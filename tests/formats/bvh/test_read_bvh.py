@@ -14,7 +14,7 @@ from rig.retargeting.two_people import figure_of
 
 from viewer.diagnostics import Phrase
 from viewer.formats import Source, detect
-from viewer.formats._bvh.guess import guess_up
+from viewer.formats.bvh.guess import guess_up
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._easymocap.cameras import find_cameras, read_storage
+from viewer.formats.easymocap.cameras import find_cameras, read_storage
 
 HEAD = "%YAML:1.0\n---\n"
 # Lists are wrapped like long lists of OpenCV.

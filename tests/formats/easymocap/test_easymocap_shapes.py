@@ -7,7 +7,7 @@ from formats.capture_files import body, noticed, opened, rows_of, waves, write_f
 from numpy.testing import assert_array_equal
 
 from viewer.diagnostics import Phrase
-from viewer.formats._easymocap.shapes import hold, last_given
+from viewer.formats.easymocap.bodies import hold, last_given
 
 ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
 GIVEN = np.array([False, True, False, True, False])

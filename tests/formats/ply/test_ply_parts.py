@@ -4,7 +4,7 @@ import pytest
 
 from viewer.errors import FormatError
 from viewer.formats import Source, ply
-from viewer.formats._ply import rows
+from viewer.formats.ply import rows
 
 HEAD = """ply
 format ascii 1.0

@@ -6,8 +6,7 @@ from decimal import ROUND_HALF_EVEN, Decimal
 import numpy as np
 import pytest
 
-from viewer.formats._text.decimals import fixed, integers, shortest, significant
-from viewer.formats._text.number_text import row_texts
+from viewer.formats._text.number_text import fixed, integers, row_texts, shortest, significant
 
 SPECIAL = [
     *(0.0, -0.0, 1.0, -1.0, 0.1, 0.3, 1e15, 1e16, 9999999999999998.0, 123456789012345680.0),

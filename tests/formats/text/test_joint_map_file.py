@@ -6,7 +6,7 @@ import pytest
 
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._text.joint_map import joint_map_text, read_joint_map
+from viewer.formats._joint_map import joint_map_text, read_joint_map
 from viewer.rig.retargeting.joint_map import JointMap
 
 

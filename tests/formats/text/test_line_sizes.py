@@ -1,7 +1,7 @@
 import pytest
 
-from viewer.formats._text import line_sizes as module
-from viewer.formats._text.line_sizes import line_sizes
+from viewer.formats.ply import rows as module
+from viewer.formats.ply.rows import line_sizes
 
 
 @pytest.mark.parametrize("piece", [1, 3, 8, 1 << 18])

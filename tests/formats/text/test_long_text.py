@@ -8,9 +8,9 @@ import pytest
 
 from viewer.errors import FormatError
 from viewer.formats import Source, _source, read
-from viewer.formats._obj import lines
-from viewer.formats._text import long_text
-from viewer.formats._text.long_text import LongText, count_line_ends, line_parts, without_marks
+from viewer.formats import _source as long_text
+from viewer.formats._source import LongText, count_line_ends, line_parts, without_marks
+from viewer.formats.obj import lines
 
 MARK = b"\xef\xbb\xbf"
 TEXTS = [

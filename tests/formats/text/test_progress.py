@@ -5,8 +5,7 @@ import pytest
 
 from viewer.export import export
 from viewer.formats import Source, obj, ply, write
-from viewer.formats._text.decimals import integers
-from viewer.formats._text.number_text import row_texts
+from viewer.formats._text.number_text import integers, row_texts
 from viewer.media.saving import save_parts
 from viewer.progress import Cancelled, receiving, report
 from viewer.rig.scene import Actor

@@ -263,6 +263,6 @@ def test_layouts_of_amass_are_left_to_its_reader(given: Any, kind: str) -> None:
 )
 def test_other_dicts_are_not_recognised(given: Any) -> None:
     from viewer.formats._archive.checking import archive_of
-    from viewer.formats._video_mocap.tools import tool_of
+    from viewer.formats.video_mocap.tools import tool_of
 
     assert tool_of(archive_of(source(given))) is None

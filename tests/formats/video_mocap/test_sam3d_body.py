@@ -14,9 +14,14 @@ from numpy.testing import assert_allclose
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats._archive.checking import archive_of
-from viewer.formats._video_mocap.mhr_points import JOINTS, KEYPOINTS, PARENTS
-from viewer.formats._video_mocap.sam3d_body import intrinsics_seen, read_person
 from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap.sam3d_body import (
+    JOINTS,
+    KEYPOINTS,
+    PARENTS,
+    intrinsics_seen,
+    read_person,
+)
 from viewer.loading import load
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "sam3d_body" / "img_subj00.npz"

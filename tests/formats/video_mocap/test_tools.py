@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from viewer.formats._video_mocap.tools import TOOLS, module_of
+from viewer.formats.video_mocap.tools import TOOLS, module_of
 
 ROOT = Path(__file__).resolve().parents[3]
 

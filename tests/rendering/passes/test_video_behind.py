@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rendering.moving import FILMED, RATE, SIZE, moving_camera, pixel
 
-from viewer.formats._footage.video_images import VideoImages
+from viewer.formats._video_images import VideoImages
 from viewer.media.video import VideoSink
 from viewer.rendering.camera import camera_from_view
 from viewer.rendering.offscreen import Offscreen

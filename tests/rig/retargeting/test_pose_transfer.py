@@ -13,7 +13,7 @@ from rig.retargeting.two_people import BODY, figure_of
 
 from viewer.diagnostics.phrase import Phrase
 from viewer.errors import RigError
-from viewer.formats._pose.rotations import named_rotations
+from viewer.formats.pose import named_rotations
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.humanoid import HUMAN_BONES, Humanoid

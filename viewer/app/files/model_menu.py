@@ -52,7 +52,7 @@ def draw_model_menu(state: AppState) -> list[Path]:
 
 def _draw_rigs(state: AppState, name: str, path: Path) -> list[Path]:
     """Draw a submenu of a model's rigs; return its file if one is chosen."""
-    from viewer.formats._anny.rigs import RIGS
+    from viewer.formats.anny.base_mesh import RIGS
 
     chosen: list[Path] = []
     opened = begin_menu(state, name)

@@ -15,7 +15,7 @@ from viewer.app.files.state import Files
 from viewer.app.retargeting.drive_changes import change_drive, no_edit, shown_drive
 from viewer.errors import ViewerError
 from viewer.formats import Source, file_stem
-from viewer.formats._text.joint_map import read_joint_map, write_joint_map
+from viewer.formats._joint_map import read_joint_map, write_joint_map
 from viewer.phrases import printable
 from viewer.rig.retargeting.driven_clip import full_map
 from viewer.rig.retargeting.joint_map import JointMap

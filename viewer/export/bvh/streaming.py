@@ -29,9 +29,9 @@ from viewer.export.bvh.body import Body, Conversion, shape_at
 from viewer.export.bvh.reading import BvhFile, read_back
 from viewer.export.bvh.text import frame_texts
 from viewer.formats import Source, bvh
-from viewer.formats._bvh.channels import Table, table_of
-from viewer.formats._bvh.hierarchy import read_hierarchy
-from viewer.formats._bvh.streaming import clip_of, parsed_rows
+from viewer.formats.bvh.hierarchy import read_hierarchy
+from viewer.formats.bvh.motion import Table, table_of
+from viewer.formats.bvh.streaming import clip_of, parsed_rows
 from viewer.media.saving import save_parts
 from viewer.progress import report, silent
 from viewer.rig.arrays import Floats

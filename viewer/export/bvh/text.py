@@ -14,8 +14,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from viewer.formats._text.decimals import fixed
-from viewer.formats._text.number_text import row_texts
+from viewer.formats._text.number_text import fixed, row_texts
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first

@@ -28,10 +28,8 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive.element_types import array_dtype, item_count, shaped
-from viewer.formats._archive.stored_file import StoredFile
-from viewer.formats._archive.values import Archive, Opaque, Value
-from viewer.formats._archive.zip_directory import DAMAGE, ZipDirectory
+from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, item_count, shaped
+from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
 from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
 from viewer.phrases import printable

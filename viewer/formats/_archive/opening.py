@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import bz2
+import io
 import json
+import lzma
 import re
+import zlib
+from collections.abc import Callable
 from functools import partial
+from typing import Protocol
 
-from viewer.formats._archive.file_window import Data, FileWindow
 from viewer.formats._archive.values import Archive, Value
-from viewer.formats._joblib.compression import is_compressed
+from viewer.formats._archive.zip import MAX_RATIO, SMALL, Data, FileWindow
 from viewer.formats._source import Source
 from viewer.formats._text.json_places import MOST_DIGITS, deepest_place, long_number_place
 from viewer.phrases import printable
-
-__all__ = ["is_archive", "open_archive"]
 
 _LARGE = 32 << 20  # bytes up to which pickles are read as a whole
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
+
 # Protocols 2 to 5 have a header; protocols 0 and 1 begin with the value that they build.
 _PICKLE = re.compile(
     rb"\x80[\x02-\x05]|\(d[pqSUVX(.]|\}[q(.]|\(lp[0-9]|\][q(.]"
@@ -32,7 +36,7 @@ def is_archive(head: bytes) -> bool:
     >>> is_archive(b"\x80\x02}q\x01."), is_archive(b"positions 4 {")
     (True, False)
     """
-    return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None or is_compressed(head)
+    return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None or _is_compressed(head)
 
 
 def open_archive(source: Source) -> Archive:
@@ -51,9 +55,8 @@ def open_archive(source: Source) -> Archive:
     """
     # Imported late, so that readers of other formats do not import them.
     from viewer.formats._archive.npz import open_npy, open_npz
-    from viewer.formats._archive.zip_directory import open_directory
-    from viewer.formats._joblib.compression import unpacked
-    from viewer.formats._torch.zipped import is_torch, open_torch
+    from viewer.formats._archive.zip import open_directory
+    from viewer.formats._torch import is_torch, open_torch
 
     head = source.peek(4096)
     if head.startswith(_ZIP):
@@ -65,7 +68,7 @@ def open_archive(source: Source) -> Archive:
         return open_npy(source, _open_objects)
     if head.startswith(_LFS):
         raise source.fault("F002.archive-pointer")
-    if is_compressed(head):
+    if _is_compressed(head):
         return _open_pickle(source, unpacked(source))
     if head.lstrip()[:1] in (b"{", b"["):
         return _open_json(source)
@@ -95,7 +98,7 @@ def _open_json(source: Source) -> Archive:
 
 def _pickle_data(source: Source) -> Data:
     """Return the bytes of a pickle; the bytes of a large file are read on demand."""
-    from viewer.formats._archive.stored_file import StoredFile
+    from viewer.formats._archive.zip import StoredFile
 
     if source._data is None:
         storage = StoredFile(source)
@@ -106,10 +109,9 @@ def _pickle_data(source: Source) -> Data:
 
 def _open_pickle(source: Source, data: Data) -> Archive:
     """Open a pickle, or a legacy torch file, which begins like one."""
-    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import named_archive, warn_of_rest
-    from viewer.formats._pickle.steps import run
-    from viewer.formats._torch.legacy import MAGIC, read_bytes, read_stream
+    from viewer.formats._torch import MAGIC, read_bytes, read_stream
 
     machine = Machine(source, data)
     machine.load_bytes = read_bytes
@@ -120,10 +122,9 @@ def _open_pickle(source: Source, data: Data) -> Archive:
 
 def _open_member(source: Source, key: str, data: bytes) -> Archive | None:
     """Open the dict, or list of dicts, in an array of objects of an ``.npz``; None for others."""
-    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import nested_archive
-    from viewer.formats._pickle.steps import run
-    from viewer.formats._torch.legacy import read_bytes
+    from viewer.formats._torch import read_bytes
 
     machine = Machine(source, data)
     machine.load_bytes = read_bytes
@@ -132,10 +133,9 @@ def _open_member(source: Source, key: str, data: bytes) -> Archive | None:
 
 def _list_member(source: Source, key: str, data: bytes) -> Value:
     """Return the objects in an array of objects of an ``.npz`` as a list; None for others."""
-    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import listed
-    from viewer.formats._pickle.steps import run
-    from viewer.formats._torch.legacy import read_bytes
+    from viewer.formats._torch import read_bytes
 
     machine = Machine(source, data)
     machine.load_bytes = read_bytes
@@ -144,10 +144,9 @@ def _list_member(source: Source, key: str, data: bytes) -> Value:
 
 def _open_objects(source: Source, offset: int) -> Archive | None:
     """Open the dict, or list of dicts, in an array of objects; None for other objects."""
-    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import has_names, named_archive, warn_of_rest
-    from viewer.formats._pickle.steps import run
-    from viewer.formats._torch.legacy import read_bytes
+    from viewer.formats._torch import read_bytes
 
     data = _pickle_data(source)
     machine = Machine(source, data, offset)
@@ -155,3 +154,115 @@ def _open_objects(source: Source, offset: int) -> Archive | None:
     whole = run(machine)
     warn_of_rest(machine)
     return named_archive(source, "npy", len(data), whole) if has_names(whole) else None
+
+
+_SHORTEST = 12  # minimum size of a compressed pickle, bytes
+_PIECE = 1 << 20  # number of bytes unpacked at a time
+_PICKLE_START = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
+
+# The header of zlib may consist of letters, but in a text no control characters follow them.
+_ZLIB = re.compile(rb"x[\x01\x5e\x9c\xda](?=[\s\S]*[\x00-\x08\x0e-\x1f\x80-\xff])")
+_KINDS: dict[str, re.Pattern[bytes]] = {
+    "zlib": _ZLIB,
+    "gzip": re.compile(rb"\x1f\x8b\x08"),
+    "bz2": re.compile(rb"BZh[1-9]1AY&SY"),
+    "xz": re.compile(rb"\xfd7zXZ\x00"),
+    "lzma": re.compile(rb"\x5d\x00\x00[\x00\x01-\xff]"),
+}
+_UNSUPPORTED = {"lz4": re.compile(rb"\x04\x22\x4d\x18"), "joblib 0.9": re.compile(rb"ZF0x")}
+_DAMAGE = (zlib.error, lzma.LZMAError, OSError, EOFError, ValueError)
+
+
+class _Unpacker(Protocol):
+    """Common interface of the decompressors of bz2 and lzma."""
+
+    @property
+    def eof(self) -> bool: ...
+    @property
+    def needs_input(self) -> bool: ...
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
+
+
+class _Zlib:
+    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
+
+    def __init__(self, window: int) -> None:
+        self._inner = zlib.decompressobj(window)
+
+    @property
+    def eof(self) -> bool:
+        return self._inner.eof
+
+    @property
+    def needs_input(self) -> bool:
+        return not self._inner.unconsumed_tail
+
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes:
+        return self._inner.decompress(self._inner.unconsumed_tail + data, max(max_length, 0))
+
+
+_UNPACKERS: dict[str, Callable[[], _Unpacker]] = {
+    "zlib": lambda: _Zlib(zlib.MAX_WBITS),
+    "gzip": lambda: _Zlib(16 + zlib.MAX_WBITS),
+    "bz2": bz2.BZ2Decompressor,
+    "xz": lambda: lzma.LZMADecompressor(lzma.FORMAT_XZ),
+    "lzma": lambda: lzma.LZMADecompressor(lzma.FORMAT_ALONE),
+}
+
+
+def _is_compressed(head: bytes) -> bool:
+    r"""Return whether a file that begins with these bytes may be a compressed pickle.
+
+    >>> is_compressed(zlib.compress(bytes([128, 4]) + b"}." * 20)), is_compressed(b"x^2 + y^2")
+    (True, False)
+    """
+    if any(kind.match(head) for kind in _UNSUPPORTED.values()):
+        return True
+    method = next((name for name, kind in _KINDS.items() if kind.match(head)), None)
+    if method is None or len(head) < _SHORTEST:
+        return False
+    try:
+        begin = _UNPACKERS[method]().decompress(head, _SHORTEST)
+    except _DAMAGE:
+        return False
+    # A block longer than the head is unpacked when the file is opened.
+    return not begin or _PICKLE_START.match(begin) is not None
+
+
+def unpacked(source: Source) -> bytes:
+    """Return the pickle in a compressed file.
+
+    Raises
+    ------
+    FormatError
+        If the data are damaged, not a pickle, packed by an unsupported method, or too large.
+    """
+    head = source.peek(64)
+    for name, kind in _UNSUPPORTED.items():
+        if kind.match(head):
+            raise source.fault("F002.packed-method", method=name)
+    method = next(name for name, kind in _KINDS.items() if kind.match(head))
+    try:
+        return _unpacked(source, method, _UNPACKERS[method]())
+    except _DAMAGE as problem:
+        reason = printable(problem, 100)
+        raise source.fault("F002.packed", method=method, reason=reason) from None
+
+
+def _unpacked(source: Source, method: str, unpacker: _Unpacker) -> bytes:
+    data, result, at = source.data, io.BytesIO(), 0
+    most = min(source.max_size, max(SMALL, MAX_RATIO * len(data)))
+    while not unpacker.eof:
+        piece = b""
+        if unpacker.needs_input:
+            piece = data[at : at + _PIECE]
+            at += len(piece)
+        found = unpacker.decompress(piece, _PIECE)
+        if not piece and not found and at >= len(data):
+            raise EOFError("truncated")
+        if not result.tell() and found and not _PICKLE_START.match(found):
+            raise source.fault("F002.packed-kind", method=method, found=found[:20])
+        if result.tell() + len(found) > most:
+            raise source.fault("F002.packed-size", method=method, most=most, size=len(data))
+        result.write(found)
+    return result.getvalue()

@@ -76,7 +76,7 @@ def json_format(source: Source, key: str, poses: Collection[str]) -> str:
 
 def _is_video_mocap(archive: Archive) -> bool:
     """Return whether an archive has results of a tool without distinctive keys."""
-    from viewer.formats._video_mocap.tools import tool_of
+    from viewer.formats.video_mocap.tools import tool_of
 
     return tool_of(archive) is not None
 

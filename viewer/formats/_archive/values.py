@@ -7,6 +7,8 @@ rejects all others by name. All other values are returned as ``Opaque``.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
@@ -17,23 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive.half_floats import in_double, widened
 from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
 from viewer.formats._text.json_places import Keys, nearest_place
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
-
-__all__ = [
-    "Archive",
-    "Axes",
-    "Opaque",
-    "Plain",
-    "Sparse",
-    "Value",
-    "describe",
-    "texts_in",
-]
 
 _MAX_SIDE = 1 << 27  # maximum rows or columns of a sparse matrix; meshes have far fewer vertices
 _WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
@@ -145,14 +135,12 @@ class Sparse:
         return rows, columns, self.data
 
 
-Plain: TypeAlias = str | bytes | int | float | bool | None
+_Plain: TypeAlias = str | bytes | int | float | bool | None
 """Values that need no conversion; numpy's scalars are returned as these."""
-
 Value: TypeAlias = (
-    Plain | Deferred | Sparse | Opaque | list[Any] | tuple[Any, ...] | dict[str | bytes | int, Any]
+    _Plain | Deferred | Sparse | Opaque | list[Any] | tuple[Any, ...] | dict[str | bytes | int, Any]
 )
 """Any value of an archive; containers contain such values in turn."""
-
 Axes: TypeAlias = Sequence[int | str | None]
 """An expected shape: for each axis a size, None for any, or a letter for equal sizes."""
 
@@ -266,7 +254,7 @@ class Archive:
         if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
             found = describe(self.get(key))
             raise self.fault("F002.value", item=key, expected=_wanted(shape, kinds), found=found)
-        return widened(value)
+        return _widened(value)
 
     def shape(self, key: str) -> tuple[int, ...]:
         """Return the shape of an array of numbers; empty if there is no such array."""
@@ -299,7 +287,7 @@ class Archive:
         value = self.get(key)
         if isinstance(value, Sparse):
             if _fits(shape, value.shape):
-                return replace(value, data=in_double(value.data))
+                return replace(value, data=_in_double(value.data))
             raise self.fault(
                 "F002.value", item=key, expected=_wanted(shape, "biuf"), found=describe(value)
             )
@@ -464,3 +452,79 @@ def _plain(value: Value, is_item: bool = False) -> Any:
 def _is_missing(item: Any) -> bool:
     """Return whether an item of a list stands for a missing frame."""
     return item is None or (isinstance(item, list) and not item)
+
+
+_DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
+_LONGEST_TEXT = 1 << 20  # maximum number of characters in one element
+_MAX_AXES = 32
+
+# Maximum size of an array; numpy has no larger ones, even if an axis is 0.
+_MAX_BYTES = 1 << 60
+_LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes without checking them
+
+
+def array_dtype(code: str) -> np.dtype[Any] | None:
+    """Return a numeric or string dtype by its numpy spelling, or None for other types.
+
+    Records, sub-arrays, objects, dates and platform-dependent types are not supported.
+
+    >>> array_dtype(">f4"), array_dtype("|O"), array_dtype("S0")
+    (dtype('>f4'), None, None)
+    """
+    match = _DTYPE.fullmatch(code)
+    if match is None or int(match[1] or 1) > _LONGEST_TEXT:
+        return None
+    return np.dtype(code)
+
+
+def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
+    """Return the number of elements of a shape, or None if numpy does not support it.
+
+    >>> item_count((6890, 3), 8), item_count((0, 1 << 62), 8)
+    (20670, None)
+    """
+    # An axis of length 0 makes the product 0 even if other axes are too long.
+    if (
+        len(shape) > _MAX_AXES
+        or math.prod(max(side, 1) for side in shape) > _MAX_BYTES // item_size
+    ):
+        return None
+    return math.prod(shape)
+
+
+def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDArray[Any]:
+    """Return flat values in their shape, C order and native byte order; copied if needed.
+
+    Raises
+    ------
+    MisfitError
+        If an element of a string array is not a valid character.
+    """
+    if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
+        # numpy accepts any byte as bool, and then computes wrong results.
+        flat = flat.view(np.uint8) != 0
+    array = flat.reshape(shape, order="F" if is_fortran else "C")
+    array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("=")).reshape(shape)
+    if array.dtype.kind == "U" and array.size:
+        last = int(array.reshape(-1).view(np.uint32).max())
+        if last > _LAST_LETTER:
+            raise MisfitError(Phrase("array-letter", found=last))
+    return array
+
+
+# Conversion of the half floats in archives to doubles, before anything is computed with them.
+#
+# A half overflows at 65504: comparing it with a larger Python number, or adding two halves,
+# already causes a warning.
+
+
+def _widened(array: Deferred) -> Deferred:
+    """Return an array whose values are converted by ``_in_double``."""
+    if array.dtype != np.float16:
+        return array
+    return Deferred(array.shape, np.float64, lambda: _in_double(array.values()))
+
+
+def _in_double(values: NDArray[Any]) -> NDArray[Any]:
+    """Return half floats as doubles, which is exact, and other values unchanged."""
+    return values.astype(np.float64) if values.dtype == np.float16 else values

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from viewer.errors import FormatError
+from viewer.formats._file_bytes import read_bytes
 from viewer.formats._references import referenced_path, refused_text
-from viewer.formats._source import Source, read_bytes
+from viewer.formats._source import Source
 from viewer.media.image import decode_picture
 from viewer.rig.arrays import Bytes
 

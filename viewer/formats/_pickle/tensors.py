@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.element_types import item_count, shaped
-from viewer.formats._archive.zip_directory import MAX_RATIO, SMALL
+from viewer.formats._archive.values import item_count, shaped
+from viewer.formats._archive.zip import MAX_RATIO, SMALL
 from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Span, StandIn, is_sizes
 from viewer.rig.arrays import Deferred

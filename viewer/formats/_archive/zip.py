@@ -1,0 +1,243 @@
+"""Zip archives: their directory, checked before anything is unpacked."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+import struct
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import IO, cast, overload
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError
+from viewer.formats._file_bytes import unreadable
+from viewer.formats._source import Source
+from viewer.phrases import printable
+
+DAMAGE = (
+    zipfile.BadZipFile,
+    zipfile.LargeZipFile,
+    zlib.error,
+    struct.error,
+    OSError,
+    EOFError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
+"""All exceptions that zipfile raises for damaged archives, as found by mutation tests."""
+MAX_RATIO = 100
+"""Largest ratio of unpacked to packed size; smooth motions reach 10 to 20."""
+SMALL = 64 << 20
+"""Unpacked size in bytes below which any ratio is accepted, as arrays of zeros compress well."""
+_ENCRYPTED = 0x41  # flag bits 0 and 6
+_METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
+
+
+@dataclass(frozen=True, slots=True)
+class ZipDirectory:
+    """A zip archive that is open for reading.
+
+    Attributes
+    ----------
+    source : Source
+        The archive, for messages.
+    storage : StoredFile
+        Its file, which is opened again whenever a member is read later.
+    archive : ZipFile
+        The open archive.
+    members : list of ZipInfo
+        Its members, whose sizes have been checked by ``check``.
+    """
+
+    source: Source
+    storage: StoredFile
+    archive: zipfile.ZipFile
+    members: list[zipfile.ZipInfo]
+
+    def check(self, key_of: Callable[[zipfile.ZipInfo], str]) -> None:
+        """Refuse unreadable or oversized members before anything is unpacked.
+
+        Raises
+        ------
+        FormatError
+            If two members have the same key, or one is encrypted, packed by an unsupported method,
+            or too large.
+        """
+        source, size = self.source, self.storage.size
+        for name, count in Counter(map(key_of, self.members)).items():
+            if count > 1:
+                raise source.fault("F002.npz-twice", item=printable(name, 60), found=count)
+        for member in self.members:
+            name, method = printable(key_of(member), 60), member.compress_type
+            if member.flag_bits & _ENCRYPTED:
+                raise source.fault("F002.npz-encrypted", item=name)
+            if method in _METHODS:
+                raise source.fault("F002.npz-method-name", item=name, method=_METHODS[method])
+            if method not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise source.fault("F002.npz-method", item=name, method=method)
+        total = sum(member.file_size for member in self.members)
+        if total > source.max_size:
+            raise source.fault("F001.too-large", most=source.max_size, size=total)
+        if total > max(SMALL, MAX_RATIO * size):
+            raise source.fault("F002.npz-ratio", most=MAX_RATIO, found=total, size=size)
+
+
+@contextmanager
+def open_directory(source: Source) -> Iterator[ZipDirectory]:
+    """Open a zip archive; damage found while it is open is an error of the source.
+
+    Raises
+    ------
+    FormatError
+        If the archive is damaged.
+    """
+    storage = StoredFile(source)
+    try:
+        with storage.open() as file, zipfile.ZipFile(file) as archive:
+            yield ZipDirectory(source, storage, archive, archive.infolist())
+    except DAMAGE as problem:
+        raise source.fault("F002.npz", reason=printable(problem, 100)) from None
+
+
+_LONGEST_DIRECTORY = 2 << 20
+"""Maximum bytes of one read, and thus of a zip directory: about 30,000 members."""
+_CHUNK = 1 << 20
+
+
+class _Reader(io.BufferedReader):
+    """A file with a size limit for each read, as zipfile trusts the declared directory size."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is None or size < 0:
+            here = self.tell()
+            size = self.seek(0, os.SEEK_END) - here
+            self.seek(here)
+        if size > _LONGEST_DIRECTORY:
+            raise ValueError(f"a directory of {size} bytes")
+        return super().read(size)
+
+
+class StoredFile:
+    """The file of a source, reopened for each read, or its bytes if there is no file."""
+
+    def __init__(self, source: Source) -> None:
+        self.path = source.path
+        self._data = source._data  # None unless the file has been read already
+        self._stamp: tuple[int, int] | None = None
+        try:
+            status = self.path.stat()
+            if stat.S_ISREG(status.st_mode) and self._is_in_file():
+                self._stamp = status.st_size, status.st_mtime_ns
+        except (OSError, ValueError) as problem:
+            if self._data is None:
+                raise unreadable(self.path, _reason(problem)) from None
+        if self._stamp is None:
+            self.size = len(self._data or b"")
+        else:
+            self._data, self.size = None, self._stamp[0]
+
+    def _is_in_file(self) -> bool:
+        """Return whether the bytes are the file's bytes, apart from a final Ctrl-Z."""
+        if self._data is None:
+            return True
+        with self.path.open("rb") as file:
+            head = file.read(_CHUNK)
+            file.seek(len(self._data))
+            rest = file.read(_CHUNK)
+        return self._data[:_CHUNK] == head[: len(self._data)] and not rest.strip(b"\x1a")
+
+    def open(self) -> IO[bytes]:
+        """Open the file, which must be unchanged since it was first opened."""
+        if self._data is not None:
+            return _Reader(cast("io.RawIOBase", io.BytesIO(self._data)))
+        try:
+            file = _Reader(self.path.open("rb", buffering=0))
+        except OSError as problem:
+            raise unreadable(self.path, _reason(problem)) from None
+        status = os.fstat(file.fileno())
+        if (status.st_size, status.st_mtime_ns) != self._stamp:
+            file.close()
+            raise FormatError(Diagnostic("F002.changed", self.path))
+        return file
+
+    def fault(self, key: str, problem: Phrase) -> FormatError:
+        """Return an error that states the file and the key."""
+        values = {"item": printable(key, 60), "problem": problem}
+        return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
+
+
+def _reason(problem: Exception) -> object:
+    return getattr(problem, "strerror", None) or problem
+
+
+_PAGE = 1 << 16  # number of bytes read at a time for small values
+_PIECE = 1 << 20  # number of bytes read at a time for arrays
+
+
+class FileWindow:
+    """A file with the interface of bytes that the pickle machine uses.
+
+    Parameters
+    ----------
+    storage : StoredFile
+        The file; a change between two reads is reported as an error.
+    """
+
+    def __init__(self, storage: StoredFile) -> None:
+        self._storage = storage
+        self._start, self._page = 0, b""
+
+    def __len__(self) -> int:
+        return self._storage.size
+
+    @overload
+    def __getitem__(self, where: int) -> int: ...
+    @overload
+    def __getitem__(self, where: slice) -> bytes: ...
+    def __getitem__(self, where: int | slice) -> int | bytes:
+        if isinstance(where, int):
+            if not self._start <= where < self._start + len(self._page):
+                self._start, self._page = where, self._read(where, where + _PAGE)
+            return self._page[where - self._start]
+        start, stop, _ = where.indices(len(self))
+        first, last = start - self._start, stop - self._start
+        if 0 <= first <= last <= len(self._page):
+            return self._page[first:last]
+        if stop - start <= _PAGE:
+            self._start, self._page = start, self._read(start, start + _PAGE)
+            return self._page[: max(stop - start, 0)]
+        return self._read(start, stop)
+
+    def find(self, wanted: bytes, start: int, stop: int) -> int:
+        """Return the first offset of some bytes within a range, -1 if there is none."""
+        while start < stop:
+            end = min(start + _PIECE, stop)
+            found = self[start:end].find(wanted)
+            if found >= 0:
+                return start + found
+            # The bytes may extend across the end of a piece.
+            start = end if end == stop else end - len(wanted) + 1
+        return -1
+
+    def _read(self, start: int, stop: int) -> bytes:
+        pieces, stop = [], min(stop, len(self))
+        with self._storage.open() as file:
+            file.seek(start)
+            while start < stop:
+                piece = file.read(min(_PIECE, stop - start))
+                if not piece:
+                    raise self._storage.fault("", Phrase("npy-cut", expected=stop, found=start))
+                pieces.append(piece)
+                start += len(piece)
+        return b"".join(pieces)
+
+
+Data = bytes | FileWindow
+"""The bytes of a pickle."""

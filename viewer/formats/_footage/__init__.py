@@ -1,1 +1,0 @@
-"""Footage of cameras: the frames of a video."""

@@ -1,1 +1,0 @@
-"""Compressed pickles as written by joblib."""

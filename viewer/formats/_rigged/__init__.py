@@ -1,1 +1,0 @@
-"""Parts of the reader and writer of rigged meshes."""

@@ -1,0 +1,194 @@
+r"""Torch files since version 1.6: zip archives of a pickle and of storages.
+
+::
+
+    NAME/data.pkl     pickle of the saved value, whose storages are persistent ids
+    NAME/data/KEY     the bytes of a storage, read when a tensor of it is used
+    NAME/byteorder    "little" or "big"; NAME/version and others are not needed
+"""
+
+from __future__ import annotations
+
+import zipfile
+from functools import partial
+from typing import Literal
+
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
+from viewer.formats._archive.values import Archive
+from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
+from viewer.formats._misfit import MisfitError
+from viewer.formats._pickle.machine import Machine, run
+from viewer.formats._pickle.reading import named_archive
+from viewer.formats._pickle.tensors import Storage, storage_of
+from viewer.formats._pickle.values import Span, noun
+from viewer.phrases import printable
+
+_PICKLE = "/data.pkl"
+_LARGEST_PICKLE = 64 << 20  # maximum bytes of the pickle, which does not contain the arrays
+_LARGEST_READ = 1 << 20
+
+
+def is_torch(directory: ZipDirectory) -> bool:
+    """Return whether a zip archive is a torch file."""
+    return any(member.filename.endswith(_PICKLE) for member in directory.members)
+
+
+def open_torch(directory: ZipDirectory) -> Archive:
+    """Open a torch file whose value is a dict; errors as of ``open_archive``."""
+    directory.check(lambda member: member.filename)
+    source, members = directory.source, {member.filename: member for member in directory.members}
+    found = [name for name in members if name.endswith(_PICKLE)]
+    root = found[0].removesuffix("data.pkl")
+    if len(found) > 1 or f"{root}constants.pkl" in members:
+        raise source.fault("F002.torch-kind")
+    size = members[found[0]].file_size
+    if size > _LARGEST_PICKLE:
+        raise source.fault("F001.too-large", most=_LARGEST_PICKLE, size=size)
+    order: Literal["<", ">"] = "<"
+    if f"{root}byteorder" in members:
+        order = ">" if directory.archive.read(f"{root}byteorder") == b"big" else "<"
+    storages = _Storages(directory.storage, f"{root}data/", members, order)
+    machine = Machine(source, directory.archive.read(found[0]))
+    machine.persistent = storages.find
+    whole = run(machine)
+    return named_archive(source, "torch", max(size, directory.storage.size), whole)
+
+
+class _Storages:
+    """The storages of a file by key, each created once."""
+
+    def __init__(
+        self,
+        file: StoredFile,
+        folder: str,
+        members: dict[str, zipfile.ZipInfo],
+        order: Literal["<", ">"],
+    ) -> None:
+        self._file, self._folder, self._members, self._order = file, folder, members, order
+        self._known: dict[str, Storage] = {}
+
+    def find(self, persistent: object) -> Storage:
+        """Return the storage of a persistent id, after comparing its size with the archive's."""
+        found = storage_of(persistent)
+        if found is None:
+            raise MisfitError(Phrase("tensor-persistent"))
+        key, storage = found
+        member = self._members.get(self._folder + key)
+        if member is None:
+            raise MisfitError(Phrase("tensor-key", item=key))
+        if member.file_size != storage.size:
+            values = {"item": key, "expected": storage.size, "found": member.file_size}
+            raise MisfitError(Phrase("tensor-member", **values))
+        known = self._known.setdefault(key, storage)
+        if (known.code, known.count) != (storage.code, storage.count):
+            raise MisfitError(Phrase("tensor-storages", item=key))
+        known.order, known.load = self._order, partial(_read_member, self._file, member)
+        return known
+
+
+def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
+    """Read the bytes of a member in pieces: reading it as a whole needs twice the memory."""
+    room, done = bytearray(member.file_size), 0
+    try:
+        with (
+            storage.open() as file,
+            zipfile.ZipFile(file) as archive,
+            archive.open(member) as stream,
+        ):
+            while done < len(room):
+                piece = stream.read(min(_LARGEST_READ, len(room) - done))
+                if not piece:
+                    raise EOFError(f"{done} bytes")
+                room[done : done + len(piece)] = piece
+                done += len(piece)
+    except DAMAGE as problem:
+        raise _damaged(storage, member.filename, problem) from None
+    return memoryview(room).toreadonly()
+
+
+def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
+    return storage.fault(key, Phrase("npy-damaged", reason=printable(problem, 100)))
+
+
+# Legacy streams of torch: files before version 1.6, and storages inside other pickles.
+#
+# ::
+#
+#     stream  = magic number, protocol 1001, {"little_endian": …}, value, [key, …], storage …
+#     storage = number of elements (8 bytes), their bytes; in the order of the keys
+#
+# The first five items are consecutive pickles. Storages in the value are persistent ids.
+
+_NUMBER = 0x1950A86A20F9469CFC6C
+_PROTOCOL = 1001
+MAGIC = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."
+"""The first bytes of a legacy file."""
+
+
+def read_bytes(outer: Machine, data: Span) -> object:
+    """Return the storage that a pickle of tensors contains as bytes; see ``read_stream``."""
+    inner = outer.nested(data.data, data.start, data.stop)
+    found = read_stream(inner)
+    outer.rejoin(inner)
+    if not isinstance(found, Storage):
+        raise outer.fail(Phrase("torch-bytes", found=noun(found)))
+    return found
+
+
+def read_stream(machine: Machine) -> object:
+    """Return the value of a legacy stream, with its storages in place.
+
+    Parameters
+    ----------
+    machine : Machine
+        At the start of the stream; at its end afterwards.
+
+    Raises
+    ------
+    FormatError
+        If the stream is damaged, or a storage is missing or does not have the declared size.
+    """
+    if run(machine) != _NUMBER:
+        raise machine.fail(Phrase("torch-magic"))
+    if run(machine) != _PROTOCOL:
+        raise machine.fail(Phrase("torch-protocol", expected=_PROTOCOL))
+    system = run(machine)
+    is_little = not isinstance(system, dict) or system.get("little_endian") is not False
+    storages: dict[str, Storage] = {}
+    machine.persistent = partial(_declare, storages, "<" if is_little else ">")
+    found = run(machine)
+    machine.persistent = None
+    keys = run(machine)
+    for key in keys if isinstance(keys, list) else []:
+        _take(machine, storages, key)
+    if any(storage.load is None for storage in storages.values()):
+        raise machine.fail(Phrase("tensor-no-storage"))
+    return found
+
+
+def _declare(storages: dict[str, Storage], order: Literal["<", ">"], persistent: object) -> Storage:
+    """Return the storage of a persistent id, the same one for the same key."""
+    found = storage_of(persistent)
+    if found is None:
+        raise MisfitError(Phrase("tensor-persistent"))
+    key, storage = found
+    storage.order = order
+    known = storages.setdefault(key, storage)
+    if (known.code, known.count) != (storage.code, storage.count):
+        raise MisfitError(Phrase("tensor-storages", item=key))
+    return known
+
+
+def _take(machine: Machine, storages: dict[str, Storage], key: object) -> None:
+    """Find the bytes of a storage, whose number must be the declared one."""
+    name = key.text() if isinstance(key, Span) and key.coding is not None else ""
+    storage = storages.get(name)
+    if storage is None or storage.load is not None:
+        raise machine.fail(Phrase("tensor-key", item=name))
+    count = machine.number(8, is_signed=True)
+    if count != storage.count:
+        values = {"item": name, "expected": storage.count, "found": count}
+        raise machine.fail(Phrase("tensor-count", **values))
+    start = machine.skip(storage.size)
+    storage.load = Span(machine.data, start, machine.at).view

@@ -1,0 +1,420 @@
+"""Parser for the MOTION of a BVH file: frame time and one row of numbers per frame."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
+from viewer.formats._neutral import held_rows
+from viewer.formats._reach import FARTHEST, is_beyond
+from viewer.formats._source import Source
+from viewer.formats._text.numbers import parse_numbers, to_number
+from viewer.formats._text.words import Words, number_key, read_words, refuse_words
+from viewer.formats.bvh.hierarchy import BvhJoint, called
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.quaternion import align_signs
+
+_Places = NDArray[np.int64]
+_FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
+_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?\s*(\S*)", re.IGNORECASE)
+_LINE = re.compile(rb"[^\r\n]+")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Motion:
+    """The channel values of all frames.
+
+    Attributes
+    ----------
+    values : (N, C)
+        One column per channel: lengths and degrees.
+    frame_time : bytes or None
+        Seconds between frames as written; None if missing.
+    has_frames : bool
+        False for the rest pose of a file without frames.
+    """
+
+    values: Floats
+    frame_time: bytes | None
+    has_frames: bool = True
+
+
+def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
+    """Read the frames.
+
+    Parameters
+    ----------
+    source : Source
+        The file; warned if the number of frames differs from the declared one.
+    start : int
+        Offset after the word MOTION; -1 for a file without one.
+    n_channels : int
+        Values per frame, C.
+
+    Returns
+    -------
+    Motion
+        Motion with at least one frame: zeros if the file has none.
+
+    Raises
+    ------
+    FormatError
+        If a word is not a number, or a row is too short or too long; the error has the line.
+    """
+    if start < 0:
+        source.warn("F007.bvh-no-motion", source.end)
+        return _rest(n_channels, None)
+    declared, time, start = read_head(source, start)
+    if declared is None:
+        source.warn("F007.bvh-no-count", start)
+    if n_channels == 0:
+        source.warn("F007.bvh-no-channels", start)
+        return _rest(0, time)
+    rows = _rows(source, start, n_channels, declared)
+    return _Motion(rows, time) if len(rows) else _rest(n_channels, time)
+
+
+def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int]:
+    """Return the declared number of frames and frame time, if any, and the offset after them."""
+    declared: int | None = None
+    time: bytes | None = None
+    is_header = True
+    while is_header:
+        is_header = False
+        if declared is None and (match := _FRAMES.match(source.data, start)):
+            declared, start, is_header = _count(source, match), match.end(), True
+        if time is None and (match := _TIME.match(source.data, start)):
+            time, start, is_header = _seconds(source, match), match.end(), True
+    return declared, time, start
+
+
+def _rest(n_channels: int, time: bytes | None) -> _Motion:
+    return _Motion(np.zeros((1, n_channels)), time, has_frames=False)
+
+
+def _count(source: Source, match: re.Match[bytes]) -> int:
+    value = to_number(match[1])
+    if value is None or value < 0 or value != int(value):
+        raise source.fault("F002.count", match.start(1), item="Frames", found=match[1] or None)
+    return int(value)
+
+
+def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
+    value = to_number(match[1])
+    if value is None or value < 0.0:
+        raise source.fault("F002.bvh-seconds", match.start(1), found=match[1] or None)
+    return match[1]
+
+
+def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
+    """Return all complete frames: (N, C)."""
+    data = source.data
+    source.remember("frames", lambda row: source.number_offset(start, len(data), row * width))
+    # Motions are usually read once, and exported ones are read back: caching would only waste
+    # space.
+    values, bad = parse_numbers(data, start, len(data), is_kept=False)
+    whole, rest = divmod(len(values), width)
+    is_whole = bad < 0 and rest == 0 and whole > 0
+    if is_whole and (declared is None or whole == declared):
+        return values.reshape(whole, width)
+    repaired = _held_frames(source, start, width, declared)
+    if repaired is not None:
+        return repaired
+    if bad >= 0:
+        _refuse_word(source, start, bad, width, declared)
+    if rest or (declared is not None and whole != declared):
+        _check_lines(source, start, width, declared)
+        _warn_of_difference(source, width, declared, whole, rest)
+    if whole == 0:
+        source.warn("F007.bvh-empty", start)
+    return values[: whole * width].reshape(whole, width)
+
+
+def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int | None) -> None:
+    """Refuse a word that is not a number, unless it follows the last frame."""
+    offset = source.word_offset(start, bad)
+    match = source.next_word(offset)
+    word = b"" if match is None else match.group()
+    if declared is not None and bad >= declared * width:
+        source.warn("F006.bvh-after", offset, found=word)
+        return
+    frame = Phrase("bvh-frame", frame=bad // width)
+    raise source.fault(number_key(word), offset, item=frame, found=word)
+
+
+def _held_frames(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
+    """Record all errors in the frames, and return the frames with invalid ones replaced.
+
+    None if there is no error in them, or the starts of the frames are unknown.
+    """
+    words = read_words(source.data, start, len(source.data))
+    begins, sizes = words.rows()
+    rest = 0
+    if (sizes == width).sum() * 2 > len(sizes):  # the file has one frame per line
+        begins, sizes, rest = _without_rest(words, begins, sizes, width)
+        begins, sizes = begins[:declared], sizes[:declared]
+    else:
+        end = len(words.values) if declared is None else declared * width
+        if len(words.values) < end or end % width:
+            return None
+        begins, sizes = np.arange(0, end, width), np.full(end // width, width)
+    last = int(begins[-1] + sizes[-1]) if len(begins) else 0
+    bad = words.bad[words.bad < last]
+    fits = sizes == width
+    if fits.all() and len(bad) == 0:
+        return None
+    frames = np.searchsorted(begins, bad, side="right") - 1
+    frame_of = dict(zip(bad.tolist(), frames.tolist(), strict=True))
+    refuse_words(
+        source,
+        words,
+        bad,
+        lambda word: Phrase("bvh-frame", frame=frame_of[word]),
+        "frames",
+        frames,
+    )
+    _refuse_sizes(source, words.offsets[begins], sizes, width)
+    rows = np.full((len(begins), width), np.nan)
+    rows[fits] = words.values[begins[fits, None] + np.arange(width)]
+    if rest or (declared is not None and len(rows) != declared):
+        _warn_of_difference(source, width, declared, len(rows), rest)
+    return held_rows(rows, np.isnan(rows).any(axis=1))
+
+
+def _without_rest(
+    words: Words, begins: _Places, sizes: _Places, width: int
+) -> tuple[_Places, _Places, int]:
+    """Return lines without a truncated last one, and the number of its values."""
+    size = int(sizes[-1])
+    if size >= width or np.isnan(words.values[begins[-1] :]).any():
+        return begins, sizes, 0
+    return begins[:-1], sizes[:-1], size
+
+
+def _refuse_sizes(source: Source, offsets: _Places, sizes: _Places, width: int) -> None:
+    """Refuse rows that are too short or too long."""
+    wrong = np.flatnonzero(sizes != width)
+    if len(wrong):
+        first = int(wrong[0])
+        source.refuse(
+            "F002.bvh-row",
+            int(offsets[first]),
+            len(wrong),
+            "frames",
+            wrong,
+            frame=first,
+            expected=width,
+            found=int(sizes[first]),
+        )
+
+
+def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
+    """Refuse a file with one frame per line if a row other than the last has a wrong length."""
+    lines = [
+        (line.start(), len(line.group().split())) for line in _LINE.finditer(source.data, start)
+    ]
+    lines = [line for line in lines if line[1]]
+    odd = [(at, row) for row, (at, found) in enumerate(lines) if found != width]
+    if not odd or len(lines) < 2:
+        return
+    if len(odd) == len(lines):
+        # If no row has the right length, each line is a frame only if all lines have the same
+        # count.
+        if len(lines) == declared:
+            raise _wrong_row(source, 0, width, lines[0])
+        return
+    row = odd[0][1]
+    if row < len(lines) - 1 or lines[row][1] > width:
+        raise _wrong_row(source, row, width, lines[row])
+
+
+def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> FormatError:
+    return source.fault("F002.bvh-row", line[0], frame=row, expected=width, found=line[1])
+
+
+def _warn_of_difference(
+    source: Source, width: int, declared: int | None, whole: int, rest: int
+) -> None:
+    expected = None if declared is None else Phrase("bvh-frames", n=declared)
+    part = Phrase("bvh-part", n=rest, width=width) if rest else None
+    if whole == 0 and (declared or rest):
+        raise source.fault("F002.bvh-no-frame", source.end, expected=expected, rest=part)
+    source.warn("F007.bvh-frames", source.end, expected=expected, found=whole, rest=part)
+
+
+# Positions of 0 in files with few decimals, as a fraction of the longest OFFSET.
+_ROUNDING = 1e-4
+_CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Joints, without End Sites, and the columns of a frame that move them."""
+
+    names: tuple[str, ...]
+    parents: list[int]
+    offsets: Floats  # (J, 3)
+    columns: list[list[tuple[int, int]]]  # code and column of each channel, per joint
+    ends: list[tuple[int, list[float]]]  # joint and offset of each End Site
+    n_channels: int
+
+    @property
+    def moves(self) -> list[tuple[int, int, int]]:
+        """Joint, axis and column of each position channel."""
+        return [
+            (joint, code, column)
+            for joint, row in enumerate(self.columns)
+            for code, column in row
+            if code < 3
+        ]
+
+
+def table_of(source: Source, joints: list[BvhJoint]) -> Table:
+    """Return the joints and their columns; missing offsets are recorded."""
+    place: dict[int, int] = {}
+    columns: list[list[tuple[int, int]]] = []
+    ends: list[tuple[int, list[float]]] = []
+    kept: list[BvhJoint] = []
+    count = 0
+    for index, joint in enumerate(joints):
+        if joint.offset is None:
+            at = place[joint.parent] if joint.is_end else len(kept)
+            source.warn(
+                "F007.bvh-no-offset",
+                joint.start,
+                part="joints",
+                places=[at],
+                joint=called(joint),
+            )
+        codes = joint.channels or []
+        if joint.is_end:
+            ends.append((place[joint.parent], joint.offset or [0.0, 0.0, 0.0]))
+            if codes:
+                source.warn(
+                    "F006.bvh-end-channels",
+                    joint.start,
+                    part="joints",
+                    places=[place[joint.parent]],
+                    joint=called(joint),
+                )
+        else:
+            place[index] = len(kept)
+            kept.append(joint)
+            columns.append([(code, count + at) for at, code in enumerate(codes)])
+        count += len(codes)
+    return Table(
+        tuple(joint.name for joint in kept),
+        [place.get(joint.parent, -1) for joint in kept],
+        np.array([joint.offset or [0.0, 0.0, 0.0] for joint in kept]),
+        columns,
+        ends,
+        count,
+    )
+
+
+def rotations_of(table: Table, values: Floats) -> Floats:
+    """Multiply each joint's rotation channels, joints with the same axes together: (N, J, 4)."""
+    rotations = np.empty((len(values), len(table.names), 4))
+    groups: dict[tuple[int, ...], list[int]] = {}
+    turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]
+    for joint, row in enumerate(turns):
+        groups.setdefault(tuple(code - 3 for code, _ in row), []).append(joint)
+    for axes, joints in groups.items():
+        columns = [[turns[joint][place][1] for joint in joints] for place in range(len(axes))]
+        for start in range(0, len(values), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            parts = [np.zeros((len(values[rows]), len(joints))) for _ in range(3)]
+            parts.append(np.ones_like(parts[0]))
+            for axis, chosen in zip(axes, columns, strict=True):
+                half = values[rows, chosen] * (np.pi / 360.0)
+                _rotate(parts, axis, np.sin(half), np.cos(half))
+            for number, part in enumerate(parts):
+                rotations[rows, joints, number] = part
+    align_signs(rotations)
+    rotations.flags.writeable = False  # the clip can use a read-only array without a copy
+    return rotations
+
+
+def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
+    """Multiply quaternions (x, y, z, w) on the right by rotations about an axis, in place."""
+    other, third = (axis + 1) % 3, (axis + 2) % 3
+    a, b, c, w = parts[axis], parts[other], parts[third], parts[3]
+    parts[axis], parts[3] = a * cosine + w * sine, w * cosine - a * sine
+    parts[other], parts[third] = b * cosine + c * sine, c * cosine - b * sine
+
+
+def translations_of(source: Source, table: Table, values: Floats) -> Floats | None:
+    """Return the position channels minus the OFFSET that they replace: (N, J, 3)."""
+    if not table.moves:
+        return None
+    base = offsets_replaced(table)
+    inner = inner_moves(table)
+    if base[inner].any() and not moves_inner(table, values):
+        source.warn("F007.bvh-positions")
+        base[inner] = 0.0
+    shifts = shifts_of(table, values, base)
+    names = [("XYZ"[axis], table.names[joint]) for joint, axis, _ in table.moves]
+    return placed(table, _within_reach(source, shifts, names))
+
+
+def inner_moves(table: Table) -> list[int]:
+    """Return the indices of the position channels of joints with a parent."""
+    return [at for at, (joint, _, _) in enumerate(table.moves) if table.parents[joint] >= 0]
+
+
+def moves_inner(table: Table, values: Floats) -> bool:
+    """Return whether position channels of joints with a parent differ from 0 beyond rounding.
+
+    ``values`` (N, C): some frames.
+    """
+    inner = inner_moves(table)
+    positions = values[:, [table.moves[at][2] for at in inner]]
+    least = _ROUNDING * np.abs(offsets_replaced(table)[inner]).max(initial=0.0)
+    return bool((np.abs(positions) > least).any())
+
+
+def offsets_replaced(table: Table) -> Floats:
+    """Return the part of the OFFSET that each position channel replaces: (M,)."""
+    return np.array([table.offsets[joint, axis] for joint, axis, _ in table.moves])
+
+
+def shifts_of(table: Table, values: Floats, base: Floats) -> Floats:
+    """Return the position channels minus their offsets: (N, M)."""
+    return values[:, [column for _, _, column in table.moves]] - base
+
+
+def placed(table: Table, shifts: Floats) -> Floats:
+    """Return translations of all joints, given those with a channel: (N, J, 3), read-only."""
+    translations = np.zeros((len(shifts), len(table.names), 3))
+    joints, axes = ([move[part] for move in table.moves] for part in (0, 1))
+    translations[:, joints, axes] = shifts
+    translations.flags.writeable = False
+    return translations
+
+
+def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
+    """Refuse frames that translate a joint beyond the limit, and repeat the previous frame.
+
+    ``names`` are the axis and joint of each column.
+    """
+    is_far = is_beyond(shifts)
+    if is_far.any():
+        frame = int(is_far.argmax())
+        at = int(np.abs(shifts[frame]).argmax())
+        axis, joint = names[at]
+        source.refuse(
+            "F003.beyond",
+            source.offset_of("frames", frame),
+            int(is_far.sum()),
+            "frames",
+            np.flatnonzero(is_far),
+            item=Phrase("bvh-position", frame=frame, axis=axis, joint=joint),
+            most=FARTHEST,
+            found=float(shifts[frame, at]),
+        )
+    return held_rows(shifts, is_far)

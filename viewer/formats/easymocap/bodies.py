@@ -1,0 +1,432 @@
+"""Body parameters of EasyMocap's records: layouts by length, and rows collected per person.
+
+The first three values of ``poses`` are the rotation of the root, which EasyMocap writes as 0:
+``Rh`` and ``Th`` move the body about the model's origin. Hand components of SMPL-X and MANO exclude
+the mean hand; those of SMPL+H include it.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import field, replace
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Phrase
+from viewer.formats._reach import within_text
+from viewer.formats._text.numbers import LARGEST
+from viewer.formats.easymocap.json_frames import (
+    RecordError,
+    has_numbers,
+    limit_of,
+    row_of,
+    take_row,
+    width_of,
+)
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.timing import Timing
+from viewer.rig.smpl_family import FAMILY, members_by_numbers
+
+_SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
+_BODY = members_by_numbers()[66]
+_FACE = _SMPLX.names[22:25]
+_VPOSER = 32
+_SHAPES = 10  # shape components that precede the expression components in the legacy code
+
+
+@dataclass(frozen=True, slots=True)
+class BodyLayout:
+    """Assignment of the values in ``poses`` to joints.
+
+    Attributes
+    ----------
+    model : str
+        Member of the SMPL family.
+    names : tuple of K str
+        Joints that are rotated, the root first.
+    columns : tuple of (int, int)
+        Ranges of ``poses`` for all joints except the root, in the order of ``names``.
+    root : int
+        Number of values at the beginning that rotate the root: 3 or 0.
+    hands : tuple of (str, int, int)
+        Side, and the range of ``poses`` with its components.
+    is_flat : bool
+        Whether the mean hand is excluded by default.
+    widths : tuple of (str, int)
+        Keys of a record that are read, with their number of values.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    columns: tuple[tuple[int, int], ...]
+    root: int = 3
+    hands: tuple[tuple[str, int, int], ...] = ()
+    is_flat: bool = True
+    widths: tuple[tuple[str, int], ...] = ()
+
+
+_LAYOUTS = {
+    72: BodyLayout("SMPL", _SMPL.names, ((3, 72),)),
+    69: BodyLayout("SMPL", _SMPL.names, ((0, 69),), root=0),
+    78: BodyLayout(
+        "SMPL+H", _BODY, ((3, 66),), hands=(("left", 66, 72), ("right", 72, 78)), is_flat=False
+    ),
+    63: BodyLayout("SMPL+H", _BODY, ((0, 63),), root=0, is_flat=False),
+    156: BodyLayout("SMPL+H", _SMPLH.names, ((3, 156),)),
+    # The face is last here, but precedes the hands in SMPL-X.
+    87: BodyLayout(
+        "SMPL-X",
+        (*_BODY, *_FACE),
+        ((3, 66), (78, 87)),
+        hands=(("left", 66, 72), ("right", 72, 78)),
+    ),
+    165: BodyLayout("SMPL-X", _SMPLX.names, ((3, 165),)),
+    9: BodyLayout("MANO", _MANO.names[:1], (), hands=(("", 3, 9),)),
+    48: BodyLayout("MANO", _MANO.names, ((3, 48),)),
+}
+
+
+def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) -> BodyLayout:
+    """Return the layout of a record, as determined by the length of its ``poses``.
+
+    Parameters
+    ----------
+    record : dict
+        Body parameters of a person in one frame.
+    usual : mapping of str to int, optional
+        Numbers of values in the recording, see ``usual_widths``.
+
+    Raises
+    ------
+    RecordError
+        If no layout has this length, the length is unusual, or the record is invalid and therefore
+        cannot determine the layout of others.
+    """
+    usual = usual or {}
+    count = len(row_of(record, "poses"))
+    if count == _VPOSER:
+        raise RecordError("poses", Phrase("record-vposer", found=count))
+    layout = _LAYOUTS.get(count)
+    if layout is None:
+        problem = Phrase("record-lengths", expected=sorted(_LAYOUTS), found=count)
+        raise RecordError("poses", problem)
+    widths = [("Rh", 3), ("Th", 3), ("poses", count)]
+    keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
+    hands = layout.hands
+    if count == 63:
+        keys += [key for key in ("handl", "handr") if has_numbers(record, key)]
+    widths = [(key, width_of(record, key, width)) for key, width in widths]
+    widths += [(key, max(width_of(record, key), usual.get(key, 0))) for key in keys]
+    if count != usual.get("poses", count):
+        problem = Phrase("record-lengths", expected=[usual["poses"]], found=count)
+        raise RecordError("poses", problem)
+    return BodyLayout(
+        layout.model,
+        layout.names,
+        layout.columns,
+        layout.root,
+        hands,
+        layout.is_flat,
+        tuple(widths),
+    )
+
+
+def with_coefficients(
+    layout: BodyLayout, record: dict[str, Any], usual: Mapping[str, int]
+) -> BodyLayout:
+    """Return a layout extended by coefficients that occur in a record for the first time.
+
+    ``usual`` are the numbers of values in the recording, see ``usual_widths``.
+
+    Raises
+    ------
+    RecordError
+        If the coefficients are not finite numbers.
+    """
+    known = [key for key, _ in layout.widths]
+    new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
+    more = [(key, max(width_of(record, key), usual.get(key, 0))) for key in new]
+    return replace(layout, widths=(*layout.widths, *more))
+
+
+RowFault = tuple[int, str, RecordError]
+"""An invalid record: its row, the name of the invalid part, and the problem."""
+_Remark = tuple[str, str, str]
+"""A note, not an error: message key, file, and key within the record."""
+
+
+@dataclass(slots=True)
+class Rows:
+    """Values of one person in some frames, in reading order, with their origins."""
+
+    frames: list[int] = field(default_factory=list)
+    paths: list[str] = field(default_factory=list)
+    # Indices of the records in the files' lists of people.
+    places: list[int] = field(default_factory=list)
+
+    def keep_origin(self, frame: int, path: str, place: int) -> None:
+        """Store the origin of an accepted record."""
+        self.frames.append(frame)
+        self.paths.append(path)
+        self.places.append(place)
+
+    def timing(
+        self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
+    ) -> Timing:
+        """Return the timing of the valid rows; the person is absent in all other frames."""
+        rows = np.full(n_frames, -1, dtype=np.int32)
+        frames = np.array(self.frames, dtype=np.int64)
+        frames = frames if keep is None else frames[keep]
+        rows[frames] = np.arange(len(frames))
+        return Timing(rate, rows, first_frame, holds=False)
+
+
+def _completed(key: str, values: list[Any], count: int) -> list[Any]:
+    """Return coefficients with zeros for those that a record lacks; raise ValueError for others."""
+    if key not in COEFFICIENTS or not 0 < len(values) < count:
+        raise ValueError(key)
+    return [*values, *([0.0] * (count - len(values)))]
+
+
+@dataclass(slots=True, kw_only=True)
+class BodyRows(Rows):
+    """Body parameters of one person.
+
+    Attributes
+    ----------
+    layout : BodyLayout
+        Layout of all records.
+    known : mapping of str to (C,), or None
+        The person's last coefficients before these rows, which ``values`` updates; None for people
+        without an identity, whose rows are independent of each other.
+    buffers : list of array
+        Values of the layout's keys, record after record.
+    remarks : list of Remark
+        Remarks that ``values`` adds.
+    """
+
+    layout: BodyLayout
+    known: dict[str, Floats] | None = None
+    buffers: list[array[float]] = field(default_factory=list)
+    remarks: list[_Remark] = field(default_factory=list)
+    _lacking: dict[str, list[int]] = field(default_factory=dict)
+    _plan: list[tuple[str, int, Callable[[list[Any]], None]]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.widen(self.layout)
+
+    def widen(self, layout: BodyLayout) -> None:
+        """Add coefficients that no earlier record had; see ``with_coefficients``."""
+        self.layout = layout
+        for key, count in layout.widths[len(self.buffers) :]:
+            self.buffers.append(array("d", bytes(8 * count * len(self.frames))))
+            self._lacking[key] = [*range(len(self.frames))]
+        self._plan = [(key, count, buffer.fromlist) for (key, count), buffer in self._buffers()]
+
+    def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
+        """Add one record.
+
+        Raises
+        ------
+        RecordError
+            If a value is missing, or its length has changed.
+        """
+        try:
+            for key, count, put in self._plan:
+                if key not in record:
+                    self._lack(key, count, put)
+                    continue
+                values = record[key]
+                if len(values) == 1:
+                    values = values[0]
+                if len(values) != count:
+                    values = _completed(key, values, count)
+                put(values)
+        except (KeyError, TypeError, ValueError, OverflowError):
+            self._take_slowly(record)
+        self.keep_origin(frame, path, place)
+
+    def _take_slowly(self, record: dict[str, Any]) -> None:
+        """Add a record that may be invalid; the first error is raised with its exact location."""
+        self._drop_unfinished()
+        try:
+            for key, count, put in self._plan:
+                if has_numbers(record, key) or key not in COEFFICIENTS:
+                    given = row_of(record, key)
+                    if key in COEFFICIENTS and len(given) < count:
+                        record = {**record, key: _completed(key, given, count)}
+                    take_row(record, key, count, put)
+                else:
+                    self._lack(key, count, put)
+        except RecordError:
+            self._drop_unfinished()
+            raise
+
+    def _lack(self, key: str, count: int, put: Callable[[list[Any]], None]) -> None:
+        """Add placeholders for coefficients that the person's other records have."""
+        if key not in COEFFICIENTS:
+            raise KeyError(key)
+        put([0.0] * count)
+        self._lacking[key].append(len(self.frames))
+
+    def _drop_unfinished(self) -> None:
+        row = len(self.frames)
+        for (_, count), buffer in self._buffers():
+            del buffer[count * row :]
+        for rows in self._lacking.values():
+            if rows and rows[-1] == row:
+                rows.pop()
+
+    def _buffers(self) -> Iterator[tuple[tuple[str, int], array[float]]]:
+        return zip(self.layout.widths, self.buffers, strict=True)
+
+    def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
+        """Return the values by key, a mask of valid rows, and the errors in invalid rows.
+
+        Returns
+        -------
+        values : mapping of str to (N, C)
+            Values of the valid rows.
+        keep : (rows,) bool
+            True for valid rows.
+        faults : list of RowFault
+            Error in each invalid row.
+        """
+        keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
+        values: dict[str, Floats] = {}
+        faults: list[RowFault] = []
+        for (key, count), buffer in self._buffers():
+            rows = np.frombuffer(buffer, dtype=np.float64).reshape(-1, count)
+            if key in COEFFICIENTS:
+                rows = self._with_missing(key, rows)
+            values[key] = rows
+            # A single sum detects NaN; rows are examined only then.
+            limit = limit_of(key)
+            if rows.size and not -limit <= rows.min() <= rows.max() <= limit:
+                is_good = (np.abs(rows) <= limit).all(axis=1)
+                for row in np.flatnonzero(~is_good & keep):
+                    odd = rows[row][~(np.abs(rows[row]) <= limit)][0]
+                    problem = RecordError(key, within_text(odd, limit), "F003")
+                    faults.append((int(row), key, problem))
+                keep &= is_good
+        if faults:
+            values = {key: rows[keep] for key, rows in values.items()}
+        return values, keep, faults
+
+    def _with_missing(self, key: str, rows: Floats) -> Floats:
+        """Repeat earlier coefficients in records that omit them, and add a note."""
+        lacking = self._lacking[key]
+        is_given: Bools = np.ones(len(rows), dtype=np.bool_)
+        is_given[lacking] = False
+        if self.known is None:
+            if lacking:
+                self.remarks.append(("F007.record-no-last", self.paths[lacking[0]], key))
+            return rows
+        before = self.known.get(key)
+        filled = hold(rows, is_given, before)
+        last = last_given(rows, is_given)
+        if last is not None:
+            self.known[key] = last
+        if lacking:
+            is_first = before is None and lacking[0] == 0
+            message = "F007.record-no-last" if is_first else "F007.record-last"
+            self.remarks.append((message, self.paths[lacking[0]], key))
+        return filled
+
+    def motion(
+        self,
+        name: str,
+        values: dict[str, Floats],
+        timing: Timing,
+        flat_hands: bool | None,
+        legacy_expression: bool,
+        up: str,
+    ) -> BodyMotion:
+        """Return the rows as a motion; see ``BodyMotion`` for the meaning of the values."""
+        layout, poses = self.layout, values["poses"]
+        vectors = np.zeros((len(poses), len(layout.names), 3))
+        joint = 1
+        for start, stop in layout.columns:
+            count = (stop - start) // 3
+            vectors[:, joint : joint + count] = poses[:, start:stop].reshape(-1, count, 3)
+            joint += count
+        own = poses[:, : layout.root]
+        turns = values["Rh"] if own.any() else None
+        vectors[:, 0] = values["Rh"] if turns is None else own
+        vectors.flags.writeable = False  # a read-only array is not copied again
+        hands = {side: poses[:, start:stop] for side, start, stop in layout.hands}
+        hands |= {
+            side: values[key]
+            for side, key in (("left", "handl"), ("right", "handr"))
+            if key in values
+        }
+        shape, expression = values.get("shapes"), values.get("expression")
+        if legacy_expression and shape is not None and expression is not None:
+            first = np.zeros((len(shape), _SHAPES))
+            first[:, : shape.shape[1]] = shape[:, :_SHAPES]
+            shape, expression = np.concatenate([first, expression], axis=1), None
+        return BodyMotion(
+            name,
+            timing,
+            layout.names,
+            vectors,
+            values["Th"],
+            about_origin=turns is None,
+            shape=_constant(shape),
+            expression=_constant(expression),
+            hands=hands,
+            flat_hands=layout.is_flat if flat_hands is None else flat_hands,
+            up=up,
+            world_rotations=turns,
+        )
+
+
+def _constant(rows: Floats | None) -> Floats | None:
+    """Return a single row if all rows are equal."""
+    return rows[:1] if rows is not None and (rows == rows[:1]).all() else rows
+
+
+COEFFICIENTS = ("shapes", "expression")
+"""Keys of a record that later records of the same person may omit."""
+
+
+def hold(rows: Floats, is_given: Bools, known: Floats | None) -> Floats:
+    """Return rows with each missing row replaced by the last valid row before it.
+
+    Parameters
+    ----------
+    rows : (N, C)
+        Rows in time order; the content of missing rows is ignored.
+    is_given : (N,) bool
+        True for rows in the file. Non-finite rows are preserved, but not repeated.
+    known : (C,) or None
+        The last valid row before all of these; None means 0.
+
+    Returns
+    -------
+    (N, C)
+        ``rows`` itself if no row is missing.
+    """
+    if is_given.all():
+        return rows
+    last = _last_good(rows, is_given)
+    before = np.zeros(rows.shape[1]) if known is None else known
+    table = np.concatenate([rows, before[None]])
+    # If there is no earlier row, the index -1 selects the row that was appended.
+    return np.asarray(np.where(is_given[:, None], rows, table[last]))
+
+
+def last_given(rows: Floats, is_given: Bools) -> Floats | None:
+    """Return the last valid row of (N, C), or None; see ``hold`` for the arguments."""
+    last = int(_last_good(rows, is_given)[-1]) if len(rows) else -1
+    return rows[last].copy() if last >= 0 else None
+
+
+def _last_good(rows: Floats, is_given: Bools) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Return the index of the last valid row up to each row; -1 for none."""
+    is_good = is_given & (np.abs(rows) <= LARGEST).all(axis=1)
+    return np.maximum.accumulate(np.where(is_good, np.arange(len(rows)), -1))

@@ -1,0 +1,320 @@
+"""Reader of calibrated cameras: ``intri.yml`` and ``extri.yml``, written by OpenCV's FileStorage.
+
+::
+
+    %YAML:1.0
+    ---
+    names:
+      - "01"
+    K_01: !!opencv-matrix
+      rows: 3
+      cols: 3
+      dt: d
+      data: [ 1200., 0., 512., 0., …
+          … ]
+    dist_01: …   H_01: 1080   W_01: 1920         in intri.yml; D_01 is the same as dist_01
+    R_01: …      Rot_01: …    T_01: …            in extri.yml: rotation vector, matrix, translation
+
+No other YAML syntax is supported.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
+from viewer.formats._misfit import remark_on
+from viewer.formats._source import Source
+from viewer.formats._text.numbers import to_number
+from viewer.formats._text.words import number_key
+from viewer.phrases import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+
+_INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
+_KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
+_PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
+_ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
+_MOST = 100_000  # maximum number of elements of a matrix
+_NEAR = 1e-3  # tolerance for a rotation matrix; calibrations have few digits
+_LARGEST = 1e9  # maximum pixels in a calibration, and maximum distance of a camera in scene units
+_SHORTEST = 1e-3  # minimum focal length, pixels
+_MOST_BENT = 1e6  # maximum distortion coefficient
+Value = Floats | list[str] | str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Storage:
+    """Content of a FileStorage file.
+
+    Attributes
+    ----------
+    source : Source
+        The file.
+    values : dict
+        Matrices, lists of strings and single strings by name.
+    lines : dict of str to int
+        Line of each key.
+    """
+
+    source: Source
+    values: dict[str, Value] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
+
+    def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
+        """Return an error at the line of an item or, if it is missing, of the cameras' names."""
+        end = self.source.line(self.source.end)
+        line = self.lines.get(item, self.lines.get("names", end))
+        return _fault(self.source, key, line, item=printable(item, 40), **values)
+
+
+def _fault(source: Source, key: str, line: int, **values: Any) -> FormatError:
+    return FormatError(Diagnostic(key, source.path, line, values=values))
+
+
+def find_cameras(
+    folders: Sequence[Path], max_size: int
+) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
+    """Return the cameras of the first folder with calibration files.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders to search, in this order.
+    max_size : int
+        Larger files, in bytes, are refused.
+
+    Returns
+    -------
+    views : tuple of CameraView
+        Cameras in the order of the files; empty if there are no files or they are invalid.
+    notes : list of Diagnostic
+        Errors in the files.
+    """
+    for folder in folders:
+        there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]
+        if len(there) == 2:
+            try:
+                return _cameras(*(Source.open(folder / name, max_size) for name in there))
+            except FormatError as problem:
+                return (), [remark_on("F007.cameras", problem.diagnostic)]
+        if there:
+            lacking = _EXTRINSIC if there == [_INTRINSIC] else _INTRINSIC
+            values = {"name": lacking}
+            return (), [Diagnostic("F007.cameras-beside", folder / there[0], values=values)]
+    return (), []
+
+
+def _cameras(
+    intrinsic: Source, extrinsic: Source
+) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
+    inner, outer = read_storage(intrinsic), read_storage(extrinsic)
+    views, notes = [], []
+    for name in _names(inner, outer):
+        try:
+            views.append(_camera(name, inner, outer))
+        except FormatError as problem:
+            notes.append(remark_on("F007.camera", problem.diagnostic))
+    return tuple(views), notes
+
+
+def _names(inner: Storage, outer: Storage) -> list[str]:
+    """Return the cameras that one of the files lists, or those that have a matrix K."""
+    for file in (inner, outer):
+        listed = file.values.get("names")
+        if isinstance(listed, list):
+            return list(dict.fromkeys(listed))
+    return [key.removeprefix("K_") for key in inner.values if key.startswith("K_")]
+
+
+def _camera(name: str, inner: Storage, outer: Storage) -> CameraView:
+    matrix = _matrix(inner, f"K_{name}", (3, 3))
+    focal = matrix[[0, 1], [0, 1]]
+    if not (focal > 0).all() or not np.allclose(matrix[2], [0, 0, 1]):
+        raise inner.fault("F002.camera-focal", item=f"K_{name}")
+    if not (focal.min() >= _SHORTEST and focal.max() <= _LARGEST):
+        raise inner.fault(
+            "F002.camera-focal-range",
+            item=f"K_{name}",
+            low=_SHORTEST,
+            high=_LARGEST,
+            first=float(focal[0]),
+            second=float(focal[1]),
+        )
+    _check_size(inner, f"K_{name}", matrix[:2])
+    lens = next((key for key in (f"dist_{name}", f"D_{name}") if key in inner.values), "")
+    values = inner.values.get(lens)
+    distortion = values.ravel() if isinstance(values, np.ndarray) else np.zeros(0)
+    _check_size(inner, lens, distortion, _MOST_BENT)
+    translation = _matrix(outer, f"T_{name}", (3,))
+    _check_size(outer, f"T_{name}", translation)
+    sizes = [inner.values.get(f"{axis}_{name}") for axis in "WH"]
+    width, height = [_pixels(size) for size in sizes]
+    return CameraView(
+        name,
+        matrix,
+        _rotation(outer, name),
+        translation,
+        (width, height) if width and height else None,
+        distortion,
+    )
+
+
+def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGEST) -> None:
+    """Refuse numbers that are too large for rendering in single precision."""
+    worst = float(values.ravel()[np.abs(values).argmax()]) if values.size else 0.0
+    if abs(worst) > largest:
+        raise file.fault("F003.camera-limit", item=key, limit=largest, found=worst)
+
+
+def _rotation(file: Storage, name: str) -> Floats:
+    """Return R: the matrix if the file has one, otherwise the rotation of the rotation vector."""
+    if f"Rot_{name}" not in file.values:
+        return rotation_vector_to_matrix(_matrix(file, f"R_{name}", (3,)))
+    rotation = _matrix(file, f"Rot_{name}", (3, 3))
+    off = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if off > _NEAR or np.linalg.det(rotation) < 0.0:
+        raise file.fault("F002.camera-rotation", item=f"Rot_{name}")
+    return rotation
+
+
+def _matrix(file: Storage, key: str, shape: tuple[int, ...]) -> Floats:
+    value = file.values.get(key)
+    if value is None:
+        raise file.fault("F002.camera-no-key", item=key, shape=shape)
+    if not isinstance(value, np.ndarray):
+        raise file.fault("F002.camera-other", item=key, shape=shape)
+    if value.size != np.prod(shape) or (len(shape) == 2 and value.shape != shape):
+        raise file.fault("F002.camera-shape", item=key, shape=shape, found=value.shape)
+    return value.reshape(shape)
+
+
+def _pixels(value: Value | None) -> int:
+    number = to_number(value.encode()) if isinstance(value, str) else None
+    return int(number) if number is not None and 0 < number < 1 << 20 else 0
+
+
+@dataclass(slots=True)
+class _Matrix:
+    """A matrix that is being read line by line."""
+
+    key: str
+    line: int
+    rows: int = -1
+    columns: int = -1
+    data: list[bytes] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)  # line of each number
+    is_open: bool = False  # whether the list of numbers continues on the next line
+
+
+def read_storage(source: Source) -> Storage:
+    """Return the content of a FileStorage file.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+
+    Raises
+    ------
+    FormatError
+        If a line is not supported; the error has the line.
+    """
+    file = Storage(source)
+    values = file.values
+    matrix: _Matrix | None = None
+    listed: list[str] | None = None
+    for number, line in _lines(source.data):
+        key = None if matrix is not None and matrix.is_open else _KEY.fullmatch(line)
+        if key is not None:
+            _close(source, matrix, values)
+            matrix, listed = None, None
+            name, rest = _text(key[1]), key[2].strip()
+            if name in values:
+                raise _fault(source, "F002.camera-twice", number, found=name)
+            file.lines[name] = number
+            if rest.startswith(b"!!opencv-matrix"):
+                matrix = _Matrix(name, number)
+            elif rest.startswith(b"[") and rest.endswith(b"]"):
+                values[name] = [_text(word) for word in rest[1:-1].split(b",") if word.strip()]
+            elif rest:
+                values[name] = _text(rest)
+            else:
+                values[name] = listed = []
+        elif matrix is not None:
+            _continue(source, matrix, line, number)
+        elif listed is not None and (item := _ITEM.fullmatch(line)):
+            listed.append(_text(item[1]))
+        else:
+            raise _fault(source, "F002.camera-value", number, found=line.strip())
+    _close(source, matrix, values)
+    return file
+
+
+def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield non-empty lines without comments, with their numbers."""
+    for number, line in enumerate(data.splitlines(), start=1):
+        bare = line.strip()
+        if bare and not bare.startswith((b"%", b"#")) and bare not in (b"---", b"..."):
+            yield number, line.rstrip()
+
+
+def _text(word: bytes) -> str:
+    return word.strip().strip(b"\"'").decode("utf-8", "replace")
+
+
+def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None:
+    """Parse one line of a matrix."""
+    part = None if matrix.is_open else _PART.fullmatch(line)
+    if part is None and not matrix.is_open:
+        raise _fault(source, "F002.camera-part", number, found=line.strip())
+    text = line.strip() if part is None else part[2].strip()
+    if part is not None and part[1] in (b"rows", b"cols"):
+        size = to_number(text)
+        if size is None or size != int(size) or not 0 <= size <= _MOST:
+            raise _fault(source, "F002.camera-size", number, found=text)
+        if part[1] == b"rows":
+            matrix.rows = int(size)
+        else:
+            matrix.columns = int(size)
+        return
+    if part is not None and part[1] == b"dt":
+        return
+    if part is not None:
+        if not text.startswith(b"["):
+            raise _fault(source, "F002.camera-data", number, found=text)
+        text, matrix.is_open = text[1:], True
+    numbers, bracket, _ = text.partition(b"]")
+    matrix.is_open = not bracket
+    words = numbers.replace(b",", b" ").split()
+    matrix.data += words
+    matrix.lines += [number] * len(words)
+
+
+def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> None:
+    """Convert a complete matrix to an array."""
+    if matrix is None:
+        return
+    if min(matrix.rows, matrix.columns) < 0:
+        lacking = "rows" if matrix.rows < 0 else "cols"
+        raise _fault(source, "F002.camera-lacks", matrix.line, item=matrix.key, name=lacking)
+    numbers = [to_number(word) for word in matrix.data]
+    if None in numbers:
+        at = numbers.index(None)
+        word = matrix.data[at]
+        item = printable(matrix.key, 60)
+        raise _fault(source, number_key(word), matrix.lines[at], item=item, found=word)
+    if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
+        sizes: dict[str, Any] = {"item": matrix.key, "shape": (matrix.rows, matrix.columns)}
+        raise _fault(source, "F002.camera-count", matrix.line, found=len(numbers), **sizes)
+    array = np.array(numbers, dtype=np.float64).reshape(matrix.rows, matrix.columns)
+    values[matrix.key] = array

@@ -1,0 +1,544 @@
+"""Sequential reader of frame files, in growing parts, with gaps for invalid frames."""
+
+from __future__ import annotations
+
+import os
+from array import array
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import field
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import FormatError
+from viewer.formats._archive.values import describe
+from viewer.formats._misfit import remark_on
+from viewer.formats._text.numbers import LARGEST
+from viewer.formats.easymocap.bodies import (
+    COEFFICIENTS,
+    BodyLayout,
+    BodyRows,
+    RowFault,
+    Rows,
+    body_layout,
+    with_coefficients,
+)
+from viewer.formats.easymocap.files import FrameFiles, FrameFolder
+from viewer.formats.easymocap.json_frames import (
+    RecordError,
+    has_numbers,
+    load_people,
+    person_of,
+    record_line,
+)
+from viewer.phrases import printable
+from viewer.progress import report
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.captures.capture import CapturePart
+from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
+from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.motion.body_motion import BodyMotion
+
+# Numbers of frames of the first parts; all later parts have the last size.
+_SIZES = (64, 256, 1024, 4096)
+_MOST_WARNINGS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Settings that are not in the files; see ``open_capture``."""
+
+    name: str
+    frame_rate: float
+    flat_hands: bool | None
+    up: str
+    legacy_expression: bool
+    layout: str
+    max_size: int
+
+
+@dataclass(slots=True)
+class _Part:
+    """People of some consecutive frames."""
+
+    bodies: dict[int, BodyRows] = field(default_factory=dict)
+    points: dict[int, _PointRows] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class Reading:
+    """A single pass over the files, with its state and warnings.
+
+    Attributes
+    ----------
+    files : FrameFiles
+        Files to read.
+    options : Options
+        Settings that are not in the files.
+    body_layout, point_layout : layouts or None
+        Layout of the first usual record; other records must agree, but may have fewer coefficients,
+        or be the first with coefficients.
+    first_fault : Diagnostic or None
+        First error.
+    """
+
+    files: FrameFiles
+    options: Options
+    body_layout: BodyLayout | None = None
+    _point_layout: tuple[PointLayout, Parts] | None = None
+    first_fault: Diagnostic | None = None
+    _numbers: set[int] = field(default_factory=set)
+    _names: dict[str, int] = field(default_factory=dict)
+    _prefixes: list[str] = field(default_factory=list)
+    _n_faults: int = 0
+    _known: dict[int, dict[str, Floats]] = field(default_factory=dict)
+    _awaited: tuple[str, ...] = ()
+    _usual: dict[str, int] = field(default_factory=dict)
+    _has_seen: dict[int, bool] = field(default_factory=dict)
+    _found: list[Diagnostic] = field(default_factory=list)
+    _said: set[tuple[object, ...]] = field(default_factory=set)
+
+    def parts(self) -> Iterator[CapturePart]:
+        """Yield the frames up to the first with a person, then parts of growing size."""
+        frames, n_frames = self.files.frames, self.files.n_frames
+        self._prefixes = [f"{folder.path}{os.sep}" for folder in self.files.folders]
+        self._usual = _usual_widths(self.files, self.options.max_size)
+        sizes = iter(_SIZES)
+        part, size, n_read = _Part(), 0, 0
+        for frame, stop in zip(frames, [*frames[1:], n_frames], strict=True):
+            self._read_frame(frame, part)
+            n_read += 1
+            report(stop, n_frames, "frames")
+            is_enough = n_read == size if size else bool(part.bodies or part.points)
+            if is_enough or stop == n_frames:
+                yield self._finished(part, stop)
+                part, n_read, size = _Part(), 0, next(sizes, _SIZES[-1])
+
+    def _read_frame(self, frame: int, part: _Part) -> None:
+        for folder, prefix in zip(self.files.folders, self._prefixes, strict=True):
+            name = folder.names.get(frame)
+            if name is None:
+                continue
+            path = prefix + name
+            try:
+                people = load_people(path, self.options.max_size)
+            except FormatError as problem:
+                self._fault(problem.diagnostic)
+                continue
+            self._take_people(people, folder, frame, path, part)
+
+    def _take_people(
+        self, people: list[Any], folder: FrameFolder, frame: int, path: str, part: _Part
+    ) -> None:
+        seen: set[int] = set()
+        for place, record in enumerate(people):
+            try:
+                person = self._number_of(person_of(record, place))
+            except RecordError as problem:
+                self._fault_of(path, place, problem, problem.key)
+                continue
+            if person < 0:  # the identity is unknown: the number is unique only within the frame
+                person = min(seen) - 1 if -1 in seen else -1
+                self.note("F007.record-untracked", path)
+            if person in seen:
+                line = self._line(path, place, "")
+                values = {"item": f"person {person}"}
+                self._fault(Diagnostic("F002.record-twice", Path(path), line, values=values))
+                continue
+            if record.get("id") is None or "personID" in record:
+                self._note_ids(path, record)
+            seen.add(person)
+            self._take_person(person, record, folder, frame, (path, place), part)
+
+    def _note_ids(self, path: str, record: dict[str, Any]) -> None:
+        """Add a note on the identity that is used if a record has none, or two different ones."""
+        first, second = record.get("id"), record.get("personID")
+        if first is None and second is None:
+            self.note("F007.record-no-id", path)
+        elif None not in (first, second) and str(first) != str(second):
+            self.note("F007.record-ids", path)
+
+    def _number_of(self, person: int | str) -> int:
+        """Return the number of a person; those with names get unused numbers.
+
+        Raises
+        ------
+        RecordError
+            If a number has already been given to a person with a name.
+        """
+        if isinstance(person, int):
+            if person in self._names.values():
+                raise RecordError("id", Phrase("record-id-named", found=person))
+            self._numbers.add(person)
+            return person
+        if person not in self._names:
+            used = {*self._numbers, *self._names.values()}
+            self._names[person] = next(number for number in count() if number not in used)
+        return self._names[person]
+
+    def _take_person(
+        self,
+        person: int,
+        record: dict[str, Any],
+        folder: FrameFolder,
+        frame: int,
+        origin: tuple[str, int],
+        part: _Part,
+    ) -> None:
+        path, place = origin
+        has_body = folder.has_bodies and "poses" in record
+        has_points = folder.has_points and _KEY in record
+        try:
+            if has_points:
+                self._add_points(part, person, record, frame, origin)
+            if has_body:
+                self._add_body(part, person, record, frame, origin)
+            elif not has_points:
+                raise RecordError("", _lacks(record, folder))
+        except RecordError as problem:
+            self._fault_of(path, place, problem, person_label(person), problem.key)
+        if has_body and _KEY in record and not has_points:
+            self.note("F007.record-points", path)
+        elif has_points and "poses" in record and not has_body:
+            self.note("F007.record-poses", path)
+
+    def _add_body(
+        self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
+    ) -> None:
+        path, place = origin
+        layout = self._layout_of(record, path)
+        rows = part.bodies.get(person)
+        if rows is None:
+            known = self._known.setdefault(person, {}) if is_tracked(person) else None
+            rows = BodyRows(layout=layout, known=known)
+        elif rows.layout is not layout:
+            rows.widen(layout)
+        rows.add(record, frame, path, place)
+        part.bodies[person] = rows
+        if "vertices" in record:
+            self.note("F007.record-vertices", path)
+
+    def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
+        """Return the layout of all bodies, extended by the first record with coefficients."""
+        layout = self.body_layout
+        if layout is None:
+            layout = body_layout(record, self._usual)
+        elif first := [key for key in self._awaited if has_numbers(record, key)]:
+            layout = with_coefficients(layout, record, self._usual)
+            self.note("F007.record-first", path, keys=tuple(first))
+        else:
+            return layout
+        self.body_layout, keys = layout, [key for key, _ in layout.widths]
+        self._awaited = tuple(key for key in COEFFICIENTS if key not in keys)
+        return layout
+
+    def _add_points(
+        self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
+    ) -> None:
+        rows = part.points.get(person)
+        if rows is None:
+            layout, parts = self.point_layout or _point_layout(record, self.options.layout)
+            rows = _PointRows(layout=layout, parts=parts)
+        rows.add(record, frame, *origin)
+        if self.point_layout is None:
+            rows.check_any()
+            self.point_layout = rows.layout, rows.parts
+        part.points[person] = rows
+
+    def _finished(self, part: _Part, stop: int) -> CapturePart:
+        """Return the collected rows as motions on the timeline of the whole recording."""
+        options, files = self.options, self.files
+        bodies: dict[int, BodyMotion] = {}
+        points: dict[int, tuple[PointLayout, PointClip]] = {}
+        where = (files.n_frames, options.frame_rate, files.first_frame)
+        for person, rows in part.bodies.items():
+            values, keep, faults = rows.values()
+            self._faults(person, rows, faults)
+            for message, path, key in rows.remarks:
+                self.note(message, path, item=key)
+            if keep.any():
+                bodies[person] = rows.motion(
+                    options.name,
+                    values,
+                    rows.timing(*where, keep),
+                    options.flat_hands,
+                    options.legacy_expression,
+                    options.up,
+                )
+        for person, seen in part.points.items():
+            places, faults = seen.points()
+            self._faults(person, seen, faults)
+            is_seen = bool(places[..., 3].any())
+            self._has_seen[person] = self._has_seen.get(person, False) or is_seen
+            clip = PointClip(options.name, seen.timing(*where), places)
+            points[person] = seen.layout, clip
+        if stop == files.n_frames:
+            self._found += self._final_messages()
+        found, self._found = self._found, []
+        return CapturePart(stop, bodies, points, tuple(found))
+
+    def _final_messages(self) -> list[Diagnostic]:
+        """Return the messages that require the whole recording."""
+        found: list[Diagnostic] = []
+        unseen = [person for person, has_seen in self._has_seen.items() if not has_seen]
+        values: dict[str, Any] = {"name": self.options.name}
+        if unseen:
+            people = [*map(person_label, unseen)]
+            found.append(Diagnostic("F007.record-unseen", values={**values, "people": people}))
+        if self._names:
+            names = [f"{number}: {printable(name, 40)}" for name, number in self._names.items()]
+            found.append(Diagnostic("F007.person-names", values={"names": names}))
+        more = self._n_faults - _MOST_WARNINGS
+        if more > 0:
+            found.append(Diagnostic("F007.records", values={**values, "n": more}))
+        return found
+
+    def _faults(self, person: int, rows: Rows, faults: list[RowFault]) -> None:
+        for row, name, problem in faults:
+            label = person_label(person)
+            self._fault_of(rows.paths[row], rows.places[row], problem, label, name)
+
+    def _fault_of(self, path: str, place: int, problem: RecordError, *names: str) -> None:
+        """Record an error in a person's record, or in one of its keys."""
+        line = self._line(path, place, problem.key)
+        values = {"item": ": ".join(filter(None, names)), "problem": problem.problem}
+        self._fault(Diagnostic(f"{problem.code}.record", Path(path), line, values=values))
+
+    def _line(self, path: str, place: int, key: str) -> int | None:
+        # Finding the line reads the file again, which is skipped for errors that are not shown.
+        if self._n_faults >= _MOST_WARNINGS:
+            return None
+        return record_line(path, self.options.max_size, place, key)
+
+    def _fault(self, fault: Diagnostic) -> None:
+        self.first_fault = self.first_fault or fault
+        self._n_faults += 1
+        if self._n_faults <= _MOST_WARNINGS:
+            self._found.append(remark_on("F007.record", fault))
+
+    def note(self, key: str, path: str, **values: Any) -> None:
+        """Record a note about the files, without repeating it."""
+        mark = key, *values.values()
+        if mark not in self._said:
+            self._said.add(mark)
+            self._found.append(Diagnostic(key, Path(path), values=values))
+
+
+def _lacks(record: dict[str, Any], folder: FrameFolder) -> Phrase:
+    wanted = ("poses",) * folder.has_bodies + (_KEY,) * folder.has_points
+    if not record:
+        return Phrase("record-no-keys", expected=wanted)
+    return Phrase("record-lacks", expected=wanted, keys=list(record))
+
+
+# Usual numbers of values in a recording, determined from a few frames spread over it.
+#
+# The first record alone must not decide for all others, because it may be unusual.
+
+_LOOKED_AT = 8  # number of frames
+
+
+def _usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
+    """Return the most frequent number of ``poses``, and the largest numbers of coefficients.
+
+    Parameters
+    ----------
+    files : FrameFiles
+        Files of the recording.
+    max_size : int
+        Maximum size of a file in bytes.
+
+    Returns
+    -------
+    mapping of str to int
+        Number of values of a record by key; empty if there are no valid bodies.
+    """
+    found = [dict(layout.widths) for layout in _layouts(files, max_size)]
+    if not found:
+        return {}
+    # The first of several equally frequent numbers is used.
+    ((usual, _),) = Counter(widths["poses"] for widths in found).most_common(1)
+    alike = [widths for widths in found if widths["poses"] == usual]
+    most = {key: max(widths.get(key, 0) for widths in alike) for key in COEFFICIENTS}
+    return {"poses": usual} | most
+
+
+def _layouts(files: FrameFiles, max_size: int) -> list[BodyLayout]:
+    """Return the layouts of all valid records in some frames."""
+    last = len(files.frames) - 1
+    chosen = np.unique(np.linspace(0, last, min(last + 1, _LOOKED_AT)).round().astype(int))
+    found: list[BodyLayout] = []
+    for folder in files.folders if files.frames else ():
+        for index in chosen.tolist() if folder.has_bodies else ():
+            name = folder.names.get(files.frames[index])
+            if name is None:
+                continue
+            try:
+                people = load_people(str(folder.path / name), max_size)
+            except FormatError:  # reported when the frame is read
+                continue
+            found += [*filter(None, map(_layout, people))]
+    return found
+
+
+def _layout(record: object) -> BodyLayout | None:
+    try:
+        return body_layout(record) if isinstance(record, dict) else None
+    except RecordError:  # reported when the frame is read
+        return None
+
+
+# Keypoints of EasyMocap records, collected per person.
+#
+# ``keypoints3d`` has rows of x, y, z and confidence, or of x, y, z with full confidence; hands
+# and face may have separate keys. A confidence of 0 means "not detected".
+
+_KEY = "keypoints3d"
+_BESIDE = ("handl3d", "handr3d", "face3d")
+_MOST = 1 << 16  # maximum number of keypoints of one person
+_FOUR, _THREE = {4}, {3}
+Parts = tuple[tuple[str, int], ...]
+
+
+def _point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, Parts]:
+    """Return the layout of a record's keypoints, and its keys with their numbers of points.
+
+    Parameters
+    ----------
+    record : dict
+        Record of one person.
+    title : str
+        Name of the layout, used if ``keypoints3d`` has its number of points.
+
+    Raises
+    ------
+    RecordError
+        If the value of a key is not a list of rows.
+    """
+    parts = [(key, _count(record, key)) for key in (_KEY, *_BESIDE) if key in record]
+    counts = [count for _, count in parts]
+    body = keypoint_layout(counts[0], title if title in TITLES.get(counts[0], ()) else "")
+    if len(parts) == 1:
+        return body, tuple(parts)
+    beside = {key: keypoint_layout(count) for key, count in parts[1:]}
+    for key, side in (("handl3d", 0), ("handr3d", 1)):
+        if key in beside and len(beside[key].names) == 21:
+            beside[key] = _one_hand(side)
+    joined = joined_layout("", [body, *beside.values()])
+    whole = keypoint_layout(len(joined.names))
+    # Body, hands and face in the standard order form a layout with its own name.
+    named = whole if whole.names == joined.names else None
+    text = " + ".join([body.title, *beside])
+    return named or PointLayout(text, joined.names, joined.limbs, joined.sides), tuple(parts)
+
+
+def _one_hand(side: int) -> PointLayout:
+    both = keypoint_layout(42)
+    first, stop = 21 * side, 21 * side + 21
+    inside = (both.limbs >= first).all(axis=1) & (both.limbs < stop).all(axis=1)
+    limbs = both.limbs[inside] - first
+    return PointLayout("hand", both.names[first:stop], limbs, both.sides[first:stop])
+
+
+def _count(record: dict[str, Any], key: str) -> int:
+    rows = record[key]
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        raise RecordError(key, Phrase("record-rows", found=describe(rows)))
+    if len(rows) > _MOST:
+        raise RecordError(key, Phrase("record-most-points", most=_MOST, found=len(rows)))
+    return len(rows)
+
+
+@dataclass(slots=True, kw_only=True)
+class _PointRows(Rows):
+    """Keypoints of one person.
+
+    Attributes
+    ----------
+    layout : PointLayout
+        Layout of all records.
+    parts : tuple of (str, int)
+        Keys of a record, with their number of points.
+    buffer : array
+        x, y, z, confidence of all points, record after record.
+    """
+
+    layout: PointLayout
+    parts: Parts
+    buffer: array[float] = field(default_factory=lambda: array("d"))
+
+    def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
+        """Add one record.
+
+        Raises
+        ------
+        RecordError
+            If a key is missing, or its number of points has changed.
+        """
+        before = len(self.buffer)
+        try:
+            for key, count in self.parts:
+                self._take(record.get(key), key, count)
+        except RecordError:
+            del self.buffer[before:]
+            raise
+        self.keep_origin(frame, path, place)
+
+    def check_any(self) -> None:
+        """Refuse rows without a valid keypoint, which must not determine the layout of others.
+
+        Raises
+        ------
+        RecordError
+            If every keypoint is invalid.
+        """
+        if _is_odd(self._rows()).all():
+            raise RecordError(_KEY, Phrase("record-no-rows"))
+
+    def _take(self, rows: Any, key: str, count: int) -> None:
+        try:
+            if len(rows) == count:
+                widths = set(map(len, rows))
+                if widths == _FOUR:
+                    self.buffer.fromlist(list(chain.from_iterable(rows)))
+                    return
+                if widths == _THREE:
+                    certain = [[*row, 1.0] for row in rows]
+                    self.buffer.fromlist(list(chain.from_iterable(certain)))
+                    return
+        except (TypeError, ValueError, OverflowError):
+            pass  # the error is reported below
+        if not isinstance(rows, list):
+            raise RecordError(key, Phrase("record-points", expected=count, found=describe(rows)))
+        if len(rows) != count:
+            raise RecordError(key, Phrase("record-points", expected=count, found=len(rows)))
+        raise RecordError(key, Phrase("record-other-rows"))
+
+    def points(self) -> tuple[Floats, list[RowFault]]:
+        """Return the points (N, K, 4), and the errors in invalid rows."""
+        points = self._rows().copy()
+        is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
+        points[is_odd | is_unseen] = 0.0
+        faults = [
+            (int(row), "", RecordError(_KEY, Phrase("record-unseen", n=int(is_odd[row].sum()))))
+            for row in np.flatnonzero(is_odd.any(axis=1))
+        ]
+        points.flags.writeable = False  # a read-only array is not copied again
+        return points, faults
+
+    def _rows(self) -> Floats:
+        count = sum(size for _, size in self.parts)
+        return np.frombuffer(self.buffer, dtype=np.float64).reshape(-1, count, 4)
+
+
+def _is_odd(points: Floats) -> Bools:
+    """Return a mask of the invalid points, (N, K, 4), whose confidence is not 0."""
+    confidence = points[..., 3]
+    is_good = (np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)
+    return ~is_good & (confidence != 0.0)

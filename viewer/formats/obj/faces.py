@@ -1,0 +1,399 @@
+"""Parser for the ``f`` lines of an ``.obj``: vertex, texture coordinate and normal of corners."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Part, Phrase
+from viewer.formats._mesh.polygons import first_known, triangles_of
+from viewer.formats._source import Source
+from viewer.formats._text.numbers import parse_numbers, parse_words, to_number, word_begins
+from viewer.formats._text.words import Words, refuse_words
+from viewer.formats.obj.lines import Lines, NumberRows, Places, Rows, rows_of
+from viewer.rig.arrays import Bools, Floats
+
+_CORNER_KINDS = ("v", "vt", "vn")
+"""Keywords of the elements that the three numbers of a corner index."""
+FEWEST = 3
+"""Corners of a face."""
+_Corners = NDArray[np.integer]
+_SLASH = ord("/")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CornerFault:
+    """Invalid corners with the same error.
+
+    Attributes
+    ----------
+    key, offset, values : str, int, dict
+        The first error, as arguments of ``Source.refuse``.
+    faces : (n,)
+        Face of each corner.
+    """
+
+    key: str
+    offset: int
+    values: dict[str, Any]
+    faces: Places
+
+
+@dataclass(frozen=True, slots=True)
+class FaceRows:
+    """The corners of some faces, face after face.
+
+    Attributes
+    ----------
+    counts : (F,)
+        Corners of each face, 3 or more.
+    corners : (C, 3)
+        0-based vertex, texture coordinate and normal of each corner; -1 if missing. The range can
+        be checked only when the whole file has been read.
+    offsets : (F,)
+        Offset of each face in the file.
+    faults : tuple of CornerFault
+        Errors to record when the triangles of the faces are known.
+    """
+
+    counts: NDArray[np.integer]
+    corners: _Corners
+    offsets: Places
+    faults: tuple[CornerFault, ...] = ()
+
+
+def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
+    """Read the faces of some lines; None if any is invalid.
+
+    Negative indices count back from the last ``v``, ``vt`` or ``vn`` before the face.
+
+    Parameters
+    ----------
+    lines : Lines
+        Some lines of a file.
+    before : dict of str to int
+        Number of earlier lines with each keyword.
+    """
+    rows = rows_of(lines, "f")
+    begins = word_begins(rows.letters)
+    counts = np.diff(np.searchsorted(begins, rows.starts))
+    written = None if (counts < FEWEST).any() else _corner_numbers(rows, begins)
+    if written is None:
+        return None
+    for column, keyword in enumerate(_CORNER_KINDS):
+        numbers = written[:, column]
+        back = np.flatnonzero(numbers < 0)
+        if len(back):
+            owners = np.repeat(np.arange(len(counts)), counts)[back]
+            known = before[keyword] + np.searchsorted(lines.of[keyword], lines.of["f"])[owners]
+            if (-numbers[back] > known).any():
+                return None
+            numbers[back] += known + 1
+    return FaceRows(counts, written - 1, rows.origins - 1)
+
+
+def _corner_numbers(rows: Rows, begins: Places) -> _Corners | None:
+    """Return the three numbers of every corner as written, 0 for missing numbers: (C, 3).
+
+    None if a corner is invalid.
+    """
+    text = rows.body.replace(b"/", b" ")
+    values, bad = parse_numbers(text, 0, len(text), is_kept=False)
+    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
+        return None
+    columns = _common_columns(rows, begins)
+    if columns is not None:
+        return _in_columns(values, columns, len(begins))
+    fits, n_numbers, has_gap = _fits_corner(rows, begins)
+    if not fits.all():
+        return None
+    return _spread(values, n_numbers, has_gap)
+
+
+def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
+    """Return the columns that the numbers of all corners have in common, as in most files.
+
+    None if corners differ, or if one may be invalid.
+    """
+    slashes = np.flatnonzero(rows.letters == _SLASH)
+    if len(slashes) == 0:
+        return [0]
+    n_slashes = len(slashes) // len(begins)
+    if n_slashes > 2 or n_slashes * len(begins) != len(slashes):
+        return None
+    table = slashes.reshape(-1, n_slashes)
+    after = rows.letters.take(table[:, -1] + 1, mode="clip")
+    is_inside = (table[:, 0] > begins) & (np.append(begins[1:], len(rows.letters)) > table[:, -1])
+    if not (is_inside & (after > ord(" ")) & (after != _SLASH)).all():
+        return None
+    if n_slashes == 1:
+        return [0, 1]
+    gaps = table[:, 1] - table[:, 0]
+    if (gaps == 1).all():
+        return [0, 2]
+    return [0, 1, 2] if (gaps > 1).all() else None
+
+
+def _number_begins(rows: Rows) -> Places:
+    return word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
+
+
+def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
+    """Classify corners by their slashes.
+
+    Parameters
+    ----------
+    rows : Rows
+        Rows of faces.
+    begins : (C,)
+        Start of each corner in the body of the rows.
+
+    Returns
+    -------
+    fits : (C,) bool
+        True for v, v/vt, v//vn and v/vt/vn; the numbers are not checked.
+    n_numbers : (C,)
+        Number of values of each corner.
+    has_gap : (C,) bool
+        True for v//vn.
+    """
+    number_begins = _number_begins(rows)
+    slashes = np.flatnonzero(rows.letters == _SLASH)
+    after = np.append(begins[1:], len(rows.letters))
+    n_slashes = np.searchsorted(slashes, after) - np.searchsorted(slashes, begins)
+    n_numbers = np.searchsorted(number_begins, after) - np.searchsorted(number_begins, begins)
+    # Only the middle number may be missing, as in "1//3": "1/", "/1" and "1///2" are invalid.
+    doubles = slashes[:-1][np.diff(slashes) == 1]
+    has_gap = np.searchsorted(doubles, after) - np.searchsorted(doubles, begins) == 1
+    fits = np.where(has_gap, (n_slashes == 2) & (n_numbers == 2), n_numbers == n_slashes + 1)
+    fits &= (
+        (n_slashes <= 2) & (rows.letters[begins] != _SLASH) & (rows.letters[after - 1] != _SLASH)
+    )
+    return fits, n_numbers, has_gap
+
+
+def _whole(values: Floats) -> _Corners | None:
+    """Return numbers as integers; None if one has a fraction, or is too large for an index."""
+    # The function for invalid faces reads large numbers again.
+    whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
+    return whole if (whole == values).all() else None
+
+
+def _in_columns(values: Floats, columns: list[int], count: int) -> _Corners | None:
+    """Arrange the numbers of corners in some of three columns; the others are 0."""
+    whole = _whole(values)
+    if whole is None or len(whole) != len(columns) * count:
+        return None
+    table = np.zeros((count, 3), dtype=np.int32)
+    table[:, columns] = whole.reshape(count, -1)
+    return table
+
+
+def _spread(values: Floats, counts: Places, gaps: Bools) -> _Corners | None:
+    """Arrange the numbers of corners in rows of three; a gap moves the second to the third."""
+    whole = _whole(values)
+    if whole is None:
+        return None
+    table = np.zeros((len(counts), 3), dtype=np.int32)
+    firsts = np.cumsum(counts) - counts
+    table[:, 0] = whole[firsts]
+    middle, third = (counts > 1) & ~gaps, counts > 2
+    table[middle, 1] = whole[firsts[middle] + 1]
+    table[gaps, 2] = whole[firsts[gaps] + 1]
+    table[third, 2] = whole[firsts[third] + 2]
+    return table
+
+
+_LOST = -(2**40)
+"""Represents an unknown vertex; no file has this many vertices."""
+
+
+def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
+    """Parse the numbers after a keyword; see ``number_rows``.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records the errors.
+    lines : Lines
+        Lines of the file.
+    keyword : str
+        v, vt or vn.
+    width : int
+        Minimum number of values in a line.
+    first : int
+        Number of earlier lines with this keyword.
+
+    Returns
+    -------
+    table, counts, values, rows
+        As for ``number_rows``, with NaN for words that are not numbers and in rows that are too
+        short.
+    """
+    rows = rows_of(lines, keyword)
+    begins = word_begins(rows.letters)
+    values = parse_words(rows.body, 0, len(rows.body))
+    firsts = np.searchsorted(begins, rows.starts)
+    counts = np.diff(firsts)
+    owners = np.repeat(np.arange(len(counts)), counts)
+    words = Words(source.data, values, rows.origins[owners] + begins - rows.starts[owners], owners)
+    part: Part = "positions" if keyword == "v" else ""
+    bad = words.bad
+    is_used = bad - firsts[owners[bad]] < width
+    parts: tuple[Part, Part] = (part, "")  # only these numbers are checked
+    for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
+        owned = owners[bad[chosen]] + first
+        refuse_words(
+            source,
+            words,
+            bad[chosen],
+            lambda word: Phrase(f"obj-{keyword}", index=int(owners[word]) + first),
+            whose,
+            owned,
+        )
+    short = np.flatnonzero(counts < width)
+    if len(short):
+        row = int(short[0])
+        source.refuse(
+            "F002.width",
+            int(rows.origins[row]) - 1,
+            len(short),
+            part,
+            short + first,
+            item=Phrase(f"obj-{keyword}", index=row + first),
+            expected=width,
+            found=int(counts[row]),
+        )
+    table = np.full((len(counts), width), np.nan)
+    long = counts >= width
+    table[long] = values[firsts[:-1][long, None] + np.arange(width)]
+    return table, counts, values, rows
+
+
+def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
+    """Read the faces of some lines; see ``read_faces``.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records the errors of omitted faces.
+    lines : Lines
+        Lines of the file.
+    before : dict of str to int
+        Number of earlier lines with each keyword.
+
+    Returns
+    -------
+    FaceRows
+        Faces, with the errors to record when their triangles are known.
+    """
+    rows = rows_of(lines, "f")
+    begins = word_begins(rows.letters)
+    counts = np.diff(np.searchsorted(begins, rows.starts))
+    owners = np.repeat(np.arange(len(counts)), counts)
+    small = np.flatnonzero(counts < FEWEST)
+    if len(small):
+        offset = int(rows.origins[small[0]]) - 1
+        found = int(counts[small[0]])
+        source.refuse("F002.obj-face", offset, len(small), least=FEWEST, found=found)
+    written, lost = _corners(rows, begins)
+    kept = counts >= FEWEST
+    places = (np.cumsum(kept) - 1)[owners]
+    faults = []
+    broken = np.flatnonzero(lost & kept[owners])
+    if len(broken):
+        offset = rows.offset(int(begins[broken[0]]))
+        faults.append(_corner_fault(source, offset, places[broken]))
+    for column, keyword in enumerate(_CORNER_KINDS):
+        numbers = written[:, column]
+        known = before[keyword] + np.searchsorted(lines.of[keyword], lines.of["f"])[owners]
+        far = np.flatnonzero((-numbers > known) & ~lost & kept[owners])
+        if len(far):
+            values = {"least": -int(known[far[0]]), "found": int(numbers[far[0]])}
+            key = f"F002.obj-{keyword}-back" if known[far[0]] else f"F002.obj-{keyword}-early"
+            offset = rows.offset(int(begins[far[0]]))
+            faults.append(CornerFault(key, offset, values, places[far]))
+            lost[far] = True
+        numbers[numbers < 0] += known[numbers < 0] + 1
+    written[lost] = _LOST, 0, 0
+    return FaceRows(counts[kept], written[kept[owners]] - 1, rows.origins[kept] - 1, tuple(faults))
+
+
+def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
+    found = source.next_word(offset)
+    word = b"" if found is None else found.group()
+    if any(to_number(number) == 0.0 for number in word.split(b"/")):
+        return CornerFault("F002.obj-zero", offset, {}, faces)
+    return CornerFault("F002.obj-corner", offset, {"found": word}, faces)
+
+
+def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
+    """Return the numbers of every corner, 0 if missing, (C, 3), and a mask of invalid corners."""
+    values = parse_words(rows.body.replace(b"/", b" "), 0, len(rows.body))
+    fits, n_numbers, has_gap = _fits_corner(rows, begins)
+    firsts = np.cumsum(n_numbers) - n_numbers
+    numbers = np.zeros((len(begins), 3))
+    numbers[fits, 0] = values[firsts[fits]]
+    for chosen, column, place in (
+        (fits & (n_numbers > 1) & ~has_gap, 1, 1),
+        (fits & has_gap, 2, 1),
+        (fits & (n_numbers > 2), 2, 2),
+    ):
+        given = values[firsts[chosen] + place]
+        # Indices count from 1, so an explicit 0 is invalid and differs from a missing index.
+        numbers[chosen, column] = np.where(given == 0.0, np.nan, given)
+    whole = np.clip(np.nan_to_num(numbers), -(2.0**40), 2.0**40).astype(np.int64)
+    lost = ~fits | (whole != numbers).any(axis=1) | (whole[:, 0] == 0)
+    return whole, lost
+
+
+def checked_corners(
+    source: Source, faces: FaceRows, faults: list[CornerFault], ends: dict[str, int]
+) -> NDArray[np.integer]:
+    """Return the corners of all faces, with invalid corners replaced by others of their face.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records the errors.
+    faces : FaceRows
+        All faces of the file; their corners are changed.
+    faults : list of CornerFault
+        Errors in these faces, which the caller records.
+    ends : dict of str to int
+        Number of lines with each keyword.
+
+    Returns
+    -------
+    (C, 3)
+        Corners; -1 for invalid indices of texture coordinates and normals.
+    """
+    corners, counts = faces.corners, faces.counts
+    limits = np.array([ends[keyword] for keyword in _CORNER_KINDS])
+    largest = [column.max(initial=-1) for column in corners.T]
+    if not faults and (largest < limits).all():
+        return corners
+    for fault in faults:
+        triangles = triangles_of(counts, fault.faces)
+        source.refuse(
+            fault.key, fault.offset, len(fault.faces), "triangles", triangles, **fault.values
+        )
+    owners = np.repeat(np.arange(len(counts)), counts)
+    for column, keyword in enumerate(_CORNER_KINDS):
+        wrong = np.flatnonzero(corners[:, column] >= ends[keyword])
+        if len(wrong):
+            source.refuse(
+                f"F002.obj-{keyword}-range" if ends[keyword] else f"F002.obj-{keyword}-none",
+                int(faces.offsets[owners[wrong[0]]]),
+                len(wrong),
+                "triangles" if column == 0 else "",
+                triangles_of(counts, owners[wrong]),
+                limit=ends[keyword],
+                found=int(corners[wrong[0], column]) + 1,
+            )
+            corners[wrong, column] = -1
+    corners[:, 0] = first_known(corners[:, 0], counts, owners)
+    return corners

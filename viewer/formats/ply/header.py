@@ -1,0 +1,153 @@
+"""Header of a ``.ply``: its elements, their properties, and the start of the data."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import field
+
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._source import Source
+
+CORNERS = ("vertex_indices", "vertex_index")
+"""Names of the property that lists a face's vertices."""
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_LINE = re.compile(rb"([^\r\n]*)(\r\n|\r+\n|\n|\r|\Z)")
+_LONGEST = 1 << 20  # maximum size of a header, bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """One property: its type in numpy's notation, and the type of the count if it is a list."""
+
+    name: str
+    kind: str
+    count_kind: str = ""
+
+
+@dataclass(slots=True)
+class Element:
+    """Consecutive rows with the same properties."""
+
+    name: str
+    count: int
+    offset: int
+    properties: list[Property] = field(default_factory=list)
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows may have different sizes."""
+        return any(prop.count_kind for prop in self.properties)
+
+
+@dataclass(slots=True)
+class Header:
+    """Contents of a file.
+
+    Attributes
+    ----------
+    order : "", "<" or ">"
+        Byte order; empty for text.
+    elements : list of Element
+        In file order.
+    comments : list of (str, int)
+        Comment strings and their offsets.
+    end : int
+        Offset of the data.
+    """
+
+    order: str = ""
+    elements: list[Element] = field(default_factory=list)
+    comments: list[tuple[str, int]] = field(default_factory=list)
+    end: int = 0
+
+
+def read_header(source: Source) -> Header:
+    """Read the lines up to ``end_header``.
+
+    Raises
+    ------
+    FormatError
+        If a line is invalid; the error has the line.
+    """
+    header = Header()
+    position, number, has_format = 0, 0, False
+    while position < min(len(source.data), _LONGEST):
+        match = _LINE.match(source.data, position)
+        assert match is not None  # the pattern matches every text
+        words = match[1].decode("utf-8", "surrogateescape").split()
+        if number == 0 and words != ["ply"]:
+            raise _no_ply(source, match[1])
+        if words == ["end_header"]:
+            if not has_format:
+                raise source.fault("F002.ply-no-format", position)
+            header.end = _behind(source.data, match)
+            return header
+        if words and words[0] == "format":
+            header.order, has_format = _order(source, words, position), True
+        elif number:
+            _take(source, header, words, match[1], position)
+        position, number = match.end(), number + 1
+    raise source.fault("F002.ply-no-end", position)
+
+
+def _no_ply(source: Source, line: bytes) -> FormatError:
+    """Return the error for a file in another format."""
+    looks = source.looks_like()
+    if looks is not None:
+        return source.fault("F002.ply-looks", 0, looks=looks)
+    return source.fault("F002.ply-start", 0, found=line[:40])
+
+
+def _behind(data: bytes, match: re.Match[bytes]) -> int:
+    """Return the offset of the data, whose first byte may resemble the LF of a CR LF."""
+    if match[2] == b"\r\n" and not data.startswith((b"ply\r\n", b"ply \r\n")):
+        return match.end() - 1
+    return match.end()
+
+
+def _order(source: Source, words: list[str], offset: int) -> str:
+    if len(words) != 3 or words[1] not in _ORDERS or words[2] != "1.0":
+        found = " ".join(words[1:])
+        raise source.fault("F002.ply-format", offset, orders=list(_ORDERS), found=found)
+    return _ORDERS[words[1]]
+
+
+def _take(source: Source, header: Header, words: list[str], line: bytes, offset: int) -> None:
+    """Parse one line after the first two."""
+    keyword = words[0] if words else ""
+    if keyword in ("comment", "obj_info"):
+        text = line.decode("utf-8", "surrogateescape").strip()
+        header.comments.append((text[len(keyword) :].strip(), offset))
+    elif keyword == "element":
+        header.elements.append(_element(source, words, offset))
+    elif keyword == "property":
+        if not header.elements:
+            raise source.fault("F002.ply-no-element", offset)
+        _add(source, header.elements[-1], words, offset)
+    elif keyword:
+        raise source.fault("F002.ply-line", offset, found=keyword)
+
+
+def _element(source: Source, words: list[str], offset: int) -> Element:
+    is_count = len(words) == 3 and words[2].isascii() and words[2].isdecimal()
+    if not is_count or len(words[2]) > 18:
+        raise source.fault("F002.ply-element", offset, found=" ".join(words[1:]))
+    return Element(words[1], int(words[2]), offset)
+
+
+def _add(source: Source, element: Element, words: list[str], offset: int) -> None:
+    kinds, name = (words[2:-1], words[-1]) if words[1:2] == ["list"] else (words[1:-1], words[-1])
+    is_list = words[1:2] == ["list"]
+    if len(kinds) != 1 + is_list or any(kind not in TYPES for kind in kinds):
+        raise source.fault("F002.ply-property", offset, found=" ".join(words[1:]))
+    if any(prop.name == name for prop in element.properties):
+        raise source.fault("F002.ply-property-again", offset, found=name)
+    if is_list and TYPES[kinds[0]].startswith("f"):
+        raise source.fault("F002.ply-list-count", offset, found=kinds[0])
+    element.properties.append(Property(name, TYPES[kinds[-1]], TYPES[kinds[0]] if is_list else ""))

@@ -1,0 +1,575 @@
+"""Parser for the rows after the header of a ``.ply``: text or binary, element after element."""
+
+from __future__ import annotations
+
+import bisect
+import re
+from collections.abc import Callable
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Part, Phrase
+from viewer.errors import FormatError
+from viewer.formats._mesh.polygons import triangles_of
+from viewer.formats._source import Source
+from viewer.formats._text.growing_table import GrowingTable
+from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
+from viewer.formats._text.words import number_key
+from viewer.formats.ply.header import CORNERS, Element, Header, Property
+from viewer.progress import report_bytes
+
+_Indices = NDArray[np.integer]
+_PART = 1 << 17  # rows that are parsed together, to limit the memory of their values
+_WORD = re.compile(rb"[^ \t\n\r\v\f]+")
+
+
+def read_tables(source: Source, header: Header) -> dict[str, Table]:
+    """Read all elements and return them by name.
+
+    Raises
+    ------
+    FormatError
+        If there are fewer numbers than the header declares, or words that are not numbers.
+    """
+    body: _Text | _BinaryRows
+    body = _BinaryRows(source, header) if header.order else _Text(source, header)
+    tables: dict[str, Table] = {}
+    for element in header.elements:
+        table = Table(element, is_first=element.name not in tables)
+        if body.take_even(table):
+            tables.setdefault(element.name, table)
+            continue
+        cursor = body.begin(element)
+        table.offset_of = body.offsets(cursor)
+        for prop in element.properties:
+            if prop.count_kind:
+                counts, values, cursor = body.take_lists(table, cursor, prop)
+                table.lists[prop.name] = counts, values
+            else:
+                table.columns[prop.name], cursor = body.take(table, cursor, prop)
+        body.end(element, cursor)
+        tables.setdefault(element.name, table)
+    body.finish()
+    return tables
+
+
+class _Text:
+    """Rows of a text file, one per line; words that are not numbers become NaN."""
+
+    def __init__(self, source: Source, header: Header) -> None:
+        self.source, self.start = source, header.end
+        self._lines = line_sizes(self.data, self.start)
+        self.counts = self._lines.words
+        self.line = 0
+        self._begins: _Places | None = None
+        self._firsts: _Places | None = None
+        self._values: _Numbers | None = None
+        self.has_bad = False  # correct once all values have been parsed
+
+    @property
+    def data(self) -> bytes:
+        """The file, without a final Ctrl-Z."""
+        return self.source.data.rstrip(b"\x1a")
+
+    @property
+    def values(self) -> _Numbers:
+        """All values; only irregular files need them together."""
+        if self._values is None:
+            self._values, bad = parse_numbers(self.data, self.start, len(self.data))
+            if bad >= 0:
+                self._values = parse_words(self.data, self.start, len(self.data))
+            self.has_bad = bad >= 0
+        return self._values
+
+    @property
+    def firsts(self) -> _Places:
+        """The first word of every non-empty line."""
+        if self._firsts is None:
+            self._firsts = np.cumsum(self.counts, dtype=np.int64) - self.counts
+        return self._firsts
+
+    def take_even(self, table: Table) -> bool:
+        """Read an element if all its rows have the same size; return whether they do."""
+        element = table.element
+        last = self.line + element.count
+        if self.has_bad or element.count == 0 or last > len(self.counts):
+            return False
+        counts = self.counts[self.line : last]
+        width = int(counts[0])
+        if (counts != width).any():
+            return False
+        rows = self._even_rows(element, width)
+        found = None if rows is None else _even_text(element, rows)
+        if found is None:
+            return False
+        first = int(self.counts[: self.line].sum(dtype=np.int64))
+        table.columns, table.lists = found
+        table.offset_of = lambda row: self._offset(first + width * row)
+        self.line = last
+        return True
+
+    def _even_rows(self, element: Element, width: int) -> _Numbers | None:
+        """Return the numbers of an element, (N, width), as integers if all are; None if invalid."""
+        has_lists = any(prop.count_kind for prop in element.properties)
+        table = GrowingTable((width,), np.int32 if has_lists else np.float64)
+        last = self.line + element.count
+        for line in range(self.line, last, _PART):
+            start, end = (self._lines.offset(at) for at in (line, min(line + _PART, last)))
+            values, bad = parse_numbers(self.data, start, end, is_kept=element.count <= _PART)
+            if bad >= 0:
+                return None
+            # Corners are indices, which take half the memory as int32.
+            table.add(
+                _compact(values.reshape(-1, width)) if has_lists else values.reshape(-1, width)
+            )
+            report_bytes(end, len(self.data))
+        return table.rows()
+
+    def begin(self, element: Element) -> _Places:
+        """Return the first word of each row."""
+        _ = self.values  # parsed first, so that invalid words are known
+        last = self.line + element.count * bool(element.properties)
+        if last > len(self.firsts):
+            raise self.source.fault(
+                "F002.ply-lines",
+                element.offset,
+                element=element.name,
+                expected=element.count,
+                found=len(self.firsts) - self.line,
+            )
+        rows = slice(self.line, last)
+        self.rows_left = self.firsts[rows] + self.counts[rows]
+        self.line = last
+        return self.firsts[rows]
+
+    def offsets(self, cursor: _Places) -> Callable[[int], int] | None:
+        """Return a function that finds the offset of a row in the file."""
+        return lambda row: self._offset(int(cursor[row]))
+
+    def take(self, table: Table, cursor: _Places, prop: Property) -> tuple[_Numbers, _Places]:
+        """Return the next number of each row."""
+        self._need(cursor + 1)
+        values = self.values[cursor]
+        if self.has_bad:
+            rows = np.flatnonzero(np.isnan(values))
+            is_place = table.element.name == "vertex" and prop.name in ("x", "y", "z")
+            part: Part = "positions" if is_place and table.is_first else ""
+            self._refuse_words(table, cursor[rows], rows, part, rows if part else None)
+        return values, cursor + 1
+
+    def take_lists(
+        self, table: Table, cursor: _Places, prop: Property
+    ) -> tuple[_Places, _Numbers, _Places]:
+        """Return the next list of each row."""
+        self._need(cursor + 1)
+        counts = self.values[cursor]
+        whole = np.clip(np.nan_to_num(counts), -(2.0**40), 2.0**40).astype(np.int64)
+        wrong = np.flatnonzero((whole != counts) | (whole < 0))
+        if len(wrong):
+            raise self._no_count(table, int(wrong[0]), int(cursor[wrong[0]]))
+        cursor = cursor + 1
+        self._need(cursor + whole)
+        places = _list_places(cursor, whole, 1)
+        values = self.values[places]
+        if self.has_bad:
+            bad = np.flatnonzero(np.isnan(values))
+            rows = np.repeat(np.arange(len(whole)), whole)[bad]
+            is_face = table.element.name == "face" and prop.name in CORNERS and table.is_first
+            part: Part = "triangles" if is_face else ""
+            lost = triangles_of(whole, rows) if is_face else None
+            self._refuse_words(table, places[bad], rows, part, lost)
+        return whole, values, cursor + whole
+
+    def _refuse_words(
+        self,
+        table: Table,
+        words: _Places,
+        rows: _Places,
+        part: Part,
+        places: _Indices | None,
+    ) -> None:
+        """Refuse words that are not numbers, each in a row of a table."""
+        if len(words):
+            item = Phrase("ply-row", element=table.element.name, row=int(rows[0]))
+            self._refuse_first(words, item, part, places)
+
+    def _refuse_first(
+        self,
+        words: _Places,
+        item: Phrase,
+        part: Part = "",
+        places: _Indices | None = None,
+    ) -> None:
+        first = int(words[0])
+        word = self._word(first)
+        self.source.refuse(
+            number_key(word), self._offset(first), len(words), part, places, item=item, found=word
+        )
+
+    def _no_count(self, table: Table, row: int, word: int) -> FormatError:
+        """Return the error for a list without a valid count."""
+        item = Phrase("ply-row", element=table.element.name, row=row)
+        found = float(self.values[word])
+        if np.isnan(found):
+            text = self._word(word)
+            return self.source.fault(number_key(text), self._offset(word), item=item, found=text)
+        return self.source.fault("F002.ply-list", self._offset(word), item=item, found=found)
+
+    def end(self, element: Element, cursor: _Places) -> None:
+        """Refuse rows with more numbers than their properties need."""
+        more = np.flatnonzero(cursor[: len(self.rows_left)] < self.rows_left)
+        if len(more) and element.properties:
+            self._refuse(int(more[0]), int(cursor[more[0]]))
+
+    def finish(self) -> None:
+        """Warn about lines after the last element, and release the text."""
+        left = len(self.counts) - self.line
+        if left:
+            self.source.warn("F006.ply-lines", n=left)
+            first = self.firsts[self.line]
+            words = first + np.flatnonzero(np.isnan(self.values[first:]))
+            if len(words):
+                self._refuse_first(words, Phrase("ply-rest"))
+        del self._lines
+        self.source.release()
+
+    def _need(self, cursor: _Places) -> None:
+        short = np.flatnonzero(cursor > self.rows_left)
+        if len(short):
+            self._refuse(int(short[0]), int(cursor[short[0]]))
+
+    def _refuse(self, row: int, cursor: int) -> None:
+        line = self.line - len(self.rows_left) + row
+        first = int(self.firsts[line])
+        expected, found, where = cursor - first, int(self.counts[line]), self._offset(first)
+        if cursor > self.rows_left[row]:
+            raise self.source.fault("F002.ply-fewer", where, expected=expected, found=found)
+        raise self.source.fault("F002.ply-more", where, expected=expected, found=found)
+
+    def _word(self, word: int) -> bytes:
+        found = _WORD.match(self.data, self._offset(word))
+        return b"" if found is None else found.group()
+
+    def _offset(self, word: int) -> int:
+        if self._begins is None:
+            letters = np.frombuffer(self.data, dtype=np.uint8, offset=self.start)
+            self._begins = word_begins(letters)
+        return self.start + int(self._begins[word])
+
+
+class _BinaryRows:
+    """Rows of a binary file."""
+
+    def __init__(self, source: Source, header: Header) -> None:
+        self.source, self.order = source, header.order
+        self.data, self.position = source.data, header.end
+
+    def begin(self, element: Element) -> _Places:
+        """Return the offset of each row; rows of different sizes are followed by their counts."""
+        sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
+        sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
+        left = len(self.data) - self.position
+        if sum(sizes) * element.count > left:
+            raise self._short(element, left)
+        if not element.has_lists:
+            return self.position + np.arange(element.count, dtype=np.int64) * sum(sizes)
+        return self._walked(element)
+
+    def offsets(self, cursor: _Places) -> Callable[[int], int] | None:
+        """Return None, as binary files have no lines."""
+        return None
+
+    def take_even(self, table: Table) -> bool:
+        """Read an element if all its rows have the same size; return whether they do."""
+        element = table.element
+        if element.count == 0:
+            return False
+        counts = self._list_sizes(element, self.position)[1]
+        # Lists longer than the file are refused with the element.
+        if sum(counts) > len(self.data) or any(count < 0 for count in counts):
+            return False
+        found = _even_binary(element, self.data, self.position, self.order, counts)
+        if found is None:
+            return False
+        (table.columns, table.lists), size = found
+        self.position += size * element.count
+        return True
+
+    def _row_size(self, element: Element, start: int) -> int:
+        """Return the size of one row in bytes; counts beyond the end of the file are 0."""
+        return self._list_sizes(element, start)[0]
+
+    def _list_sizes(self, element: Element, start: int) -> tuple[int, list[int]]:
+        """Return the size of one row in bytes, and the lengths of its lists as declared."""
+        place, counts = start, list[int]()
+        for prop in element.properties:
+            size = int(prop.kind[1])
+            if prop.count_kind:
+                width = int(prop.count_kind[1])
+                number = int.from_bytes(
+                    self.data[place : place + width],
+                    "little" if self.order == "<" else "big",
+                    signed=prop.count_kind[0] == "i",
+                )
+                counts.append(number)
+                place += width + max(number, 0) * size
+            else:
+                place += size
+        return place - start, counts
+
+    def _walked(self, element: Element) -> _Places:
+        """Return the starts of rows, followed one by one because their lists differ in length.
+
+        This takes one iteration per face; files that contain only triangles never need it.
+        """
+        starts = np.empty(element.count, dtype=np.int64)
+        place, end = self.position, len(self.data)
+        for row in range(element.count):
+            starts[row] = place
+            place += self._row_size(element, place)
+            if place > end:
+                raise self._short(element, end - self.position)
+        return starts
+
+    def take(self, table: Table, cursor: _Places, prop: Property) -> tuple[_Numbers, _Places]:
+        """Return the next number of each row."""
+        return self._numbers(cursor, prop.kind)
+
+    def _numbers(self, cursor: _Places, kind: str) -> tuple[_Numbers, _Places]:
+        """Return the number at each offset, in native byte order."""
+        size = int(kind[1])
+        if len(cursor) == 0:
+            return np.zeros(0, dtype=kind), cursor
+        # A window with the size of a number starts at every byte, as rows need not be aligned.
+        windows = np.ndarray(
+            len(self.data) - size + 1, dtype=self.order + kind, buffer=self.data, strides=(1,)
+        )
+        return windows[cursor].astype(kind), cursor + size
+
+    def take_lists(
+        self, table: Table, cursor: _Places, prop: Property
+    ) -> tuple[_Places, _Numbers, _Places]:
+        """Return the next list of each row."""
+        counts, cursor = self._numbers(cursor, prop.count_kind)
+        whole = counts.astype(np.int64)
+        wrong = np.flatnonzero(whole < 0)
+        if len(wrong):
+            row = int(wrong[0])
+            item = Phrase("ply-row", element=table.element.name, row=row)
+            raise self.source.fault("F002.ply-list", item=item, found=int(whole[row]))
+        size = int(prop.kind[1])
+        values, _ = self._numbers(_list_places(cursor, whole, size), prop.kind)
+        return whole, values, cursor + whole * size
+
+    def end(self, element: Element, cursor: _Places) -> None:
+        """Continue after the last row."""
+        if len(cursor):
+            self.position = int(cursor[-1])
+
+    def finish(self) -> None:
+        """Warn about bytes after the last element."""
+        left = len(self.data) - self.position
+        if left:
+            self.source.warn("F006.ply-bytes", n=left)
+
+    def _short(self, element: Element, left: int) -> FormatError:
+        return self.source.fault(
+            "F002.ply-short",
+            element.offset,
+            element=element.name,
+            expected=element.count,
+            size=left,
+        )
+
+
+# Rows of a ``.ply`` that all have the same size, as in most files.
+#
+# Their columns are views of one array, so positions of individual numbers are not needed.
+
+_WHOLE = 2.0**31
+_Numbers = NDArray[Any]
+_Columns = tuple[dict[str, _Numbers], dict[str, tuple[NDArray[np.int64], _Numbers]]]
+"""Properties by name, and lists by name. A list consists of the number of values of each row, and
+all values."""
+
+
+def _even_text(element: Element, block: _Numbers) -> _Columns | None:
+    """Split rows of numbers into the columns of an element, (N, C).
+
+    Returns None if the rows do not fit, or have lists of different lengths.
+    """
+    lists = [prop.name for prop in element.properties if prop.count_kind]
+    width = block.shape[1] - len(element.properties)
+    if len(element.properties) == 0 or len(lists) > 1 or width < 0 or (width and not lists):
+        return None
+    columns: dict[str, _Numbers] = {}
+    found: dict[str, tuple[NDArray[np.int64], _Numbers]] = {}
+    at = 0
+    for prop in element.properties:
+        if prop.count_kind:
+            if (block[:, at] != width).any():
+                return None
+            values = _compact(block[:, at + 1 : at + 1 + width])
+            found[prop.name] = _equal_counts(len(block), width), values.reshape(-1)
+            at += width
+        else:
+            columns[prop.name] = block[:, at]
+        at += 1
+    return columns, found
+
+
+def _even_binary(
+    element: Element, data: bytes, start: int, order: str, counts: list[int]
+) -> tuple[_Columns, int] | None:
+    """Return the columns of an element, and the size of its rows in bytes.
+
+    ``counts`` are the lengths of the lists in the first row. Returns None if other rows have other
+    lengths, or the file is too short.
+    """
+    left = iter(counts)
+    fields: list[tuple[Any, ...]] = []
+    for number, prop in enumerate(element.properties):
+        if prop.count_kind:
+            fields += [
+                (f"n{number}", order + prop.count_kind),
+                (f"v{number}", order + prop.kind, (next(left),)),
+            ]
+        else:
+            fields.append((f"v{number}", order + prop.kind))
+    kind = np.dtype(fields)
+    if element.count == 0 or start + kind.itemsize * element.count > len(data):
+        return None
+    rows = np.frombuffer(data, dtype=kind, count=element.count, offset=start)
+    columns: dict[str, _Numbers] = {}
+    found: dict[str, tuple[NDArray[np.int64], _Numbers]] = {}
+    for number, prop in enumerate(element.properties):
+        values = rows[f"v{number}"]
+        if prop.count_kind:
+            width = values.shape[1]
+            if (rows[f"n{number}"] != width).any():
+                return None
+            flat = values.astype(prop.kind, copy=False).reshape(-1)
+            found[prop.name] = _equal_counts(len(rows), width), flat
+        else:
+            columns[prop.name] = values
+    return (columns, found), kind.itemsize
+
+
+def _compact(values: _Numbers) -> _Numbers:
+    """Return whole numbers as int32, of half the size, and others unchanged."""
+    fits = values.size and values.min() > -_WHOLE and values.max() < _WHOLE
+    if values.dtype == np.int32 or not fits:
+        return values
+    whole = values.astype(np.int32)
+    return whole if (whole == values).all() else values
+
+
+def _equal_counts(count: int, size: int) -> NDArray[np.int64]:
+    # A single number represents all equal counts.
+    return np.broadcast_to(np.int64(size), (count,))
+
+
+_Places = NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class Table:
+    """One element's rows.
+
+    Attributes
+    ----------
+    element : Element
+        Declaration of the element in the header.
+    columns : dict of str to (N,)
+        Properties of the element that are not lists.
+    lists : dict of str to ((N,), (M,))
+        List properties: the number of values of each row, and the values of all rows.
+    offset_of : callable or None
+        Returns the offset of a row; slow, for errors only. None in a binary file.
+    is_first : bool
+        Whether it is the first element with its name; later ones are read and discarded.
+    """
+
+    element: Element
+    columns: dict[str, _Numbers] = field(default_factory=dict)
+    lists: dict[str, tuple[_Places, _Numbers]] = field(default_factory=dict)
+    offset_of: Callable[[int], int] | None = None
+    is_first: bool = True
+
+    def offset(self, row: int) -> int | None:
+        """Return the offset of a row in the file; None in a binary file, which has no lines."""
+        return None if self.offset_of is None else self.offset_of(row)
+
+
+def _list_places(starts: _Places, counts: _Places, step: int) -> _Places:
+    """Return the positions of all values of lists that begin at ``starts``."""
+    total = np.cumsum(counts) - counts
+    return np.repeat(starts - total * step, counts) + np.arange(counts.sum()) * step
+
+
+_PIECE = 1 << 18  # bytes per piece, whose temporary arrays stay in the processor's cache
+_LINE_END = re.compile(rb"[\r\n]")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _LineSizes:
+    """Non-blank lines of a text.
+
+    Attributes
+    ----------
+    data : bytes
+        The text.
+    words : (L,)
+        Number of words in each line.
+    marks : list of (int, int)
+        Offset of each piece of the text, and the number of lines before it.
+    """
+
+    data: bytes
+    words: NDArray[np.int32]
+    marks: list[tuple[int, int]]
+
+    def offset(self, line: int) -> int:
+        """Return an offset between the words of a line and the words of the previous line.
+
+        The offset of the end of the text follows the last line.
+        """
+        if line >= len(self.words):
+            return len(self.data)
+        place = bisect.bisect_right(self.marks, line, key=lambda mark: mark[1]) - 1
+        start, before = self.marks[place]
+        end = self.marks[place + 1][0] if place + 1 < len(self.marks) else len(self.data)
+        counts, ends = _counts(self.data, start, end)
+        return start + int(np.append(0, ends)[np.flatnonzero(counts)[line - before]])
+
+
+def line_sizes(data: bytes, start: int) -> _LineSizes:
+    r"""Return the number of words in each non-blank line, from an offset to the end.
+
+    >>> found = line_sizes(b"1 2\r\n\n3", 0)
+    >>> found.words.tolist(), found.offset(1)
+    ([2, 1], 5)
+    """
+    sizes = [np.zeros(0, np.int32)]
+    marks, n_lines = [(start, 0)], 0
+    while start < len(data):
+        found = _LINE_END.search(data, min(start + _PIECE, len(data)))
+        end = found.end() if found else len(data)
+        counts, _ = _counts(data, start, end)
+        sizes.append(counts[counts > 0])
+        n_lines += len(sizes[-1])
+        start = end
+        marks.append((start, n_lines))
+    return _LineSizes(data, np.concatenate(sizes), marks)
+
+
+def _counts(data: bytes, start: int, end: int) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the number of words in each line of a piece, and the offsets of line ends in it."""
+    letters = np.frombuffer(data, dtype=np.uint8, count=end - start, offset=start)
+    begins = word_begins(letters)
+    ends = np.append(np.flatnonzero((letters == 10) | (letters == 13)), len(letters))
+    return np.diff(np.searchsorted(begins, ends), prepend=0).astype(np.int32), ends

@@ -1,0 +1,326 @@
+r"""Reader and writer of ``.skin`` meshes with weights (UCSD course CSE169, texture extension).
+
+::
+
+    skin    = section*                                    in any order
+    section = "positions"   N "{" (x y z)*N "}"
+            | "normals"     N "{" (x y z)*N "}"
+            | "texcoords"   N "{" (u v)*N "}"
+            | "skinweights" N "{"? (k (joint weight)*k)*N "}"
+            | "material" name? "{" ("texture" file)? "}"
+            | "triangles"   M "{" (i j k)*M "}"
+            | "bindings"    B "{"? ("matrix" "{" 12 numbers "}")*B "}"
+
+A binding's four rows of three are the columns a, b, c, d of B = [a b c d; 0 0 0 1]. A material
+applies to the triangles sections after it. Weights are used as stored.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import OutputError, UnsupportedFormatError
+from viewer.formats._mesh.texture import load_image
+from viewer.formats._neutral import neutral_positions
+from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
+from viewer.formats.skin.checks import (
+    check_mesh,
+    check_weights,
+    checked_influences,
+    checked_triangles,
+    even_counts,
+    invert_bindings,
+    unbound_skin,
+)
+from viewer.formats.skin.sections import Sections, read_sections
+from viewer.formats.skin.tables import KEYWORDS
+from viewer.media.image import save_image
+from viewer.media.saving import as_words, save_parts
+from viewer.phrases import printable
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh, vertex_normals, without_seams
+from viewer.rig.skin import Skin, skin_rows
+
+_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
+
+
+def read(source: Source) -> Figure:
+    """Read a mesh with its weights and bindings.
+
+    Parameters
+    ----------
+    source : Source
+        The file; recoverable errors are added to its warnings.
+
+    Returns
+    -------
+    Figure
+        Figure without skeleton, and without skin if the file has neither weights nor bindings.
+
+    Raises
+    ------
+    FormatError
+        If the text violates the grammar or its sections do not match; the error has the file and
+        line.
+    """
+    sections = read_sections(source)
+    mesh = _mesh(source, sections)
+    check_mesh(source, sections, mesh)
+    return Figure(name=source.path.stem, mesh=mesh, skin=_skin(source, sections))
+
+
+def _mesh(source: Source, sections: Sections) -> Mesh:
+    _require_positions(source, sections)
+    even_counts(source, sections)
+    if not sections.triangles:
+        raise source.fault("F002.skin-triangles", source.end)
+    triangles = checked_triangles(source, sections, len(sections.tables["positions"]))
+    if len(triangles) == 0:
+        raise source.fault("F002.skin-no-triangle", sections.offsets["triangles"])
+    source.remember("triangles", sections.triangle_offset)
+    materials = np.repeat(
+        [run.material for run in sections.triangles],
+        [len(run.triangles) for run in sections.triangles],
+    )
+    positions = neutral_positions(sections.tables["positions"], triangles)
+    uvs = sections.tables.get("texcoords")
+    return Mesh(
+        positions=positions,
+        normals=_normals(source, sections, positions, triangles),
+        triangles=triangles,
+        # Invalid values are NaN, which a single sum detects.
+        uvs=uvs if uvs is None or not np.isnan(uvs.sum()) else np.nan_to_num(uvs),
+        materials=tuple(sections.materials),
+        triangle_materials=materials.astype(np.int32),
+    )
+
+
+def _require_positions(source: Source, sections: Sections) -> None:
+    table = sections.tables.get("positions")
+    if table is None:
+        looks = source.looks_like()
+        raise source.fault("F002.skin-positions", None if looks else source.end, looks=looks)
+    if len(table) == 0:
+        raise source.fault("F002.skin-no-vertex", sections.offsets["positions"])
+
+
+def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
+    normals = sections.tables.get("normals")
+    if normals is None:
+        if "normals" not in sections.offsets:
+            source.warn("F007.skin-normals")
+        return vertex_normals(positions, triangles)
+    # Columns are reduced one by one, because numpy is slow at reducing rows of three.
+    x, y, z = np.abs(normals.T)
+    longest = np.maximum(np.maximum(x, y), z)
+    zero: Bools = longest < _SHORTEST
+    if zero.any():
+        first = int(zero.argmax())
+        source.warn(
+            "M007.computed",
+            source.offset_of("normals", first),
+            1,
+            "positions",
+            [first],
+            n=int(zero.sum()),
+            vertex=first,
+        )
+    missing: Bools = zero | np.isnan(longest)
+    if missing.any():
+        normals = np.where(missing[:, None], vertex_normals(positions, triangles), normals)
+    return normals
+
+
+def _skin(source: Source, sections: Sections) -> Skin | None:
+    if sections.starts is None and sections.bindings is None:
+        source.warn("F007.skin-unbound")
+        return None
+    if sections.starts is None or sections.bindings is None:
+        missing = "skinweights" if sections.starts is None else "bindings"
+        present = "bindings" if sections.starts is None else "skinweights"
+        skin = None if sections.starts is None else unbound_skin(sections)
+        source.refuse(
+            "B001.skin-section",
+            sections.offsets[present],
+            1,
+            "bindings",
+            np.arange(0 if skin is None else skin.n_joints),
+            missing=missing,
+            present=present,
+        )
+        return skin
+    inverse_bind = invert_bindings(source, sections)
+    joints, weights = checked_influences(source, sections, len(inverse_bind))
+    skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
+    if not source.diagnostics.errors:  # after errors, warnings about weights are redundant
+        check_weights(source, skin)
+    return skin
+
+
+def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
+    """Write a figure's mesh, weights and bindings, and any of its texture images that are missing.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a mesh. Without a skin, weights and bindings are omitted.
+    path : str or Path
+        Replaced only when the whole text has been written.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes about properties of materials that are omitted, and about vertices that were split.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If there is no mesh, or a name or number does not conform to the grammar.
+    OutputError
+        If a file cannot be written.
+    """
+    from viewer.formats.skin.weights import weights_lines
+
+    if figure.mesh is None:
+        raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")
+    mesh, sources = without_seams(figure.mesh)
+    skin = None if figure.skin is None else skin_rows(figure.skin, sources)
+    _check_writable(figure.name, mesh, skin)
+    parts = [*_table("positions", mesh.positions), *_table("normals", mesh.normals)]
+    if mesh.uvs is not None:
+        parts += _table("texcoords", mesh.uvs)
+    if skin is not None:
+        parts += _section("skinweights", skin.n_vertices, weights_lines(skin))
+    parts += _triangle_runs(mesh)
+    if skin is not None:
+        parts.append([_bindings_text(skin)])
+    for material in mesh.materials:
+        _save_texture(material, Path(path).parent)
+    n_tables = 2 + (mesh.uvs is not None) + (skin is not None)
+    save_parts(path, chain.from_iterable(parts), n_tables * mesh.n_vertices + mesh.n_triangles)
+    notes = []
+    if len(sources) != figure.mesh.n_vertices:
+        counts = {"before": figure.mesh.n_vertices, "after": mesh.n_vertices}
+        notes.append(Diagnostic("X005.seams", Path(path), values=counts))
+    if lost := lost_parts(mesh):
+        notes.append(
+            Diagnostic("X003.parts", Path(path), values={"format": ".skin", "parts": lost})
+        )
+    return notes
+
+
+def lost_parts(mesh: Mesh) -> list[Phrase]:
+    """Return the data of a mesh that the format cannot hold."""
+    lost = []
+    if not all(material.is_plain for material in mesh.materials):
+        lost.append(Phrase("part-materials"))
+    if mesh.other_uvs:
+        lost.append(Phrase("part-second-uvs"))
+    if mesh.colors is not None:
+        lost.append(Phrase("part-vertex-colors"))
+    if mesh.parts:
+        lost.append(Phrase("part-mesh-parts"))
+    return lost
+
+
+def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
+    if mesh.n_triangles == 0:
+        raise UnsupportedFormatError(f"figure {name} has no triangles to write as .skin")
+    arrays = [mesh.positions, mesh.normals, mesh.uvs, None if skin is None else skin.weights]
+    if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
+        raise UnsupportedFormatError(f".skin cannot store numbers beyond {LARGEST:.3g}")
+
+
+def _table(name: str, rows: Floats) -> list[Iterable[bytes]]:
+    from viewer.formats._text.number_text import row_texts, shortest
+
+    return _section(name, len(rows), row_texts(rows, shortest, start=b"  "))
+
+
+def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[bytes]]:
+    """Return the text of a section in parts, which are composed when they are written."""
+    return [[f"{name} {count} {{\n".encode()], lines, [b"}\n"]]
+
+
+def _triangle_runs(mesh: Mesh) -> list[Iterable[bytes]]:
+    """Return the triangles sections, each after its material, as assigned by the reader."""
+    from viewer.formats._text.number_text import integers, row_texts
+
+    indices = mesh.material_indices
+    edges = np.flatnonzero(np.diff(indices)) + 1
+    parts: list[Iterable[bytes]] = []
+    written = 0
+    for first, last in zip([0, *edges], [*edges, len(indices)], strict=True):
+        material = int(indices[first])
+        if written and material != written - 1 and material < written:
+            raise UnsupportedFormatError(".skin cannot return to an earlier material")
+        for index in range(written, material + 1):
+            parts.append([_material_text(mesh.materials[index])])
+            written = index + 1
+        rows = mesh.triangles[first:last]
+        parts += _section("triangles", len(rows), row_texts(rows, integers, start=b"  "))
+    parts.append(map(_material_text, mesh.materials[written:]))
+    return parts
+
+
+def _material_text(material: Material) -> bytes:
+    name, texture = as_words(material.name), _as_rest_of_line(material.texture)
+    if name is None or not KEYWORDS.isdisjoint(name) or texture != material.texture:
+        raise UnsupportedFormatError(
+            f'.skin cannot store the material "{printable(material.name)}" '
+            f'with the texture "{printable(material.texture)}"'
+        )
+    head = " ".join(filter(None, ["material", material.name, "{\n"]))
+    text = head + (f"  texture {material.texture}\n" if material.texture else "") + "}\n"
+    return text.encode("utf-8", "surrogateescape")
+
+
+def _as_rest_of_line(texture: str | None) -> str | None:
+    """Return a texture's name as it would be read back."""
+    try:
+        text = (texture or "").encode("utf-8", "surrogateescape").strip()
+    except UnicodeEncodeError:  # the name has a lone surrogate, which decoding never yields
+        return None
+    return re.split(rb"[\r\n{}]", text)[0].decode("utf-8", "surrogateescape") or None
+
+
+def _bindings_text(skin: Skin) -> bytes:
+    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # adding 0.0 replaces -0.0 by 0.0
+    # The rows of the text are the matrix's columns.
+    blocks = [_matrix_text(columns) for columns in bindings[:, :3, :].transpose(0, 2, 1)]
+    return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n".encode()
+
+
+def _matrix_text(rows: Floats) -> str:
+    lines = "".join(f"    {' '.join(map(repr, row))}\n" for row in rows.tolist())
+    return f"  matrix {{\n{lines}  }}\n"
+
+
+def _save_texture(material: Material, folder: Path) -> None:
+    """Save an image under its name in the file, unless the same image is already there."""
+    if material.texture is None or material.image is None:
+        return
+    name = Path(material.texture.replace("\\", "/"))  # the reader interprets it in the same way
+    path = folder / name
+    if path.exists():
+        there = load_image(Source(folder / "x.skin", b""), material.texture, 0)
+        if there is None or not np.array_equal(there, material.image):
+            raise OutputError(f"{printable(path, 300)}: a different image already exists")
+        return
+    if name.is_absolute() or ".." in name.parts:
+        why = "is an absolute path" if name.is_absolute() else "lies outside the folder"
+        raise UnsupportedFormatError(f"the texture {printable(path, 300)} {why}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise OutputError(f"{printable(path.parent, 300)}: {problem.strerror}") from None
+    save_image(path, material.image)

@@ -1,0 +1,286 @@
+"""Blocks of numbers in a ``.skin`` file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Part, Phrase
+from viewer.errors import FormatError
+from viewer.formats._source import Source
+from viewer.formats._text.numbers import parse_numbers, to_number
+from viewer.rig.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from viewer.formats._text.words import Words
+
+KEYWORDS = frozenset(
+    (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")
+)
+"""Keywords of sections."""
+_INT32 = 2.0**31
+_Word = re.Match[bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Range of a section's numbers, from which the line of an error is determined.
+
+    Attributes
+    ----------
+    name : str
+        Keyword of the section.
+    header, count : int
+        Offsets of the keyword and of the number of entries.
+    start, end : int
+        Range of the numbers.
+    closed : bool
+        Whether a closing brace follows them.
+    """
+
+    name: str
+    header: int
+    count: int
+    start: int
+    end: int
+    closed: bool
+
+
+def find_block(source: Source, name: str, header: _Word, position: int) -> Block:
+    """Return the range of a section's numbers; only weights may omit the opening brace.
+
+    ``position`` is the offset after the section's count, or after its keyword if there is no count.
+    """
+    stated = position - 1
+    brace = source.next_word(position)
+    if brace is not None and brace.group() == b"{":
+        position = brace.end()
+    elif name != "skinweights":
+        where = header.start() if brace is None else brace.start()
+        raise source.fault("F002.skin-brace", where, section=name, found=brace and brace.group())
+    end = source.data.find(b"}", position)
+    closed = end >= 0
+    return Block(
+        name, header.start(), stated, position, end if closed else len(source.data), closed
+    )
+
+
+def read_count(source: Source, name: str, word: _Word) -> tuple[int, int]:
+    """Return a section's count and the offset after it; refuse counts that do not fit the file."""
+    found = source.next_word(word.end())
+    value = None if found is None else to_number(found.group())
+    if found is None or value is None or value != int(value) or value < 0:
+        at = word.start() if found is None else found.start()
+        raise source.fault("F002.count", at, item=name, found=found and found.group())
+    # An entry takes at least two bytes: one character, and white space before it.
+    left = len(source.data) - found.end()
+    if value * 2 > left + 1:
+        raise source.fault(
+            "F002.skin-too-many", found.start(), section=name, found=int(value), size=left
+        )
+    return int(value), found.end()
+
+
+def words_of(source: Source, block: Block) -> Words:
+    """Return the words of a block, which must not contain the keyword of another section.
+
+    Raises
+    ------
+    FormatError
+        If the block is not closed before another section begins.
+    """
+    from viewer.formats._text.words import read_words
+
+    words = read_words(source.data, block.start, block.end)
+    for index in words.bad.tolist():
+        word = words.word(index)
+        if word in KEYWORDS or b"{" in word:
+            raise unclosed(source, block, int(words.offsets[index]), word)
+    return words
+
+
+def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
+    """Return the error for a block interrupted by ``found``, or by the end of the file if None."""
+    line = source.line(block.header)
+    return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
+
+
+def to_whole(values: Floats) -> tuple[Ints, int]:
+    """Return numbers as int32, and the index of the first number that conversion changed, or -1."""
+    whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
+    differs = whole != values
+    whole.flags.writeable = False  # a read-only array need not be copied
+    return whole, int(differs.argmax()) if differs.any() else -1
+
+
+# Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
+#
+# A valid block is parsed as a whole. Otherwise every word is examined: each error is recorded and
+# the value replaced by NaN. Line breaks have no meaning in the format, but most files have one
+# vertex or triangle per line. In this case, a line of the wrong length does not affect the
+# others.
+
+LOST = -(2**31)
+"""Placeholder for a corner that is not an integer."""
+_Places = NDArray[np.int64]
+OffsetOf = Callable[[int], int]
+"""Returns the offset of the element with an index; slow, for errors only."""
+_PARTS: dict[str, Part] = {"positions": "positions", "triangles": "triangles"}
+
+
+def read_rows(
+    source: Source,
+    block: Block,
+    count: int,
+    width: int,
+    first: int = 0,
+    item: str = "of-vertex",
+) -> tuple[Floats, OffsetOf]:
+    """Parse a block of rows.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records the errors.
+    block : Block
+        Range of the numbers.
+    count : int
+        Number of rows declared by the file; the actual number takes precedence.
+    width : int
+        Numbers per row.
+    first : int
+        Index of the first row, for messages.
+    item : str
+        Key of the phrase that names a row.
+
+    Returns
+    -------
+    rows : (N, width)
+        Values; NaN for words that are not numbers, and in rows with more or fewer numbers.
+    offset_of : callable
+        Returns the offset of a row.
+
+    Raises
+    ------
+    FormatError
+        If the start of the rows is unknown.
+    """
+    values, bad = parse_numbers(source.data, block.start, block.end)
+    if bad < 0 and len(values) == count * width:
+        values.flags.writeable = False  # the mesh can use a read-only array without a copy
+        begin, end = block.start, block.end
+        return values.reshape(count, width), lambda row: source.number_offset(
+            begin, end, width * row
+        )
+    rows, offsets = _faulty_rows(source, block, count, width, first, item)
+    return rows, lambda row: int(offsets[row])
+
+
+def _faulty_rows(
+    source: Source, block: Block, count: int, width: int, first: int, item: str
+) -> tuple[Floats, _Places]:
+    from viewer.formats._text.words import refuse_words
+
+    def named(row: int) -> Phrase:
+        return Phrase(item, section=block.name, index=row)
+
+    words = words_of(source, block)
+    begins, sizes = _row_begins(source, block, words, count, width)
+    fits = sizes == width
+    rows = np.full((len(begins), width), np.nan)
+    rows[fits] = words.values[begins[fits, None] + np.arange(width)]
+    part = _PARTS.get(block.name, "")
+    owners = np.repeat(np.arange(len(begins)), sizes) + first
+    bad = words.bad
+    refuse_words(source, words, bad, lambda word: named(int(owners[word])), part, owners[bad])
+    wrong = np.flatnonzero(~fits)
+    if len(wrong):
+        source.refuse(
+            "F002.width",
+            int(words.offsets[begins[wrong[0]]]),
+            len(wrong),
+            part,
+            wrong + first,
+            item=named(int(wrong[0]) + first),
+            expected=width,
+            found=int(sizes[wrong[0]]),
+        )
+    if block.name == "triangles" and len(begins) != count:
+        source.refuse("F002.skin-triangle-rows", block.header, expected=count, found=len(begins))
+    return rows, words.offsets[begins]
+
+
+def _row_begins(
+    source: Source, block: Block, words: Words, count: int, width: int
+) -> tuple[_Places, _Places]:
+    """Return the first word and the number of words of each row."""
+    total = len(words.values)
+    if total != count * width:
+        begins, sizes = words.rows()
+        if block.closed and (sizes == width).sum() * 2 >= len(sizes):
+            return begins, sizes
+        if not block.closed or total % width:
+            raise _no_rows(source, block, total, count, width)
+    begins = np.arange(0, total, width)
+    return begins, np.full(len(begins), width)
+
+
+def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -> FormatError:
+    if not block.closed:
+        return source.fault(
+            "F002.skin-rows-end",
+            source.end,
+            section=block.name,
+            line=source.line(block.header),
+            found=total // width,
+            expected=count,
+        )
+    return source.fault(
+        "F002.skin-rows",
+        block.count,
+        section=block.name,
+        expected=count,
+        width=width,
+        found=total // width,
+        rest=total % width,
+        end=source.line(block.end),
+    )
+
+
+def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
+    """Return triangles as integers, ``LOST`` for corners that are not integers: (T, 3).
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records the errors.
+    rows, offset_of : (T, 3), callable
+        Results of ``read_rows``, which has recorded its errors.
+    first : int
+        Index of the first triangle, for messages.
+    """
+    known = ~np.isnan(rows)
+    if known.all():
+        corners, changed = to_whole(rows)
+        if changed < 0:
+            return corners
+    corners, _ = to_whole(np.where(known, rows, LOST))
+    wrong = known & (corners != rows)
+    triangles = np.flatnonzero(wrong.any(axis=1))
+    if len(triangles):
+        row = int(triangles[0])
+        source.refuse(
+            "F002.skin-corner",
+            offset_of(row),
+            int(wrong.sum()),
+            "triangles",
+            triangles + first,
+            triangle=row + first,
+            found=float(rows[row][wrong[row]][0]),
+        )
+    return np.where(wrong, LOST, corners).astype(np.int32)

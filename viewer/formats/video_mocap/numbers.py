@@ -1,0 +1,242 @@
+"""Checked arrays of results: finite, of the expected shape, within limits."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from viewer.data_classes import dataclass
+from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
+from viewer.formats._archive.values import Archive, Axes
+from viewer.formats._source import Source
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
+
+Frames = np.ndarray[Any, np.dtype[np.int64]]
+
+# Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
+_MOST_ROWS = 2_000_000
+_PERSON = re.compile(r"-?[0-9]{1,9}")
+_SMALLEST = 1e-3  # minimum determinant; a rotation has 1, a missing rotation 0
+
+
+class RowBudget:
+    """Limit of the number of frames of all people, which dicts that share arrays could multiply."""
+
+    def __init__(self, archive: Archive, most: int = _MOST_ROWS) -> None:
+        self._archive, self._most, self._left = archive, most, most
+
+    def spend(self, count: int) -> None:
+        """Deduct a number of frames.
+
+        Raises
+        ------
+        FormatError
+            If there are more than in any plausible recording.
+        """
+        self._left -= max(count, 1)
+        if self._left < 0:
+            raise self._archive.source.fault("F002.video-rows", most=self._most)
+
+
+def has(archive: Archive | None, *keys: str) -> bool:
+    """Return whether an archive has all of some keys."""
+    return archive is not None and all(archive.has(key) for key in keys)
+
+
+def person_number(key: str) -> int | None:
+    """Return the number of a person from a key, or None if the key is not a number.
+
+    >>> person_number("-1"), person_number("camera")
+    (-1, None)
+    """
+    return int(key) if _PERSON.fullmatch(key) else None
+
+
+def rows(archive: Archive, key: str, shape: Axes) -> Floats:
+    """Return numbers of a shape, one row per frame; NaN in place of invalid ones."""
+    return finite_or_nan(archive, key, archive.array(key, shape).values())
+
+
+def places(archive: Archive, key: str, count: int) -> Floats:
+    """Return translations (N, 3), also from (N, 1, 3); NaN beyond the limit of all motions."""
+    is_nested = len(archive.array(key).shape) == 3
+    found = rows(archive, key, (count, 1, 3) if is_nested else (count, 3)).reshape(count, 3)
+    return within_reach(archive, key, found)
+
+
+def frames_of(archive: Archive, key: str, count: int) -> Frames:
+    """Return frame numbers, integers in any order: (N,); of a table, those in its first column."""
+    shape = (count, None) if len(archive.array(key).shape) == 2 else (count,)
+    found = archive.array(key, shape).values()
+    found = finite(archive, key, found[:, 0] if found.ndim == 2 else found)
+    if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
+        raise archive.fault("F002.video-frame-numbers", item=key)
+    return found.astype(np.int64)
+
+
+def first_rows(source: Source, frames: ArrayLike) -> tuple[Frames, Ints]:
+    """Return different frames in order, and the first row of each; warn if others are ignored."""
+    numbers = np.asarray(frames, dtype=np.int64)
+    found, first = np.unique(numbers, return_index=True)
+    if len(found) < len(numbers):
+        source.warn("F007.video-same-frame", n=len(numbers) - len(found))
+    return found, first.astype(np.int32)
+
+
+def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
+    """Return rotation vectors of rotation matrices (..., 3, 3); zeros become the identity.
+
+    Matrices in single precision are not exactly orthogonal; the nearest rotation is used, and NaN
+    in place of matrices that are neither near a rotation nor zero.
+    """
+    return vectors_of(archive, key, rows(archive, key, shape))
+
+
+def rotations_of(archive: Archive, key: str, shape: Axes) -> Floats:
+    """Return exactly orthogonal rotation matrices; see ``matrices``."""
+    return _rotations(archive, key, rows(archive, key, shape))
+
+
+def vectors_of(archive: Archive, key: str, found: Floats) -> Floats:
+    """Return rotation vectors of matrices (..., 3, 3) that were read from a key."""
+    return matrix_to_rotation_vector(_rotations(archive, key, found))
+
+
+def _rotations(archive: Archive, key: str, found: Floats) -> Floats:
+    is_invalid: Bools = np.asarray(np.isnan(found).any(axis=(-2, -1)))
+    is_missing: Bools = np.asarray(~found.any(axis=(-2, -1)))
+    found = np.where((is_missing | is_invalid)[..., None, None], np.eye(3), found)
+    determinants = np.linalg.det(found)
+    is_flat = determinants < _SMALLEST
+    if is_flat.any():
+        worst = float(determinants.min())
+        archive.leave_gap("F002.video-rotation", item=key, found=worst)
+        is_invalid |= is_flat
+    return np.where(is_invalid[..., None, None], np.nan, nearest_rotations(found)[0])
+
+
+def six(archive: Archive, key: str, found: Floats) -> Floats:
+    """Return rotation vectors of 6D rotations (..., 6).
+
+    The numbers are the first two columns of a matrix, one after the other, which are made
+    orthonormal in this order (Zhou et al. 2019).
+    """
+    first, second = found[..., :3], found[..., 3:]
+    x = _unit(archive, key, first)
+    y = _unit(archive, key, second - (x * second).sum(axis=-1, keepdims=True) * x)
+    return matrix_to_rotation_vector(np.stack([x, y, np.cross(x, y)], axis=-1))
+
+
+def _unit(archive: Archive, key: str, vectors: Floats) -> Floats:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    is_short = lengths < _SMALLEST
+    if is_short.any():
+        worst = float(lengths[is_short].min())
+        archive.leave_gap("F002.video-rotation", item=key, found=worst)
+    return np.where(is_short, np.nan, vectors / np.where(is_short, 1.0, lengths))
+
+
+def numbers(archive: Archive, key: str, count: int) -> Floats:
+    """Return a fixed count of numbers, in an array of any shape or a list."""
+    values = finite(archive, key, archive.array(key).values().reshape(-1))
+    if len(values) != count:
+        raise archive.fault("F002.video-count", item=key, expected=count, found=len(values))
+    return values
+
+
+def sole(archive: Archive, key: str) -> float:
+    """Return a single number, which may be an array with one element."""
+    return float(numbers(archive, key, 1)[0])
+
+
+def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
+    """Return K for focal lengths (N,), (N, 2) or a single one, and image centres (N, 2), pixels."""
+    lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
+    centers = np.atleast_2d(center)
+    count = max(len(lengths), len(centers))
+    matrix = np.zeros((count, 3, 3))
+    matrix[:, 0, 0] = lengths if lengths.ndim == 1 else lengths[:, 0]
+    matrix[:, 1, 1] = lengths if lengths.ndim == 1 else lengths[:, 1]
+    matrix[:, :2, 2] = centers
+    matrix[:, 2, 2] = 1.0
+    return matrix
+
+
+# Rotations of a body in any of the usual forms, distinguished by the shapes of their arrays.
+#
+# ::
+#
+#     rotation vectors  (N, J, 3)     (N, 3 J)
+#     matrices          (N, J, 3, 3)  (N, 9 J)
+#     6D                (N, J, 6)     (N, 6 J)   two columns of a matrix, one after the other
+#
+# A single frame may lack the axis of frames.
+
+_TITLES = {3: "rotation vectors", 6: "6D rotations", 9: "matrices"}
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """Layout of rotations in an array: frames, joints, and numbers per rotation."""
+
+    n_frames: int
+    n_joints: int
+    size: int
+
+    @property
+    def title(self) -> str:
+        """Name of the form."""
+        return _TITLES[self.size]
+
+
+def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
+    """Return the form of an array; None if it does not have one of these numbers of joints.
+
+    Parameters
+    ----------
+    archive : Archive
+        Archive that contains the array.
+    key : str
+        Its key.
+    joints : tuple of int
+        Possible numbers of joints.
+    """
+    return shape_form(archive.shape(key), joints)
+
+
+def shape_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
+    """Return the form of an array of a shape; see ``form_of``."""
+    sizes: tuple[int, ...] = ()
+    lead: tuple[int, ...] = ()
+    if shape[-2:] == (3, 3) and (len(shape) != 2 or joints == (1,)):
+        lead, sizes = shape[:-2], (9,)
+    elif len(shape) >= 2 and shape[-1] in (3, 6) and math.prod(shape[:-1]) > 0:
+        lead, sizes = shape[:-1], (shape[-1],)
+    for size in sizes:
+        for frames, count in ((lead[:-1], lead[-1:]), (lead, ())):
+            n_joints = math.prod(count)
+            if len(frames) <= 1 and n_joints in joints:
+                return Form(math.prod(frames), n_joints, size)
+    return _flat_form(shape, joints)
+
+
+def _flat_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
+    for size in _TITLES if 1 <= len(shape) <= 2 else ():
+        if shape[-1] % size == 0 and shape[-1] // size in joints:
+            return Form(math.prod(shape[:-1]), shape[-1] // size, size)
+    return None
+
+
+def rotation_vectors(archive: Archive, key: str, form: Form) -> Floats:
+    """Return the rotations as rotation vectors: (N, J, 3)."""
+    found = rows(archive, key, archive.shape(key))
+    count = form.n_frames, form.n_joints
+    if form.size == 9:
+        return vectors_of(archive, key, found.reshape(*count, 3, 3))
+    found = found.reshape(*count, form.size)
+    return six(archive, key, found) if form.size == 6 else np.asarray(found)

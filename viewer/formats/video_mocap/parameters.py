@@ -1,0 +1,993 @@
+"""SMPL parameters in dicts of any layout, found by the usual spellings of their keys.
+
+::
+
+    poses      poses, pose, rotmat … of all joints; or global_orient … and body_pose …
+    places     trans, transl … ; cam_t … in the space of a camera, where y points down
+    shape      betas, shape …
+    frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
+    person     person_id, track_id, id …, one number or name, or one for each row
+    gender     gender, of the body model; one, or one for each row
+    model      model_type, model …: SMPL, SMPL+H or SMPL-X
+    rate       fps, frame_rate, frameRate …, frames per second
+    scale      smpl_scaling, by which places are divided
+
+Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
+except the poses may also stand in one of the dicts around them, once, or as a list or dict with one
+value for each dict. Gender, model and rate may also stand in a dict beside the parameters. Several
+rows with the same frame are several people. Poses may also be a list with the rows of each frame or
+person, or an array with an axis more than usual; other lists and arrays of this length then belong
+to the frames or people too. In a list of frames, None, an empty list, no rows and a dict without
+poses are frames without people. AMASS files and single poses have other spellings and are read by
+``amass.py`` and ``pose.py``.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
+from viewer.formats._archive.values import Archive, Value, describe, texts_in
+from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in, scale_in
+from viewer.formats._frame_gaps import frame_spans
+from viewer.formats._source import Source
+from viewer.formats.video_mocap.numbers import (
+    Form,
+    Frames,
+    RowBudget,
+    first_rows,
+    form_of,
+    frames_of,
+    person_number,
+    places,
+    rotation_vectors,
+    rows,
+    shape_form,
+)
+from viewer.formats.video_mocap.results import Results, Track
+from viewer.phrases import counted, printable
+from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
+from viewer.rig.smpl_family import FAMILY, gender_of, members_by_numbers
+
+_AMASS = {
+    *("poses", "pose", "fullpose", "smpl_poses"),
+    *("root_orient", "global_orient", "pose_body", "body_pose"),
+}
+_WHOLE = (
+    *("pose_world", "poses_world", "poses", "pose", "fullpose", "full_pose", "smpl_poses"),
+    *("smpl_pose", "thetas", "theta", "pred_thetas", "smpl_thetas"),
+    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "body_rotmat", "bodyPose"),
+)
+_ROOTS = (
+    *("global_orient", "root_orient", "pred_global_orient", "orient", "root_pose", "root_rot"),
+    *("smplx_root_pose", "global_rot", "poses_root"),
+)
+_BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose", "poses_body")
+_WORLD = (
+    *("trans_world", "trans", "transl", "translation", "smpl_trans", "root_trans"),
+    *("smplx_transl", "Th", "bodyTranslation"),
+)
+_CAMERA = (
+    *("cam_t", "pred_cam_t", "cam_trans", "camera_translation", "pred_trans", "pred_cam_trans"),
+    *("trans_cam", "cam_transl", "transl_cam", "trans_full", "global_t"),
+)
+_SHAPES = (
+    *("betas", "shape", "shapes", "pred_betas", "pred_shape", "beta", "smpl_shape", "smplx_shape"),
+    *("shapeParameters",),
+)
+_FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
+_OF_SMPLX = ("jaw_pose", "leye_pose", "reye_pose", "pose_jaw", "pose_eye", "expression")
+_BODY_JOINTS = 22  # of a body without hands, which SMPL, SMPL+H and SMPL-X share
+_COUNTS = ("frames", "frame_ids")  # a single number there is that of all frames
+_SCALES = ("smpl_scaling",)
+_DETECTIONS = "detection_all"
+_PEOPLE = (
+    *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
+    *("person_ids", "track_ids", "tracklet_ids", "pids", "ids"),
+)
+
+# Kinds of archives of the people in an array, whose axis other values tell, or nothing does.
+_OF_PEOPLE = _TOLD, _ASSUMED = "people", "assumed people"
+_EACH = (*_PEOPLE, *GENDERS, *_SHAPES)  # keys with one value for each person
+_NAMES = {len(names): names for names in members_by_numbers().values()}
+_LARGEST = 1 << 30  # maximum number of a frame or person
+_DEEPEST = 3  # maximum depth of dicts inside dicts; lists between them do not count
+_NAMED_PERSON = re.compile(r"(?:subj|subject|person|people|pid|id|track|tracklet)[_ -]?(\d{1,9})")
+_NAMED_FRAME = re.compile(r"\D*(?:.*\D)?(\d{1,9})(?:\.[A-Za-z]\w*)?")
+_COST = 20  # number of frames that take about as long to read as one dict takes to inspect
+_LOOKED_AT = 5000  # number of dicts of which at least one must be recognised
+
+# Maximum number of frames of a numbered dict: this many for every item, plus a constant.
+_MOST_HOLES, _FEW = 10, 1000
+_STEADIER = (
+    0.1  # ratio of variances of one person and of several; they have the same number of rows
+)
+_LISTED = 12  # maximum number of ignored keys that are listed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Value:
+    """A value of a dict, or of one around it; ``item``: only this item of the value."""
+
+    archive: Archive
+    key: str
+    item: int | None = None
+    within: str = ""
+    """The key of the dict that has the value, if neither has parameters."""
+
+    @property
+    def title(self) -> str:
+        return f"{self.within}.{self.key}" if self.within else self.key
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layout:
+    """Keys of one dict of parameters, and the forms of its rotations."""
+
+    poses: tuple[tuple[str, Form], ...]
+    place: _Value | None
+    shape: _Value | None
+    frames: _Value | None  # a number for each of several rows
+    frame: _Value | None  # one number for all rows
+    person: _Value | None
+    rate: _Value | None
+    gender: _Value | None
+    model: _Value | None
+    scale: _Value | None
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return self.poses[0][1].n_frames
+
+    @property
+    def others(self) -> list[_Value]:
+        """Values other than the poses."""
+        frames = self.frames or self.frame
+        found = (self.place, self.shape, frames, self.person, self.rate)
+        return [each for each in (*found, self.gender, self.model, self.scale) if each is not None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """A dict of parameters; its path from the outermost, and the dicts and lists on this path."""
+
+    path: tuple[str, ...]
+    around: tuple[Archive, ...]
+    archive: Archive
+    layout: _Layout
+
+
+def recognises(archive: Archive) -> bool:
+    """Return whether an archive has SMPL parameters in a layout other than AMASS's."""
+    layout = _layout(archive)
+    if layout is None:
+        budget = RowBudget(archive, _COST * _LOOKED_AT)
+        try:
+            return next(_found(archive, budget), None) is not None
+        except FormatError:  # there are thousands of dicts without poses
+            return False
+    is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
+    is_plain &= layout.place is None or layout.place.key not in _CAMERA
+    has_people = layout.person is not None and layout.count > 1
+    is_numbered = layout.frames is not None or (layout.frame is not None and layout.count == 1)
+    return not is_plain or is_numbered or has_people
+
+
+def read(source: Source, archive: Archive) -> Results:
+    """Read all people."""
+    found = _with_facts([*_found(archive)])
+    layout = found[0].layout
+    people, span = _people(source, found)
+    is_camera = layout.place is not None and layout.place.key in _CAMERA
+    space = "camera" if is_camera else "world"
+    if any(scope.kind == _ASSUMED for one in found for scope in one.around):
+        source.warn("F007.video-axes", people=len(found), frames=layout.count)
+    if layout.place is None:
+        source.warn("F007.motion-place")
+    recognised = [
+        f"{key} ({form.title} of {counted(form.n_joints, 'joint')})" for key, form in layout.poses
+    ]
+    recognised += [value.title for value in layout.others]
+    used = {key for one in found for key in one.path}
+    used |= {key for one in found for key, _ in one.layout.poses}
+    used |= {
+        key for one in found for value in one.layout.others for key in (value.key, value.within)
+    }
+    scopes = [scope for scope in (found[0].archive, *found[0].around) if not scope.is_list]
+    ignored = [*dict.fromkeys(key for scope in scopes for key in scope.keys if key not in used)]
+    rest = ", ".join(map(printable, ignored[:_LISTED]))
+    source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
+    n_joints = sum(form.n_joints for _, form in layout.poses)
+    model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
+    if layout.model is not None:
+        model = model_in([layout.model.archive.objects(layout.model.key)])
+    elif n_joints == _BODY_JOINTS and any(map(found[0].archive.has, _OF_SMPLX)):
+        model = "SMPL-X"
+    facts = (("recognised", ", ".join(recognised)),)
+    return Results(
+        "SMPL parameters",
+        model,
+        {space: people},
+        {space: "-y" if is_camera else ""},
+        frame_rate=_rate(source, found),
+        facts=facts,
+        span=span,
+    )
+
+
+def _rate(source: Source, found: list[_Found]) -> float | None:
+    """Return the first frame rate; note values that differ from it, or are not frame rates."""
+    values = [one.layout.rate for one in found if one.layout.rate is not None]
+    rates: list[float] = []
+    for archive, key in dict.fromkeys((value.archive, value.key) for value in values):
+        rate = _number(archive.get(key))
+        if rate is None or not is_rate(rate):
+            shown = describe(archive.get(key)) if rate is None else f"{rate:g}"
+            source.warn("F007.rate-ignored", item=key, low=SLOWEST, high=FASTEST, found=shown)
+        elif rate not in rates:
+            rates.append(rate)
+    if len(rates) > 1:
+        source.warn("F007.motion-rates", rates=[f"{rate:g}" for rate in rates])
+    return rates[0] if rates else None
+
+
+def _number(value: Value) -> float | None:
+    """Return a number, also as text or an array of one; None for other values."""
+    if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
+        value = value.values().reshape(-1)[0].item()
+    if isinstance(value, list | tuple) and len(value) == 1:
+        return _number(value[0])
+    if isinstance(value, bool) or not isinstance(value, int | float | str | bytes):
+        return None
+    try:
+        return float(value)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _layout(
+    archive: Archive, around: Sequence[Archive] = (), path: Sequence[str] = ()
+) -> _Layout | None:
+    """Return the layout of a dict inside others; None if it has no poses."""
+    whole = _first_form(archive, _WHOLE, tuple(_NAMES))
+    if whole is not None:
+        poses: tuple[tuple[str, Form], ...] = (whole,)
+    else:
+        root, body = _first_form(archive, _ROOTS, (1,)), _first_form(archive, _BODIES, (21, 23))
+        if root is None or body is None:
+            return None
+        count = body[1].n_frames
+        if root[1].n_frames != count and archive.shape(root[0]) == (count, 3):
+            root = root[0], Form(count, 1, 3)  # three frames, not one matrix
+        if root[1].n_frames != count:
+            return None
+        poses = (root, body)
+    count = poses[0][1].n_frames
+    scopes = (archive, *reversed(around))
+
+    def first(keys: Sequence[str], fits: Callable[[Archive, str], bool]) -> _Value | None:
+        return next(
+            (
+                _Value(scope, key)
+                for scope in scopes
+                for key in keys
+                if scope.has(key) and key not in path and fits(scope, key)
+            ),
+            None,
+        )
+
+    def is_single(scope: Archive, key: str) -> bool:
+        return scope.shape(key) in ((), (1,)) and _identity(scope.get(key)) is not None
+
+    def of_item(keys: Sequence[str]) -> _Value | None:
+        """Find a list with one value for each item of a list, or of a dict, on the path."""
+        for level in range(len(around) - 1, 0, -1):
+            items, beside = around[level].keys, around[level - 1]
+            for key in keys:
+                if not beside.has(key) or key in path:
+                    continue
+                is_free = not archive.has(key) or is_single(archive, key)
+                if is_free and _length(beside, key) == len(items):
+                    return _Value(beside, key, items.index(path[level]))
+                named = beside.inside(key)
+                if named is not None and not named.is_list and named.has(path[level]):
+                    return _Value(named, path[level], within=key)
+        return None
+
+    frames = frame = None
+    if count > 1:
+        # A number in the dict itself is that of all rows, whatever stands around it.
+        frames = first(
+            _FRAMES,
+            lambda scope, key: (
+                scope.shape(key) == (count,) and (scope is archive or not archive.has(key))
+            ),
+        )
+        frames = frames or first(
+            (_DETECTIONS,), lambda scope, key: scope.shape(key)[:1] == (count,)
+        )
+    if frames is None:
+        single = _FRAMES if count == 1 else [key for key in _FRAMES if key not in _COUNTS]
+        frame = first(single, is_single) or of_item(_FRAMES)
+    person = of_item(_PEOPLE) or first(
+        _PEOPLE, lambda scope, key: count > 1 and _length(scope, key) == count
+    )
+    person = person or first(_PEOPLE, is_single)
+    place = first((*_WORLD, *_CAMERA), lambda scope, key: _is_place(scope.shape(key), count))
+    shape = first(_SHAPES, lambda scope, key: _is_shape(scope.shape(key), count))
+    return _Layout(
+        poses,
+        place,
+        shape,
+        frames,
+        frame,
+        person,
+        rate=first(RATES, _is_number),
+        gender=of_item(GENDERS) or first(GENDERS, lambda scope, key: _is_gender(scope, key, count)),
+        model=first(MODELS, _is_model),
+        scale=first(_SCALES, _is_number),
+    )
+
+
+def _is_number(scope: Archive, key: str) -> bool:
+    return scope.shape(key) in ((), (1,))
+
+
+def _is_model(scope: Archive, key: str) -> bool:
+    return bool(model_in([scope.objects(key)]))
+
+
+def _is_gender(scope: Archive, key: str, count: int) -> bool:
+    """Return whether a value states one gender, or that of each row."""
+    said = texts_in(scope.objects(key))
+    is_each = len(said) == count and all(map(gender_of, said))
+    return is_each or bool(gender_in(scope.objects(key))[0])
+
+
+def _with_facts(found: list[_Found]) -> list[_Found]:
+    """Return dicts with the gender, model and rate that a dict beside them states.
+
+    Such a dict describes the parameters, as "meta" or "info", and has none itself.
+    """
+    on_path = {id(scope) for one in found for scope in (one.archive, *one.around)}
+    described: dict[int, list[tuple[str, Archive]]] = {}
+
+    def facts(scope: Archive) -> list[tuple[str, Archive]]:
+        if id(scope) not in described:
+            known = described[id(scope)] = []
+            for key in () if scope.is_list else scope.keys:
+                try:
+                    inner = scope.inside(key)
+                except FormatError:  # its values are not needed
+                    continue
+                if inner is not None and not inner.is_list and id(inner) not in on_path:
+                    known.append((key, inner))
+        return described[id(scope)]
+
+    def first(
+        one: _Found, keys: Sequence[str], fits: Callable[[Archive, str], bool]
+    ) -> _Value | None:
+        for scope in reversed(one.around):
+            for name, inner in facts(scope):
+                for key in keys:
+                    if inner.has(key) and fits(inner, key):
+                        return _Value(inner, key, within=name)
+        return None
+
+    def completed(one: _Found) -> _Found:
+        layout = one.layout
+        rate = layout.rate or first(one, RATES, _is_number)
+
+        def is_gender(scope: Archive, key: str) -> bool:
+            return _is_gender(scope, key, layout.count)
+
+        gender = layout.gender or first(one, GENDERS, is_gender)
+        model = layout.model or first(one, MODELS, _is_model)
+        return replace(one, layout=replace(layout, rate=rate, gender=gender, model=model))
+
+    return [completed(one) for one in found]
+
+
+def _first_form(
+    archive: Archive, keys: tuple[str, ...], joints: tuple[int, ...]
+) -> tuple[str, Form] | None:
+    for key in keys:
+        form = form_of(archive, key, joints) if archive.has(key) else None
+        if form is not None:
+            return key, form
+    return None
+
+
+def _length(archive: Archive, key: str) -> int:
+    """Return the number of items of a list or array with one axis; -1 for other values."""
+    value = archive.get(key)
+    if isinstance(value, list | tuple):
+        return len(value)
+    is_row = isinstance(value, Deferred) and len(value.shape) == 1
+    return value.shape[0] if isinstance(value, Deferred) and is_row else -1
+
+
+def _identity(value: Value) -> int | str | None:
+    """Return the number or name of a person or frame; None for other values."""
+    if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
+        value = value.values().reshape(-1)[0].item()
+    if isinstance(value, list | tuple) and len(value) == 1:
+        return _identity(value[0])
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, str):
+        number = person_number(value)
+        return value if number is None else number
+    if isinstance(value, bool) or not isinstance(value, int):
+        return None
+    return value if abs(value) < _LARGEST else None
+
+
+def _identities(value: _Value, count: int) -> list[int | str]:
+    """Return the person of each row, or of all rows."""
+    found = value.archive.get(value.key)
+    if isinstance(found, Deferred) and len(found.shape) == 1:
+        found = [np.asarray(item).item() for item in found.values()]
+    items = list(found) if isinstance(found, list | tuple) else [found]
+    chosen = items if value.item is None else items[value.item : value.item + 1]
+    persons = [_identity(item) for item in chosen]
+    if None in persons:
+        odd = describe(chosen[persons.index(None)])
+        raise value.archive.fault("F002.video-identity", item=value.key, found=odd)
+    known = [person for person in persons if person is not None]
+    return known if len(known) == count else known[:1] * count
+
+
+def _is_place(shape: tuple[int, ...], count: int) -> bool:
+    return shape in ((count, 3), (count, 1, 3)) or (count == 1 and shape == (3,))
+
+
+def _is_shape(shape: tuple[int, ...], count: int) -> bool:
+    return (len(shape) == 1 and shape[0] > 0) or (len(shape) == 2 and shape[0] in (1, count))
+
+
+def _found(
+    archive: Archive,
+    budget: RowBudget | None = None,
+    around: tuple[Archive, ...] = (),
+    path: tuple[str, ...] = (),
+) -> Iterator[_Found]:
+    """Yield all dicts with poses."""
+    layout = _layout(archive, around, path)
+    budget = budget or RowBudget(archive)
+    budget.spend(_COST if layout is None else layout.count)
+    if layout is not None:
+        # A frame with arrays of no rows has no people.
+        if layout.count or not (around and around[-1].is_list):
+            yield _Found(path, around, archive, layout)
+        return
+    parts = None if archive.is_list else _parts(archive)
+    if parts is not None:
+        key, items = parts
+        found = [*_found(items, budget, (*around, archive), (*path, key))]
+        known = {one.path[len(path) + 1] for one in found}
+        if found and all(name in known or items.get(name) is None for name in items.keys):
+            yield from found
+            return
+    depth = sum(not scope.is_list for scope in around)
+    for key in archive.keys if depth < _DEEPEST or archive.is_list else ():
+        inner = archive.inside(key)
+        if inner is not None:
+            yield from _found(inner, budget, (*around, archive), (*path, key))
+
+
+def _parts(archive: Archive) -> tuple[str, Archive] | None:
+    """Return the key of poses with an axis more than usual, and their items as a list of dicts.
+
+    The items of a list of arrays are the rows of frames or of people (3DPW), and so are those of an
+    array with IDs of each person and frame; ``_are_frames`` tells which. Of other arrays, they are
+    people: of the axis as long as their shapes, genders or IDs, or else of the shorter one, which a
+    note says. None if there are no such poses.
+    """
+    kinds = ((_WHOLE, tuple(_NAMES)), (_BODIES, (21, 23)))
+    candidates = ((key, joints) for keys, joints in kinds for key in keys if archive.has(key))
+    key, joints = next(candidates, ("", ()))
+    shape = archive.shape(key) if key else ()
+    axis, kind = 0, archive.kind
+    if shape:
+        is_usual = len(shape) < 3 or shape_form(shape, joints) is not None
+        if is_usual or shape[0] * shape[1] < 2 or shape_form(shape[1:], joints) is None:
+            return None
+        if not any(archive.shape(name) == shape[:2] for name in _PEOPLE):
+            told = _axis_of_people(archive, shape)
+            axis = int(shape[1] < shape[0]) if told is None else told
+            kind = _ASSUMED if told is None else _TOLD
+    poses = _along(archive, key, axis) if key else ()
+    shapes = [
+        Archive(archive.source, "item", (key,), {key: item}.__getitem__).shape(key)
+        for item in poses
+    ]
+    forms = [shape_form(one, joints) for one in shapes]
+    has_rows = [
+        bool(item.shape[:1] != (0,) if isinstance(item, Deferred) else item) for item in poses
+    ]
+    if not any(forms) or any(has and not form for has, form in zip(has_rows, forms, strict=True)):
+        return None
+
+    def column(name: str) -> Sequence[Value]:
+        own = archive.shape(name)
+        is_table = own[:2] == shape[:2] and (len(own) > 2 or name in (*_PEOPLE, *_FRAMES))
+        if kind in _OF_PEOPLE and not is_table and name not in _EACH and shape[0] == shape[1]:
+            return ()  # one for each frame, or one for each person
+        if name in _SHAPES and len(own) == 1:
+            return ()  # that of all
+        return _along(archive, name, axis if is_table else 0, len(poses))
+
+    found = {name: column(name) for name in archive.keys}
+    columns = {name: items for name, items in found.items() if items}
+    prefix = "person_" if kind in _OF_PEOPLE else ""
+    places = {f"{prefix}{index}": index for index in range(len(poses))}
+
+    def item(name: str) -> Archive:
+        return Archive(
+            archive.source,
+            archive.kind,
+            tuple(columns),
+            lambda key: columns[key][places[name]],
+            label=f"{archive.label}{name}.",
+        )
+
+    return key, Archive(
+        archive.source,
+        kind,
+        tuple(places),
+        lambda name: poses[places[name]] if has_rows[places[name]] else None,
+        item,
+        archive.label,
+        is_list=True,
+    )
+
+
+def _along(archive: Archive, key: str, axis: int, count: int | None = None) -> Sequence[Value]:
+    """Return the items of a list, or those of an array along an axis; none of other values.
+
+    ``count``: the number of items; none if there are more or fewer.
+    """
+    value = archive.objects(key)
+    if axis == 0 and isinstance(value, list | tuple):
+        return value if count in (None, len(value)) else ()
+    if axis > 0:
+        value = archive.array(key)
+    if not isinstance(value, Deferred) or len(value.shape) <= axis:
+        return ()
+    known = value.shape[axis]
+    return [_item(value, index, axis) for index in range(known)] if count in (None, known) else ()
+
+
+def _item(array: Deferred, index: int, axis: int) -> Deferred:
+    shape = (*array.shape[:axis], *array.shape[axis + 1 :])
+    return Deferred(shape, array.dtype, lambda: np.asarray(array.values().take(index, axis)))
+
+
+def _axis_of_people(archive: Archive, shape: tuple[int, ...]) -> int | None:
+    """Return which of the first two axes of poses is as long as what each person has once."""
+    for key in filter(archive.has, _EACH):
+        texts = texts_in(archive.objects(key))
+        own = archive.shape(key) or ((len(texts),) if texts else ())
+        matches = [axis for axis in (0, 1) if own[:1] == shape[axis : axis + 1]]
+        if len(own) == 1 and key in _SHAPES:
+            continue  # the shape of all
+        if len(own) <= 2 and len(matches) == 1:
+            return matches[0]
+    for key in filter(archive.has, _FRAMES):
+        matches = [axis for axis in (0, 1) if archive.shape(key) == shape[axis : axis + 1]]
+        if len(matches) == 1:
+            return 1 - matches[0]
+    return None
+
+
+_Person = int | str | tuple[int, ...]
+"""A person of a row: an ID or name of the file, or the index of a dict and the person in it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """A track of several people: the frame and person of each row."""
+
+    track: Track
+    frames: Frames
+    persons: Sequence[_Person]
+    genders: Sequence[str]
+
+
+def _people(source: Source, found: list[_Found]) -> tuple[dict[int, Track], tuple[int, ...]]:
+    """Return the tracks of people, and the first and last frame of a list of frames.
+
+    A dict has all frames of one or several people, or one frame of one or several people.
+    """
+    tracks = [_track(one) for one in found]
+    is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
+    if is_alike and _are_frames(found):
+        rows, span = _rows_of_frames(source, found, tracks)
+    else:
+        rows, span = _rows_of_people(source, found, tracks), ()
+    return _assembled(source, rows), span
+
+
+def _rows_of_people(source: Source, found: list[_Found], tracks: list[Track]) -> list[_Rows]:
+    """Return the rows of dicts, each of which has all frames of one or several people."""
+    rows: list[_Rows] = []
+    taken: dict[int, int] = {}
+    for index, (one, track) in enumerate(zip(found, tracks, strict=True)):
+        frames = track.frames
+        again = _occurrences(frames.tolist())
+        persons: list[_Person]
+        if one.layout.person is not None:
+            persons = [*_identities(one.layout.person, len(frames))]
+            if one.layout.frames is None and len(set(persons)) > 1:
+                frames = _occurrences(persons)
+                source.warn("F007.video-rows", item=one.layout.person.key)
+        elif again.any():
+            persons = [(index, person) for person in again.tolist()]
+            source.warn("F007.video-repeated", n=int(again.max()) + 1)
+        else:
+            known = (_person_named(part) for part in one.path)
+            number = next((each for each in known if each is not None), None)
+            is_free = number is not None and taken.setdefault(number, index) == index
+            persons = [number if number is not None and is_free else (index, 0)] * len(frames)
+        rows.append(_Rows(track, frames, persons, _genders(one.layout.gender, len(frames))))
+    return rows
+
+
+def _are_frames(found: list[_Found]) -> bool:
+    """Return whether dicts are frames, and not people.
+
+    A single dict is one if it is an item of a longer list, whose other items are missing. Dicts of
+    several rows are frames if they have one frame number each, if each row is another person, or if
+    they are items of a list that has more items than any of them has rows.
+    """
+    most = max(one.layout.count for one in found)
+    if len(found) == 1 and not any(
+        scope.is_list and len(scope.keys) > 1 for scope in found[0].around
+    ):
+        return False
+    if most == 1:
+        return True
+    if any(scope.kind in _OF_PEOPLE for one in found for scope in one.around):
+        return False
+    if any(one.layout.frames is not None for one in found):
+        return False
+    if all(one.layout.frame is not None for one in found):
+        return True
+    listed = [
+        _identities(one.layout.person, one.layout.count)
+        for one in found
+        if one.layout.person is not None
+    ]
+    if len(listed) == len(found):
+        return all(len(set(persons)) == len(persons) for persons in listed)
+    container = found[0].around[-1]
+    return container.is_list and len(container.keys) > most
+
+
+def _rows_of_frames(
+    source: Source, found: list[_Found], tracks: list[Track]
+) -> tuple[list[_Rows], tuple[int, ...]]:
+    """Return the rows of dicts of single frames, and the first and last frame of their list."""
+    frames, persons, span = _on_timeline(source, found, tracks)
+    is_known = all(one.layout.person is not None for one in found)
+    rows: list[_Rows] = []
+    seen: Counter[int] = Counter()
+    for one, track, frame, number in zip(found, tracks, frames, persons, strict=True):
+        count = one.layout.count
+        own: list[_Person] = [*range(seen[frame], seen[frame] + count)]
+        if is_known and one.layout.person is not None:
+            own = [*_identities(one.layout.person, count)]
+        elif number is not None and count == 1:
+            own = [number]
+        seen[frame] += count
+        genders = _genders(one.layout.gender, count)
+        rows.append(_Rows(track, np.full(count, frame), own, genders))
+    most = max(seen.values())
+    if most > 1 and not is_known:
+        source.warn("F007.video-repeated", n=most)
+    return rows, span
+
+
+def _on_timeline(
+    source: Source, found: list[_Found], tracks: list[Track]
+) -> tuple[list[int], list[int | None], tuple[int, ...]]:
+    """Return the frame of each dict, its person if its place tells it, and the range of frames.
+
+    Frames have numbers in the dicts, or are the items of a list or dict. Of two of these, one in
+    the other, ``_level_of_people`` tells which.
+    """
+    depth = min(len(one.path) for one in found)
+    levels = [
+        level
+        for level in range(depth)
+        if found[0].around[level].is_list
+        or len({one.path[: level + 1] for one in found}) > len({one.path[:level] for one in found})
+    ]
+    numbers = [
+        None if one.layout.frame is None else _identities(one.layout.frame, 1)[0] for one in found
+    ]
+    keyed = [number for number in numbers if isinstance(number, int)]
+    of_people = [level for level in levels if _are_people(found, level)]
+    if len(keyed) == len(found):
+        # Keys of dicts only tell people apart if frames repeat.
+        is_repeated = len(set(keyed)) < len(keyed)
+        level = next((one for one in levels if not found[0].around[one].is_list), None)
+        persons = [
+            _person_named(one.path[level]) if is_repeated and level is not None else None
+            for one in found
+        ]
+        return keyed, persons, ()
+    if len(levels) > 1 and not of_people:
+        of_people = [_level_of_people(source, found, tracks, levels[:2])]
+    of_frames = next((level for level in levels if level not in of_people), None)
+    others = [level for level in range(depth) if level != of_frames]
+    names = [[_person_named(one.path[level]) for level in others] for one in found]
+    persons = [next((one for one in each if one is not None), None) for each in names]
+    if of_frames is None:
+        return [0] * len(found), persons, ()
+    frames, missing, span = _numbered(found, of_frames)
+    if missing:
+        spans = frame_spans(np.array(missing))
+        source.warn("F007.frames-empty", n=len(missing), frames=spans)
+    return frames, persons, span
+
+
+def _level_of_people(
+    source: Source, found: list[_Found], tracks: list[Track], levels: Sequence[int]
+) -> int:
+    """Return which of two lists or dicts, one inside the other, has the people.
+
+    No identity occurs twice in a frame. Otherwise, it is the one whose items keep their gender or
+    shape in all items of the other one. Shapes that vary from frame to frame vary less than between
+    people, and so do places. A note says what was assumed if nothing but places, or the longer
+    list, tells it.
+    """
+    keys = {level: [one.path[level] for one in found] for level in levels}
+    persons = [_stated(one, one.layout.person) for one in found]
+    genders = [_genders(one.layout.gender, 1)[0] for one in found]
+    shapes = [None if one.shape is None else one.shape.tobytes() for one in tracks]
+    outer, inner = levels
+    if all(isinstance(one, str) or (one is not None and one >= 0) for one in persons):
+        is_once = [_most_repeated(keys[level], persons) == 1 for level in levels]
+        if any(is_once):
+            return inner if is_once[0] else outer
+    # Items of one dict each have the same values in any case.
+    is_table = all(len(set(keys[level])) < len(found) for level in levels)
+    for values in (genders, shapes) if is_table else ():
+        is_same = [_are_constant(keys[level], values) for level in levels]
+        if is_same[0] != is_same[1] and not {None, ""}.intersection(values):
+            return outer if is_same[0] else inner
+    by_shape = by_place = None
+    if is_table:
+        by_shape = _steadier_level(keys, [one.shape for one in tracks])
+        by_place = _steadier_level(keys, [one.translations for one in tracks])
+    if by_shape is not None:
+        return by_shape
+    sizes = {level: max(len(one.around[level].keys) for one in found) for level in levels}
+    chosen = by_place if by_place is not None else outer if sizes[outer] < sizes[inner] else inner
+    if min(sizes.values()) > 1:
+        other = outer if chosen == inner else inner
+        source.warn("F007.video-lists", people=sizes[chosen], frames=sizes[other])
+    return chosen
+
+
+def _stated(one: _Found, value: _Value | None) -> int | str | None:
+    return None if value is None else _identities(value, 1)[0]
+
+
+def _most_repeated(groups: Sequence[str], values: Sequence[object]) -> int:
+    """Return how often the most frequent value of any group occurs in it."""
+    return max(Counter(zip(groups, values, strict=True)).values())
+
+
+def _are_constant(groups: Sequence[str], values: Sequence[object]) -> bool:
+    """Return whether all values of a group are the same, but not those of all groups."""
+    pairs = set(zip(groups, values, strict=True))
+    return len(pairs) == len(set(groups)) and len(set(values)) > 1
+
+
+def _steadier_level(
+    keys: Mapping[int, Sequence[str]], values: Sequence[Floats | None]
+) -> int | None:
+    """Return the level within whose items values vary much less; None if neither is."""
+    rows = [value for value in values if value is not None and len(value) == 1]
+    if len(rows) < len(values) or len({row.shape for row in rows}) > 1:
+        return None
+    table = np.concatenate(rows)
+    spreads: dict[int, float] = {}
+    for level, groups in keys.items():
+        members = np.unique(np.array(groups), return_inverse=True)[1]
+        counts = np.bincount(members)[:, None]
+        means = np.stack([np.bincount(members, column) for column in table.T], axis=1) / counts
+        # The variance within items has a degree of freedom less for the mean of each item.
+        spreads[level] = float(((table - means[members]) ** 2).sum()) / (len(table) - len(counts))
+    low = min(spreads, key=spreads.__getitem__)
+    high = max(spreads, key=spreads.__getitem__)
+    return low if spreads[low] < _STEADIER * spreads[high] else None
+
+
+def _are_people(found: list[_Found], level: int) -> bool:
+    """Return whether the keys of a dict on the path say that they are people."""
+    return all(_NAMED_PERSON.fullmatch(one.path[level].lower()) for one in found)
+
+
+def _numbered(found: list[_Found], level: int) -> tuple[list[int], list[int], tuple[int, ...]]:
+    """Return the frames of items of lists or dicts, those without people, and their range."""
+    keys = [one.path[level] for one in found]
+    scopes = dict.fromkeys(one.around[level] for one in found)
+    known = set(keys)
+    slots = [
+        key
+        for key in dict.fromkeys(key for scope in scopes for key in scope.keys)
+        if key in known
+        or any(scope.has(key) and scope.get(key) in (None, [], (), {}) for scope in scopes)
+        or any(scope.is_list for scope in scopes)
+    ]
+    matches = [_NAMED_FRAME.fullmatch(key) for key in slots]
+    numbers = [int(match[1]) for match in matches if match is not None]
+    is_plausible = len(set(numbers)) == len(slots)
+    if not is_plausible or max(numbers) - min(numbers) > _MOST_HOLES * len(slots) + _FEW:
+        numbers = [*range(len(slots))]
+    place = dict(zip(slots, numbers, strict=True))
+    missing = sorted(place[key] for key in slots if key not in known)
+    return [place[key] for key in keys], missing, (min(numbers), max(numbers))
+
+
+def _person_named(name: str) -> int | None:
+    """Return the person of a key that is a number, or a number after a word; None for others."""
+    match = _NAMED_PERSON.fullmatch(name.lower())
+    number = int(match[1]) if match else person_number(name)
+    return number if number is not None and number >= 0 else None
+
+
+def _occurrences(values: Sequence[object]) -> Frames:
+    """Return how often each value has occurred before: (N,).
+
+    >>> _occurrences([5, 5, 6, 5]).tolist()
+    [0, 1, 0, 2]
+    """
+    seen: Counter[object] = Counter()
+    found = []
+    for value in values:
+        found.append(seen[value])
+        seen[value] += 1
+    return np.array(found, dtype=np.int64)
+
+
+def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
+    """Return the tracks of people, each with the rows of one or several dicts."""
+    numbers = _numbers_of(source, [person for each in rows for person in each.persons])
+    listed: dict[int, list[tuple[Track, Frames]]] = {}
+    genders: dict[int, dict[str, None]] = {}
+    untracked: Counter[int] = Counter()
+    for each in rows:
+        own = np.zeros(len(each.frames), dtype=np.int64)
+        for row, (frame, person) in enumerate(zip(each.frames.tolist(), each.persons, strict=True)):
+            own[row] = numbers.get(person, 0)
+            if isinstance(person, int) and person < 0:  # the number is unique only in its frame
+                untracked[frame] += 1
+                own[row] = -untracked[frame]
+        for number in np.unique(own).tolist():
+            chosen = np.flatnonzero(own == number)
+            part = each.track.selected(chosen)
+            genders.setdefault(number, {}).update(
+                dict.fromkeys(each.genders[row] for row in chosen.tolist())
+            )
+            listed.setdefault(number, []).append((part, each.frames[chosen]))
+    if untracked:
+        source.warn("F007.record-untracked")
+    people: dict[int, Track] = {}
+    for number, parts in sorted(listed.items()):
+        frames, first = first_rows(source, np.concatenate([own for _, own in parts]))
+        whole = _joined([track for track, _ in parts]).selected(first)
+        said = [*filter(None, genders[number])]
+        if len(said) > 1:
+            source.warn("F007.motion-gender", found=", ".join(said))
+        people[number] = replace(whole, frames=frames, gender=said[0] if len(said) == 1 else "")
+    return people
+
+
+def _numbers_of(source: Source, persons: Sequence[_Person]) -> dict[_Person, int]:
+    """Return the number of each person; names, and people without IDs, get unused numbers."""
+    found = dict.fromkeys(persons)
+    numbers: dict[_Person, int] = {one: one for one in found if isinstance(one, int)}
+    for one in found:
+        if not isinstance(one, int):
+            start = one[0] + one[1] if isinstance(one, tuple) else 0
+            used = set(numbers.values())
+            numbers[one] = next(each for each in itertools.count(start) if each not in used)
+    names = [
+        f"{number}: {printable(one, 40)}" for one, number in numbers.items() if isinstance(one, str)
+    ]
+    if names:
+        source.warn("F007.person-names", names=names)
+    return numbers
+
+
+def _joined(tracks: list[Track]) -> Track:
+    """Return the rows of one person, which are in several dicts."""
+    if len(tracks) == 1:
+        return tracks[0]
+    counts = [len(track.frames) for track in tracks]
+    shapes = [
+        np.broadcast_to(track.shape, (count, track.shape.shape[1]))
+        for track, count in zip(tracks, counts, strict=True)
+        if track.shape is not None
+    ]
+    return Track(
+        np.concatenate([track.frames for track in tracks]),
+        tracks[0].joint_names,
+        np.concatenate([track.vectors for track in tracks if track.vectors is not None]),
+        np.concatenate([track.translations for track in tracks if track.translations is not None]),
+        np.concatenate(shapes) if len(shapes) == len(tracks) else None,
+    )
+
+
+def _track(one: _Found) -> Track:
+    archive, layout = one.archive, one.layout
+    parts = [rotation_vectors(archive, key, form) for key, form in layout.poses]
+    vectors = np.concatenate(parts, axis=1)
+    count = len(vectors)
+    placed = np.zeros((count, 3))
+    if layout.place is not None:
+        beside, key = layout.place.archive, layout.place.key
+        if beside.shape(key) == (3,):
+            placed = within_reach(beside, key, rows(beside, key, (3,))[None])
+        else:
+            placed = places(beside, key, count)
+    if layout.scale is not None:
+        placed = placed / scale_in(layout.scale.archive, layout.scale.key)
+    frames = np.arange(count)
+    if layout.frames is not None:
+        frames = frames_of(layout.frames.archive, layout.frames.key, count)
+    elif layout.frame is not None and count == 1:
+        number = _identities(layout.frame, 1)[0]
+        frames = np.array([number if isinstance(number, int) else 0])
+    return Track(
+        frames,
+        _NAMES[vectors.shape[1]],
+        vectors,
+        placed,
+        _coefficients(layout, count),
+    )
+
+
+def _genders(value: _Value | None, count: int) -> tuple[str, ...]:
+    """Return the gender of each row; empty if the file does not state it."""
+    if value is None:
+        return ("",) * count
+    found = value.archive.objects(value.key)
+    if value.item is not None:
+        items = found.values().tolist() if isinstance(found, Deferred) else found
+        found = items[value.item] if isinstance(items, list | tuple) else None
+    said = texts_in(found)
+    if len(said) == count:
+        return tuple(map(gender_of, said))
+    return (gender_in(found)[0],) * count
+
+
+def _coefficients(layout: _Layout, count: int) -> Floats | None:
+    if layout.shape is None:
+        return None
+    archive, key = layout.shape.archive, layout.shape.key
+    shape = archive.shape(key)
+    is_constant = count > 1 and (len(shape) == 1 or shape[0] == 1)
+    check = finite if is_constant else finite_or_nan
+    return check(archive, key, archive.array(key).values()).reshape(-1, shape[-1])
+
+
+def _width(shape: Floats | None) -> int:
+    return 0 if shape is None else shape.shape[1]

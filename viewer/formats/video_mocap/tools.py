@@ -1,0 +1,76 @@
+"""Tools of video motion capture whose results are read, in the order in which they are tried."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._archive.values import Archive
+from viewer.formats._source import Source
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A tool, and the form of its results.
+
+    Attributes
+    ----------
+    title : str
+        Name of the tool.
+    files : str
+        Its files, for the manual.
+    has_folders : bool
+        Whether its results may be a folder; its module then has ``claims_folder(source, names)``
+        and ``read_folder(source, names)``.
+    """
+
+    title: str
+    files: str
+    has_folders: bool = False
+
+
+TOOLS = {
+    "gvhmr": Tool("GVHMR, GENMO", "hmr4d_results.pt, smpl_params.pt"),
+    "wham": Tool("WHAM", "wham_output.pkl"),
+    "phalp": Tool("4D-Humans, PHALP", "results/NAME.pkl"),
+    "tram": Tool("TRAM", "folder of hps/ and camera.npy", has_folders=True),
+    "prompthmr": Tool("PromptHMR", "results.pkl"),
+    "slahmr": Tool("SLAHMR", "NAME_world_results.npz", has_folders=True),
+    "sam3d_body": Tool("SAM 3D Body", "NAME.npz, folders of them, pickles", has_folders=True),
+    "romp": Tool("ROMP, BEV", "video_results.npz, NAME.npz"),
+    "parameters": Tool("SMPL parameters of other tools", "dicts with the usual keys"),
+}
+"""Modules in this folder; each has ``recognises(archive)`` and ``read(source, archive)``."""
+
+
+def module_of(tool: str) -> ModuleType:
+    """Return the module of a tool."""
+    return import_module(f"{__package__}.{tool}")
+
+
+def tool_of(archive: Archive) -> str | None:
+    """Return the key in ``TOOLS`` of an archive's tool, or None.
+
+    Raises
+    ------
+    FormatError
+        If no tool is recognised, and a nested pickle that was examined cannot be read.
+    """
+    problem: FormatError | None = None
+    for tool in TOOLS:
+        try:
+            if module_of(tool).recognises(archive):
+                return tool
+        except FormatError as found:  # in an array of objects that other tools may not need
+            problem = problem or found
+    if problem is not None:
+        raise problem
+    return None
+
+
+def folder_tool(source: Source, names: set[str]) -> str | None:
+    """Return the key in ``TOOLS`` of a folder's tool, given the folder's file names; or None."""
+    tools = (tool for tool, row in TOOLS.items() if row.has_folders)
+    return next((tool for tool in tools if module_of(tool).claims_folder(source, names)), None)
