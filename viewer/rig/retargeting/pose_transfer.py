@@ -15,7 +15,6 @@ instead.
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import field
@@ -132,6 +131,8 @@ def dof_layout(figure: Figure) -> str:
     figure : Figure
         Figure with a skeleton.
     """
+    import hashlib
+
     skeleton = figure.require_skeleton()
     # Adding 0 replaces -0 by 0.
     rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0
