@@ -13,7 +13,7 @@ from PIL import Image
 
 from viewer.errors import FormatError, RigError
 from viewer.loading import MotionSettings, load
-from viewer.loading.filming import filmed
+from viewer.loading.driving import filmed
 from viewer.media.video import VideoSink
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.capture import Capture

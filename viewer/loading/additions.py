@@ -8,8 +8,7 @@ from pathlib import Path
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.formats.pose import pose_error
-from viewer.loading.contents import Contents
-from viewer.loading.texturing import with_texture
+from viewer.loading.contents import Contents, with_texture
 from viewer.rig.coefficients import space_misfit
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record

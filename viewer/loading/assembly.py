@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
@@ -20,16 +22,24 @@ from viewer.loading.placing import (
     stand_up,
 )
 from viewer.loading.settings import MotionSettings
-from viewer.loading.unused_options import unused_options
-from viewer.rig.arrays import Bytes
+from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import hidden_parts
+from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.animation_choice import (
+    NONE,
+    chosen_animation,
+    counterpart,
+    own_first,
+    play_animation,
+)
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.timing import Timing
+from viewer.rig.posing.pose_record import PARTS, PoseRecord
 from viewer.rig.scene import Actor, Scene
+from viewer.rig.smpl_family import FAMILY, members_by_numbers, model_of_joints
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.posing.pose_record import PoseRecord
-
-__all__ = ["assemble", "begin"]
 
 
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
@@ -119,7 +129,6 @@ def _with_bodies(contents: Contents) -> Contents:
     """Return contents in which poses of bodies without a figure are motions of one frame."""
     if not contents.poses:
         return contents
-    from viewer.loading.lone_poses import with_bodies
 
     return with_bodies(contents)
 
@@ -156,9 +165,7 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         if drive_by_figures(cast, wanted, settings):
             wanted = ""
     if wanted or any(actor.figure.animations for actor in cast.actors):
-        from viewer.loading.animating import animate
-
-        animate(cast, wanted)
+        _animate(cast, wanted)
     if any(actor.clip is not None for actor in cast.actors):
         from viewer.rig.motion.evaluation import pose_actor, time_span
 
@@ -176,7 +183,7 @@ def _note_unused_options(contents: Contents, cast: Cast, settings: MotionSetting
     is_driving = any(builder.target is not None for builder in cast.builders)
     if is_driving or any(actor.drive is not None for actor in cast.actors):
         used.add("joint-map")
-    cast.diagnostics += unused_options(settings, used)
+    cast.diagnostics += _unused_options(settings, used)
 
 
 def _has_bare_motion(cast: Cast) -> bool:
@@ -243,7 +250,7 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     """Apply a texture to the first actor that can show it and has none."""
-    from viewer.loading.texturing import with_texture
+    from viewer.loading.contents import with_texture
 
     open_for_it = [
         actor
@@ -258,3 +265,183 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
         values = {"figures": [actor.figure.name for actor in actors]}
         raise RigError(Diagnostic("F004.picture", path, values=values))
     chosen.figure = with_texture(chosen.figure, path, pixels)
+
+
+def _animate(cast: Cast, wanted: str) -> None:
+    """Let actors without a motion play an animation of their file.
+
+    Parameters
+    ----------
+    cast : Cast
+        The actors; their poses are computed later.
+    wanted : str
+        See ``chosen_animation``; figures of files without it keep their rest pose.
+
+    Raises
+    ------
+    RigError
+        If no file has the requested animation; every file can be shown without one.
+    FormatError
+        If the keys of a requested animation are invalid; for others, this is only a warning.
+    """
+    files = _files(cast)
+    if not files and wanted.lower() == NONE:
+        return
+    if wanted and not files:
+        raise RigError(Diagnostic("F004.no-animations", values={"name": wanted}))
+    refusals = []
+    for actors in files:
+        try:
+            chosen = chosen_animation([actor.figure for actor in actors], wanted)
+        except RigError as problem:
+            refusals.append(problem)
+        else:
+            _start(cast, actors, chosen, is_requested=bool(wanted))
+    if files and len(refusals) == len(files):
+        raise refusals[0]
+
+
+def _files(cast: Cast) -> list[list[Actor]]:
+    """Return the actors that can be animated, grouped by file."""
+    files: dict[object, list[Actor]] = {}
+    for actor in cast.actors:
+        if actor.figure.animations and actor.clip is None:
+            files.setdefault(actor if actor.origin is None else actor.origin, []).append(actor)
+    return [*files.values()]
+
+
+def _start(cast: Cast, actors: list[Actor], chosen: Animation | None, is_requested: bool) -> None:
+    for actor in actors:
+        index = -1 if chosen is None else counterpart(actor.figure, chosen)
+        if index < 0 and chosen is not None and not is_requested:
+            index = own_first(actor.figure, [other.figure for other in actors])
+        try:
+            play_animation(actor, index)
+        except FormatError as problem:
+            if is_requested:
+                raise
+            cast.diagnostics.append(replace(problem.diagnostic, is_refusal=False))
+
+
+# Single poses of bodies of the SMPL family without a figure, as motions of one frame.
+#
+# They are then shown like all captured bodies: with the user's model, or with the bundled body.
+
+_RATE = 30.0  # of a motion with one frame, where it has no effect
+_ANGLES = 45  # rotation vectors of the fingers of a hand; fewer numbers are coefficients
+_HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
+_SINGLE = ("global_orient", "jaw_pose", "leye_pose", "reye_pose")  # rotations of one joint each
+_READ = {*_SINGLE, *_HANDS, "body_pose"}
+_MOST = len(FAMILY[24].names)  # maximum number of joints of body_pose and global_orient
+_FINGERS = {"left": FAMILY[55].names[25:40], "right": FAMILY[55].names[40:]}
+
+
+def with_bodies(contents: Contents) -> Contents:
+    """Return contents in which poses of bodies are motions, if no figure or motion is with them.
+
+    Parameters
+    ----------
+    contents : Contents
+        Contents of the files.
+
+    Returns
+    -------
+    Contents
+        The contents themselves if there is a figure, or a pose is not one of a body.
+    """
+    if contents.figures or contents.has_motion or contents.morphs or not contents.poses:
+        return contents
+    found = [(path, _motion(path, record)) for path, record in contents.poses]
+    bodies = [(path, motion) for path, motion in found if motion is not None]
+    if len(bodies) < len(found):
+        return contents
+    return replace(contents, poses=[], body_motions=bodies)
+
+
+def _motion(path: Path, record: PoseRecord) -> BodyMotion | None:
+    """Return a pose as a motion of one frame; None if it is not a pose of a known body."""
+    joints = _joints(record)
+    if joints is None or record.scale not in (None, 1.0):
+        return None
+    names, vectors = joints
+    space = record.shape_space
+    hands: dict[str, Floats] = {}
+    for part, side in _HANDS.items():
+        numbers = record.parts.get(part)
+        if numbers is None:
+            continue
+        if numbers.size == _ANGLES and record.hand_coefficients is not True:
+            if record.flat_hands is False:  # angles relative to the mean hand of an unknown model
+                return None
+            names += _FINGERS[side]
+            vectors = np.concatenate([vectors, numbers.reshape(-1, 3)])
+        else:
+            hands[side] = numbers.reshape(1, -1)
+    return BodyMotion(
+        path.stem,
+        Timing(_RATE, np.zeros(1, dtype=np.int32)),
+        names,
+        vectors[None],
+        np.zeros((1, 3)) if record.translation is None else record.translation[None],
+        shape=None if record.shape is None else record.shape[None],
+        expression=None if record.expression is None else record.expression[None],
+        hands=hands,
+        flat_hands=bool(record.flat_hands),
+        shape_space=replace(space, model=space.model or model_of_joints(names)),
+    )
+
+
+def _joints(record: PoseRecord) -> tuple[tuple[str, ...], Floats] | None:
+    """Return the joints other than fingers and their rotation vectors, (K, 3); None if unknown."""
+    known, parts = members_by_numbers(), record.parts
+    if record.dofs or record.joint_rotations is not None:
+        own, vector = record.joint_rotations, record.vector
+        # A pose of a model that this program has written: its numbers are the whole pose.
+        is_whole = own is not None and not own.shifts.any() and own.scales is None
+        names = known.get(0 if vector is None else vector.size)
+        is_whole &= own is not None and names == own.names and bool(record.shape_space.model)
+        return (
+            None
+            if names is None or vector is None or not is_whole
+            else (names, vector.reshape(-1, 3))
+        )
+    if record.vector is not None:
+        names = known.get(record.vector.size)
+        return None if names is None or parts else (names, record.vector.reshape(-1, 3))
+    body = parts.get("body_pose", np.zeros(0))
+    rotated = {part: parts[part] for part in _SINGLE if part in parts}
+    names = known.get(body.size + 3)
+    is_known = names is not None and len(names) <= _MOST and set(parts) <= _READ
+    if names is None or not is_known or any(part.size != 3 for part in rotated.values()):
+        return None
+    root = rotated.pop("global_orient", np.zeros(3))
+    names += tuple(PARTS[part][0] for part in rotated)
+    return names, np.concatenate([root, body, *rotated.values()]).reshape(-1, 3)
+
+
+def _unused_options(settings: MotionSettings, used: set[str]) -> Iterator[Diagnostic]:
+    """Yield a message for each option that was given but had no effect.
+
+    Parameters
+    ----------
+    settings : MotionSettings
+        The requested settings.
+    used : set of str
+        Names of the options that had an effect.
+    """
+    given = {
+        "rig": settings.rig,
+        "lod": settings.lod,
+        "space": settings.space,
+        "average-shape": settings.average_shape,
+        "video": settings.video,
+        "images": settings.images,
+        "model": settings.model,
+        "gender": settings.gender,
+    }
+    for name, value in given.items():
+        if value and name not in used:
+            yield Diagnostic(f"F007.unused-{name}", values={"value": value})
+    joint_map = settings.joint_map
+    if joint_map is not None and "joint-map" not in used:
+        yield Diagnostic("F007.unused-joint-map", joint_map.path)

@@ -13,7 +13,6 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
-from viewer.loading.scaling import scale_to_unit
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.capture import Capture, CapturePart
@@ -33,8 +32,7 @@ from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.smpl_family import ShapeSpace
-
-__all__ = ["Builder", "joined_points", "joined_timing"]
+from viewer.rig.units import METRES, UNIT_NAMES
 
 _COLORS = (
     (0.85, 0.42, 0.28),
@@ -322,7 +320,7 @@ class Builder:
                 "known": len(known.names),
             }
             return [Diagnostic("C005.keypoint-count", self.path, values=values)]
-        actor.clip = joined_points(actor.clip, clip)
+        actor.clip = _joined_points(actor.clip, clip)
         return []
 
     def _actor(self, figure: Figure, clip: SampledClip | PointClip, person: int) -> Actor:
@@ -404,16 +402,39 @@ def _grown(first: Drive, second: Drive) -> Drive:
 
 def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
     """Return one clip with the rows of two clips on the same timeline."""
-    return joined([first, second], joined_timing(first.timing, second.timing, first.n_rows))
+    return joined([first, second], _joined_timing(first.timing, second.timing, first.n_rows))
 
 
-def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
+def _joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
     """Return the timing of concatenated rows: those of ``second`` are offset by ``shift``."""
     rows: Ints = np.where(second.rows >= 0, second.rows + shift, first.rows).astype(np.int32)
     return replace(first, rows=rows)
 
 
-def joined_points(first: PointClip, second: PointClip) -> PointClip:
+def _joined_points(first: PointClip, second: PointClip) -> PointClip:
     """Return one clip with the concatenated rows of two clips on the same timeline."""
-    timing = joined_timing(first.timing, second.timing, len(first.points))
+    timing = _joined_timing(first.timing, second.timing, len(first.points))
     return PointClip(first.name, timing, np.concatenate([first.points, second.points]))
+
+
+def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:
+    """Scale an actor to a unit; return a note if both units are known and differ."""
+    own = known_unit(actor)
+    if not unit or own in ("", unit):
+        return []
+    factor = METRES[own] / METRES[unit]
+    actor.placement = scaling(factor) @ actor.placement
+    values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
+    return [Diagnostic("F007.unit-matched", values={**values, "factor": factor})]
+
+
+def scaling(factor: float) -> Floats:
+    """Return the matrix of a uniform scale: (4, 4)."""
+    return np.diag([factor, factor, factor, 1.0])
+
+
+def known_unit(actor: Actor) -> str:
+    """Return the unit of an actor; empty if it is unknown."""
+    if actor.figure.points is not None:  # captured keypoints
+        return "m"
+    return actor.figure.unit if actor.figure.unit in METRES else ""

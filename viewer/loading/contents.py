@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError
+from viewer.errors import FormatError, RigError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
-from viewer.loading.choices import reader_options
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
+from viewer.rig.material import Material, Texture
 
 if TYPE_CHECKING:
     from viewer.formats import Content
@@ -26,9 +28,6 @@ if TYPE_CHECKING:
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.skeleton_motion import SkeletonMotion
     from viewer.rig.posing.pose_record import PoseRecord
-
-__all__ = ["Contents", "read_files", "read_source"]
-
 
 _PEEK = 16  # number of bytes that identify an image
 
@@ -180,7 +179,7 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple
 
 def _read(source: Source, settings: MotionSettings) -> Content:
     """Read a file; explicit settings override the properties of a capture."""
-    source.options = reader_options(settings)
+    source.options = _reader_options(settings)
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
@@ -249,7 +248,6 @@ def _is_picture(source: Source) -> bool:
 def _with_own_picture(source: Source, figure: Figure) -> Figure:
     """Apply the image in a figure's folder as its texture, if there is exactly one."""
     from viewer.formats import read_picture, referenced_path
-    from viewer.loading.texturing import with_texture
 
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None or mesh.materials:
@@ -271,3 +269,29 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
     except FormatError as problem:
         source.warn("F005.texture-unreadable", problem=problem.diagnostic)
         return figure
+
+
+def _reader_options(settings: MotionSettings) -> dict[str, str]:
+    """Return the options that readers consider; see ``Source.options``."""
+    rate = settings.frame_rate
+    return {"rig": settings.rig, "lod": settings.lod, "fps": "" if rate is None else f"{rate!r}"}
+
+
+def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
+    """Return a figure textured with one image.
+
+    Raises
+    ------
+    RigError
+        If it has no texture coordinates.
+    """
+    mesh = figure.mesh
+    if mesh is None or mesh.uvs is None:
+        values = {"figures": [figure.name]}
+        raise RigError(Diagnostic("F004.picture", path, values=values))
+    covered = replace(
+        mesh,
+        materials=(Material(path.stem, Texture(path.name, pixels)),),
+        triangle_materials=np.zeros(mesh.n_triangles, dtype=np.int32),
+    )
+    return replace(figure, mesh=covered)

@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose
 from viewer.app.actors.actors_panel import switch_space
 from viewer.errors import RigError
 from viewer.loading import assembly
-from viewer.loading.cleaning import CleanUp, clean_up
+from viewer.loading.cleaning import clean_up
+from viewer.loading.cleaning_settings import CleanUp
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.camera_view import CameraView
