@@ -28,10 +28,10 @@ from viewer.export.vrm.made import made_character
 from viewer.export.vrm.meta import LICENCE, changed_meta, checked_meta
 from viewer.export.vrm.standing import in_t_pose, standing
 from viewer.export.vrm.upgraded import upgraded
-from viewer.formats.vrm.bones import given_bones
-from viewer.formats.vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
-from viewer.formats.vrm.parts import listed, part, value_of
-from viewer.formats.vrm.springs import EXTENDED
+from viewer.formats._vrm.bones import given_bones
+from viewer.formats._vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
+from viewer.formats._vrm.parts import listed, part, value_of
+from viewer.formats._vrm.springs import EXTENDED
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord

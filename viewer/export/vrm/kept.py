@@ -11,7 +11,7 @@ from typing import Any
 
 from viewer.export.gltf.body import Built
 from viewer.export.gltf.document import Document
-from viewer.formats.vrm.parts import is_index, listed, part
+from viewer.formats._vrm.parts import is_index, listed, part
 from viewer.rig.file_record import VrmRecord
 
 _SPRINGS = "VRMC_springBone"

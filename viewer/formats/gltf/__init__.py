@@ -14,6 +14,7 @@ import numpy as np
 from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._source import Source
+from viewer.formats._vrm.reading import with_vrm
 from viewer.formats.gltf.animations import Targets, read_animations
 from viewer.formats.gltf.checks import check_conformance
 from viewer.formats.gltf.document import Document, open_document
@@ -34,7 +35,6 @@ from viewer.formats.gltf.nodes import (
     shown_scene,
 )
 from viewer.formats.gltf.toon import stored_textures, stored_toon
-from viewer.formats.vrm.reading import with_vrm
 from viewer.rig.figure_group import FigureGroup
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def read(source: Source) -> FigureGroup | SkeletonMotion:
     """
     file = read_nodes(source)
     if isinstance(file.extensions.get(_MOTION), dict):
-        from viewer.formats.vrm.animation import read_motion
+        from viewer.formats._vrm.animation import read_motion
 
         return read_motion(file, source)
     return figure_group(with_vrm(file, source), source)

@@ -10,9 +10,9 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree, descendants, roots_of
+from viewer.formats._vrm.parts import listed, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
-from viewer.formats.vrm.parts import listed, part
 from viewer.rig.arrays import Floats, Ints
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component

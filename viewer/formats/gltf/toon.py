@@ -22,11 +22,11 @@ from typing import Any
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
+from viewer.formats._vrm.old import modern_toon, overridden
+from viewer.formats._vrm.parts import part, rows_of, value_of
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.textures import Slot, read_slot
-from viewer.formats.vrm.old import modern_toon, overridden
-from viewer.formats.vrm.parts import part, rows_of, value_of
 from viewer.rig.file_record import StoredImage, StoredTextures
 from viewer.rig.material import Outline, Rim
 

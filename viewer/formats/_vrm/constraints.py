@@ -14,7 +14,7 @@ from typing import Any
 
 from viewer.formats._scene_graph.content import NodeTree, path_to_root
 from viewer.formats._source import Source
-from viewer.formats.vrm.parts import is_index, part, value_of
+from viewer.formats._vrm.parts import is_index, part, value_of
 from viewer.rig.constraints.constraint import Constraint, ConstraintKind
 
 _EXTENSION = "VRMC_node_constraint"

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats.vrm.materials import main_transform
-from viewer.formats.vrm.parts import part, rows_of, value_of
+from viewer.formats._vrm.materials import main_transform
+from viewer.formats._vrm.parts import part, rows_of, value_of
 from viewer.rig.arrays import Floats
 from viewer.rig.srgb import decode_srgb
 
@@ -120,7 +120,6 @@ def _opacity(told: Any) -> dict[str, Any]:
 #
 # Colours are sRGB, widths of outlines are in centimetres or hundredths of half the image height,
 # and rotations of texture coordinates are in revolutions per second.
-
 _TOON_TEXTURES = {
     "_ShadeTexture": "shadeMultiplyTexture",
     "_SphereAdd": "matcapTexture",

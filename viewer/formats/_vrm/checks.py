@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from viewer.formats._source import Source
-from viewer.formats.vrm.bones import given_bones
-from viewer.formats.vrm.parts import listed, part
+from viewer.formats._vrm.bones import given_bones
+from viewer.formats._vrm.parts import listed, part
 from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 
 _MODERN = "1.0"

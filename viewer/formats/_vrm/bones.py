@@ -7,7 +7,7 @@ from typing import Any
 
 from viewer.formats._scene_graph.content import NodeFile
 from viewer.formats._source import Source
-from viewer.formats.vrm.parts import is_index, part
+from viewer.formats._vrm.parts import is_index, part
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
 _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}

@@ -23,7 +23,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeFile, NodeTree
 from viewer.formats._source import Source
-from viewer.formats.vrm.parts import is_index, listed, part, rows_of, value_of
+from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.springs.springs import INSIDE, OUTSIDE, PLANE, Colliders, Springs
@@ -237,7 +237,6 @@ def _node_matrix(tree: NodeTree, node: int) -> Floats:
 #     colliderGroups  node, colliders (offset, radius)
 #
 # Vectors are in Unity's axes, whose z axis is reversed.
-
 _END = 0.07  # distance from the last joint to the swinging point, metres
 _TO_OURS = np.array([1.0, 1.0, -1.0])
 

@@ -20,8 +20,8 @@ from viewer.formats._scene_graph.content import NodeFile, path_to_root
 from viewer.formats._scene_graph.joints import make_joints, skeleton_of
 from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
 from viewer.formats._source import Source
-from viewer.formats.vrm.bones import read_humanoid
-from viewer.formats.vrm.parts import is_index, part
+from viewer.formats._vrm.bones import read_humanoid
+from viewer.formats._vrm.parts import is_index, part
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_of

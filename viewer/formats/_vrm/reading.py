@@ -14,12 +14,12 @@ from typing import Any
 from viewer.formats._scene_graph.content import NodeExpression, NodeFile
 from viewer.formats._scene_graph.surfaces import part_name
 from viewer.formats._source import Source
-from viewer.formats.vrm.bones import read_humanoid
-from viewer.formats.vrm.checks import check_character
-from viewer.formats.vrm.constraints import read_constraints
-from viewer.formats.vrm.materials import modern_binds, old_binds
-from viewer.formats.vrm.parts import is_index, listed, part, value_of
-from viewer.formats.vrm.springs import read_springs
+from viewer.formats._vrm.bones import read_humanoid
+from viewer.formats._vrm.checks import check_character
+from viewer.formats._vrm.constraints import read_constraints
+from viewer.formats._vrm.materials import modern_binds, old_binds
+from viewer.formats._vrm.parts import is_index, listed, part, value_of
+from viewer.formats._vrm.springs import read_springs
 from viewer.rig.expressions import OLD_PRESETS, OVERRIDES, PROCEDURAL
 from viewer.rig.mesh import PartView
 from viewer.rig.springs.springs import Springs
