@@ -20,7 +20,10 @@ PACKAGE = Path(viewer.__file__).parent
 
 
 def modules(folder: str) -> set[str]:
-    return {path.stem for path in (PACKAGE / folder).glob("*.py") if not path.name.startswith("_")}
+    """Return the modules and packages of a folder that are not private."""
+    found = {path.stem for path in (PACKAGE / folder).glob("*.py")}
+    found |= {path.parent.name for path in (PACKAGE / folder).glob("*/__init__.py")}
+    return {name for name in found if not name.startswith("_")}
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.joblib.joblib_bytes import joblib_file
+from formats.archive.joblib_bytes import joblib_file
 from formats.torch.torch_bytes import torch_zip
 from formats.video_mocap.tool_files import gvhmr
 from media.small_videos import counting, write

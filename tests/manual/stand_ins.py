@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from app.tiny import SKEL, skin_text
 from formats.anny.anny_package import files, wheel
+from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import body, write_frames
 from formats.fbx.tiny_fbx import write_humanoid
-from formats.joblib.joblib_bytes import joblib_file
 from formats.mhr import mhr_files
 from formats.pig_text import GOOD, arrays
 from formats.synthetic_smpl import model

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.joblib.joblib_bytes import joblib_file
+from formats.archive.joblib_bytes import joblib_file
 from formats.npz_bytes import cost
 from numpy.testing import assert_array_equal
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formats.joblib.joblib_bytes import joblib_file
+from formats.archive.joblib_bytes import joblib_file
 from formats.npz_bytes import npz
 from formats.torch.torch_bytes import object_npy, torch_zip
 from formats.video_mocap.test_sam3d_body import person

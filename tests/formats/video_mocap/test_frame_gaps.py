@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
-from formats.joblib.joblib_bytes import joblib_file
 from formats.npz_bytes import npz
 from formats.torch.torch_bytes import torch_zip
 from formats.video_mocap.test_romp import image, written

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
-from formats.joblib.joblib_bytes import joblib_file
 from numpy.testing import assert_allclose
 
 from viewer.errors import FormatError

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formats.joblib.joblib_bytes import aligned_array
+from formats.archive.joblib_bytes import aligned_array
 from formats.npz_bytes import cost
 from formats.pickle_bytes import finished, unicode
 from formats.torch.torch_bytes import value

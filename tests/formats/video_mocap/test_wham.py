@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formats.joblib.joblib_bytes import joblib_file
+from formats.archive.joblib_bytes import joblib_file
 from formats.synthetic_smpl import model
 from formats.video_mocap.plain_smpl import vertices
 from formats.video_mocap.tool_files import (

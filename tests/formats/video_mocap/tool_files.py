@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from formats.archive.joblib_bytes import joblib_file
 from formats.capture_files import waves
-from formats.joblib.joblib_bytes import joblib_file
 from formats.synthetic_smpl import model
 from formats.torch.torch_bytes import torch_zip
 from formats.video_mocap.plain_smpl import rotation

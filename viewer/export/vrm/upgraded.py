@@ -217,7 +217,7 @@ def _thumbnail(texture: Any, record: VrmRecord) -> int | None:
 # ::
 #
 #     blendShapeGroups  name, presetName, isBinary, binds (mesh, index, weight in percent),
-#                       materialValues, see ``viewer.formats._vrm.material_values``
+#                       materialValues, see ``viewer.formats._vrm.materials``
 
 _PERCENT = 100.0
 

@@ -23,7 +23,7 @@ from viewer.rig.material_binds import COLOR_KINDS, TRANSFORM
 from viewer.rig.srgb import decode_srgb
 
 Bind = tuple[int, str, Floats]
-"""Material, kind and target (4,), as in ``viewer.rig.materials.material_binds.MaterialBinds``."""
+"""Material, kind and target (4,), as in ``viewer.rig.material_binds.MaterialBinds``."""
 _COLORS = {
     "_Color": "color",
     "_EmissionColor": "emissionColor",

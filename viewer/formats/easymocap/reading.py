@@ -91,7 +91,7 @@ class Reading:
     files: FrameFiles
     options: Options
     body_layout: BodyLayout | None = None
-    _point_layout: tuple[PointLayout, Parts] | None = None
+    point_layout: tuple[PointLayout, Parts] | None = None
     first_fault: Diagnostic | None = None
     _numbers: set[int] = field(default_factory=set)
     _names: dict[str, int] = field(default_factory=dict)

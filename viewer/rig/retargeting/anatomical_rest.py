@@ -5,7 +5,7 @@ sideways, the arms point straight to the sides with the elbows' axes vertical, a
 level. Hands are straight if shoulder, elbow and wrist are collinear in the zero pose. All other
 joints keep their mean rotation. A bend of the spine or a twist of the forearms that never changes
 cannot be detected and becomes part of the rest pose, unless the axes of the joints are parallel to
-the body's: see ``viewer.rig.retargeting.parallel_axes``.
+the body's: see ``_parallel_axes``.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from faults import fault_of
-from formats.joblib.joblib_bytes import joblib_file, wrapper
+from formats.archive.joblib_bytes import joblib_file, wrapper
 from formats.npz_bytes import cost
 from formats.pickle.pickle_costs import self_contained
 from formats.pickle_bytes import (

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.testing import assert_allclose
 
-from tests.formats.nodes.node_files import file_of, mesh, skin, source, tree_of, triangle
+from tests.formats.scene_graph.node_files import file_of, mesh, skin, source, tree_of, triangle
 from viewer.formats._scene_graph.content import NodeAnimation, NodeCamera, NodeFile, NodeTree
 from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._scene_graph.grouping import group_nodes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.formats.nodes.node_files import (
+from tests.formats.scene_graph.node_files import (
     affine,
     file_of,
     local,

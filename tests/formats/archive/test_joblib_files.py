@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formats.joblib.joblib_bytes import joblib_file
+from formats.archive.joblib_bytes import joblib_file
 from formats.pickle_bytes import finished, named, several, unicode, whole
 from formats.torch.torch_bytes import torch_legacy
 from numpy.testing import assert_array_equal
