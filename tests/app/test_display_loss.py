@@ -19,7 +19,7 @@ PROGRAM = """
 import os, signal, sys
 from pathlib import Path
 from viewer.app import window
-from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.recording.state import RecordingState, RecordSettings
 from viewer.cli import run
 
 server, folder = int(sys.argv[1]), sys.argv[2]
@@ -30,8 +30,8 @@ def watched(self):
     if len(drawn) == 3 and folder:
         settings = RecordSettings(kind=".gif", turntable=True, seconds=60.0)
         settings.size, settings.own_size = "own", (64, 48)
-        self.state.of(Recording).settings = settings
-        self.state.of(Recording).wanted = Path(folder, "turn.gif")
+        self.state.of(RecordingState).settings = settings
+        self.state.of(RecordingState).wanted = Path(folder, "turn.gif")
     if len(drawn) >= 3 and (not folder or os.listdir(folder)):
         os.kill(server, signal.SIGKILL)
     return draw(self)
