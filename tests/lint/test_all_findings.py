@@ -10,7 +10,7 @@ from faults import told
 from formats import bvh_text, skel_text, skin_text, synthetic_smpl
 from lint.sound import column
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.formats import write
 from viewer.lint import Finding, lint_files
 from viewer.rig.figure import Figure

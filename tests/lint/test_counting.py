@@ -11,7 +11,7 @@ from lint.sound import column, legs, scene_of, standing
 from rig.animated import channel, clip_of, leg
 
 from viewer.app.core.clock import Clock
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene

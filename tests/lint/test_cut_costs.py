@@ -9,7 +9,7 @@ import pytest
 from faults import told
 from lint.sound import column, make_skeleton, scene_of
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import Finding, lint_scene
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure

@@ -10,7 +10,7 @@ import pytest
 from faults import told
 from lint.sound import FRAMES, RATE, legs, scene_of, standing
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.inspection.ground_height import Ground, ground_of
 from viewer.rig.motion.timing import Timing

@@ -17,7 +17,7 @@ from lint.sound import (
     scene_of,
 )
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import lint_scene
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh

@@ -10,7 +10,7 @@ import pytest
 from faults import told
 from formats import bvh_text, capture_files, pig_text, skel_text, skin_text, synthetic_smpl
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import CODES, Finding, LintOptions, lint_files
 
 STILL = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"

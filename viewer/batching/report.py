@@ -19,7 +19,7 @@ from typing import Any
 
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
-from viewer.diagnostics.describing import plain
+from viewer.diagnostics.diagnostic import plain
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import printable
 

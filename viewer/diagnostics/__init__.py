@@ -9,10 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from viewer.diagnostics.collector import Collector
-from viewer.diagnostics.describing import described
-from viewer.diagnostics.diagnostic import Diagnostic, Part
-from viewer.diagnostics.phrase import Phrase, frame_range
+from viewer.diagnostics.diagnostic import (
+    Collector,
+    Diagnostic,
+    Part,
+    Phrase,
+    described,
+    frame_range,
+)
 
 if TYPE_CHECKING:
     from viewer.diagnostics.codes import SEVERITIES, Code

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.phrases import listed, printable
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 Part = Literal[
@@ -125,3 +127,192 @@ class Diagnostic:
     def __str__(self) -> str:
         """Return location and message on one line."""
         return ": ".join(filter(None, (self.place, self.message)))
+
+
+class Phrase:
+    """A message value that is itself a template with values.
+
+    Parameters
+    ----------
+    key : str
+        A key of ``PHRASES``.
+    **values : object
+        Values for the template.
+    """
+
+    __slots__ = ("key", "values")
+
+    def __init__(self, key: str, **values: Any) -> None:
+        self.key = key
+        self.values = values
+
+    def __str__(self) -> str:
+        """Return the rendered template."""
+        from viewer.diagnostics.template import rendered
+        from viewer.diagnostics.wording import PHRASES
+
+        return rendered(PHRASES[self.key], self.values)
+
+    def __repr__(self) -> str:
+        """Return the call that creates the phrase."""
+        values = "".join(f", {name}={value!r}" for name, value in self.values.items())
+        return f"Phrase({self.key!r}{values})"
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether two phrases have the same key and values."""
+        return isinstance(other, Phrase) and (self.key, self.values) == (other.key, other.values)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def frame_range(first: int, last: int) -> Phrase:
+    """Return the phrase for one frame, or for a range that includes its last frame.
+
+    >>> str(frame_range(3, 3)), str(frame_range(3, 5))
+    ('frame 3', 'frames 3 to 5')
+    """
+    if first == last:
+        return Phrase("one-frame", frame=first)
+    return Phrase("frame-range", first=first, last=last)
+
+
+# Maximum number of warnings per file: users do not read longer lists.
+_MOST = 100
+
+
+class Collector:
+    """Collects the diagnostics of readers and operations.
+
+    Repeated warnings are dropped, as are warnings after the first hundred; all errors are kept.
+
+    Parameters
+    ----------
+    keeps_errors : bool
+        Whether a reader continues after an error in order to find all errors. Otherwise the
+        first one is raised where it is recorded.
+    """
+
+    def __init__(self, keeps_errors: bool = False) -> None:
+        self.keeps_errors = keeps_errors
+        self._found: list[Diagnostic] = []
+        self._warned: set[str] = set()
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def add(self, found: Diagnostic) -> None:
+        """Record an error, or a warning that has not been recorded yet."""
+        if found.is_refusal:
+            self._found.append(found)
+            return
+        # A search for all errors has to list each faulty element, even if the messages are equal.
+        message = f"{found.pointer} {found.message}" if self.keeps_errors else found.message
+        if message in self._warned or len(self._warned) > _MOST:
+            return
+        self._warned.add(message)
+        if len(self._warned) > _MOST:
+            found = Diagnostic("F007.further-warnings", found.path)
+        self._found.append(found)
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """Errors in the order found; ``load`` raises the first."""
+        return [found for found in self._found if found.is_refusal]
+
+    @property
+    def warnings(self) -> list[Diagnostic]:
+        """Warnings and notes in the order found."""
+        return [found for found in self._found if not found.is_refusal]
+
+
+def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return diagnostics in order, with similar ones merged into the first of them.
+
+    Two are similar if message, file, part and names are equal: values of type ``str`` are names,
+    while numbers and text from a file (``bytes``) may differ.
+    """
+    kinds: dict[tuple[object, ...], list[Diagnostic]] = {}
+    for one in found:
+        if one.count == 0:
+            continue
+        kinds.setdefault((one.key, one.path, one.part, *_names(one.values)), []).append(one)
+    return [_joined(alike) for alike in kinds.values()]
+
+
+def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
+    for name, value in sorted(values.items()):
+        if isinstance(value, Phrase | Diagnostic):
+            yield (name, value.key, *_names(value.values))
+        elif isinstance(value, str):
+            yield name, value
+
+
+def _joined(alike: list[Diagnostic]) -> Diagnostic:
+    if len(alike) == 1:
+        return alike[0]
+    known = [one.places for one in alike if one.places is not None]
+    places = np.unique(np.concatenate(known)) if known else None
+    return replace(alike[0], places=places, count=sum(one.count for one in alike))
+
+
+# Maximum number of indices and names per diagnostic; the total is always included.
+_LISTED = 100
+
+
+def described(found: Diagnostic) -> dict[str, Any]:
+    """Return all data of a diagnostic.
+
+    Parameters
+    ----------
+    found : Diagnostic
+        The diagnostic to describe.
+
+    Returns
+    -------
+    dict
+        Code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
+        returned by ``plain``, the first 100 indices, and the number of indices.
+    """
+    places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
+    return {
+        "code": found.code,
+        "key": found.key,
+        "severity": found.severity,
+        "message": printable(found.full_message, 2000),
+        "file": None if found.path is None else printable(found.path, 1000),
+        "line": found.line,
+        "pointer": found.pointer,
+        "part": found.part or None,
+        "places": places[:_LISTED].tolist(),
+        "n_places": len(places),
+        "count": found.count,
+        "values": plain(found.values),
+    }
+
+
+def plain(value: Any) -> Any:
+    """Return a message value as JSON data.
+
+    File bytes and non-finite numbers become strings, phrases become their text and values, and
+    lists are truncated after 100 items.
+    """
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, Phrase):
+        return {"text": str(value), "values": plain(value.values)}
+    if isinstance(value, Diagnostic):
+        return described(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, bool | int | float) or value is None:
+        return value
+    if isinstance(value, bytes):
+        return printable(value.decode("utf-8", "replace"), 1000)
+    if isinstance(value, Sequence) and not isinstance(value, str | Path):
+        return [plain(item) for item in value[:_LISTED]]
+    return printable(value, 1000)

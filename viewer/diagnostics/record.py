@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics.describing import described
-from viewer.diagnostics.diagnostic import Diagnostic
+from viewer.diagnostics.diagnostic import Diagnostic, described
 from viewer.phrases import printable
 
 __all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", "recorded"]

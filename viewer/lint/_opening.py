@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import SEVERITIES, Collector, Diagnostic
-from viewer.diagnostics.merging import merged
+from viewer.diagnostics.diagnostic import merged
 from viewer.diagnostics.wording import PLACES
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source

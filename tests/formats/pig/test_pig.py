@@ -21,7 +21,7 @@ from formats.pig_text import (
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.formats import save_image
 from viewer.rig.mesh import split_seams
 from viewer.rig.pose import rest_pose

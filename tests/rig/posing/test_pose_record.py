@@ -8,7 +8,7 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from rig.hand_made import mesh, skeleton
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations, pose_key, rest_pose

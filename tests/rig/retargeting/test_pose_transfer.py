@@ -11,7 +11,7 @@ from faults import told
 from numpy.testing import assert_allclose
 from rig.retargeting.two_people import BODY, figure_of
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.errors import RigError
 from viewer.formats.pose import named_rotations
 from viewer.rig.blendshapes import BlendShapes

@@ -18,7 +18,7 @@ from rig.retargeting.two_people import (
     quaternions,
 )
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.rig.figure import Figure
 from viewer.rig.humanoid import HUMAN_BONES, Humanoid
 from viewer.rig.mesh import Mesh

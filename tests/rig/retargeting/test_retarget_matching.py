@@ -10,7 +10,7 @@ from faults import told
 from rig.retargeting.two_people import BODY, EXACT, HIK, bones, figure_of, moving, places
 
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.motion.skeleton_motion import SkeletonMotion

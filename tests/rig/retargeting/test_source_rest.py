@@ -26,7 +26,7 @@ from rig.retargeting.rest_twins import (
     written,
 )
 
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.diagnostic import Phrase
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
 from viewer.rig.geometry.quaternion import multiply

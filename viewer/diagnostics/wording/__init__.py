@@ -8,51 +8,25 @@ from __future__ import annotations
 
 from viewer.diagnostics.codes import Code
 from viewer.diagnostics.wording import (
-    anim,
     archives,
-    bindings,
-    body_models,
-    bvh,
     captures,
-    clips,
-    comparison,
     export,
-    fbx,
+    figures,
     gltf,
-    gltf_materials,
-    joints,
-    kinds,
-    loading,
-    meshes,
-    morph,
-    motion,
-    nodes,
-    obj,
-    pictures,
-    ply,
-    poses,
+    motions,
     reading,
-    rig,
     rigging,
-    skeletons,
-    skin,
-    weights,
+    text_formats,
 )
 
-TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
-    *(gltf_materials, archives, body_models, captures, poses, pictures),
-    *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
-)
-_CODED = (
-    *(reading, weights, bindings, skeletons, meshes, clips, gltf),
-    *(rigging, comparison, export),
-)
+TABLES = (reading, text_formats, archives, captures, gltf, figures, motions, rigging, export)
 
 CODES: dict[str, Code] = {
-    code: row for table in _CODED for code, row in sorted(table.CODES.items())
+    code: row
+    for table in (reading, figures, motions, gltf, rigging, export)
+    for code, row in table.CODES.items()
 }
-"""By code; a code is never reused with a different meaning."""
+"""By code, in the order of lists; a code is never reused with a different meaning."""
 
 MESSAGES: dict[str, str] = {
     key: template for table in TABLES for key, template in table.MESSAGES.items()

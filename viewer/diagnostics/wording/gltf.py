@@ -1,4 +1,4 @@
-"""Messages about ``.gltf``, ``.glb`` and ``.vrm`` files."""
+"""Messages about glTF, VRM and FBX files."""
 
 from viewer.diagnostics.codes import Code
 
@@ -9,8 +9,8 @@ CODES = {
     "G004": Code("warning", "inconsistent glTF skin", "bind the mesh again or export again"),
     "G005": Code("warning", "invalid glTF animation", "export the animation again"),
     "G006": Code("warning", "invalid VRM data", "export the character again"),
-    "G008": Code("error", "invalid VRM character", "export the character again"),
     "G007": Code("note", "transform without effect", "none if intentional"),
+    "G008": Code("error", "invalid VRM character", "export the character again"),
 }
 
 MESSAGES = {
@@ -192,6 +192,63 @@ MESSAGES = {
     "G005.range": "expected keys from {start:.6g} to {end:.6g} s as declared by the accessors, "
     "found {first:.6g} to {last:.6g} s",
     "G005.channel-twice": "ignored second channel for {path:text} of node {node}",
+    # Materials, textures and images
+    "F005.gltf-image": "{problem:text}; drawn without this image",
+    "F005.gltf-format": "{found:text} images are not supported; drawn without this image",
+    "F005.gltf-texture": "no image; drawn untextured",
+    "F006.gltf-material": "{problem:text}; ignored",
+    "F006.gltf-range": "expected {limits:text}, found {found:text}; {used:text} used",
+    "F006.gltf-choice": "expected {choices:or}, found {found:quoted}; {used:quoted} used",
+    "F007.gltf-not-drawn": "{extension:text} not drawn ({n:#material})",
+    "F007.gltf-glossiness": "KHR_materials_pbrSpecularGlossiness is approximated by metallic and "
+    "roughness ({n:#material})",
+    "F007.gltf-toon": "{n:#toon material|is|are} lit by the white key light only{names:+; not "
+    "drawn: {:list}}",
+    # Figures in glTF and FBX files
+    "F002.no-figure": "expected meshes, skins or a hierarchy of nodes, found nothing to show",
+    "F008.contents": "expected triangles, a skin or a hierarchy of nodes, found only "
+    "{contents:list}",
+    "F002.many-vertices": "expected at most {most} vertices, found {found} over all nodes",
+    "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
+    "vertex} along the edges",
+    "W004.mesh-node": "mesh {mesh:quoted}: {n:#vertex} without weights {n:?follows|follow} the "
+    "node of the mesh instead of a joint",
+    "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
+    "F003.joint-reach": "joint {joint:quoted}: expected a rest transform within ±{limit:.2g}, "
+    "found {found:.3g}",
+    "F003.bind-reach": "joint {joint:quoted}: expected vertices within ±{limit:.2g} in the rest "
+    "pose, found larger ones",
+    "F007.animated-others": "animations of {n:#node} that {n:?belongs|belong} to no figure are "
+    "omitted: {names:list}",
+    "F007.orthographic": "orthographic cameras are not supported: {names:list}",
+    "F007.skinning-method": "{n:?skin|skins} {names:list} {n:?asks|ask} for the method {method}: "
+    "used unless {window:?the Skinning panel|--method} selects another one",
+    "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
+    "W001.divided": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "
+    "by their sum",
+    # FBX
+    "F001.fbx-extra": "reading .fbx files needs ufbx, which is not installed: pip install ufbx",
+    "F001.fbx-crash": "the FBX library failed on this file: {how:text}",
+    "F001.fbx-slow": "reading took more than {seconds:.0f} s and was stopped",
+    "F002.fbx-cut": "expected the end of {n:#open section}, found the end of the file: it is cut "
+    "short",
+    "F002.fbx-connections": "expected a section Connections, found the end of the file: it is cut "
+    "short",
+    "F002.fbx": "not a readable FBX file: {reason:text}",
+    "F007.fbx-takes": "no section Takes before the end of the file: if it is cut short, its "
+    "animations are missing",
+    "F007.fbx-converted": "unsupported {what:list} converted to {to:list}",
+    "F007.fbx-unused": "not used: {items:list12}",
+    "F007.fbx-warning": "FBX library: {text:text}",
+    "F007.fbx-in-betweens": "blend shape {shape:quoted}: {n:#in-between target} "
+    "{n:?is a blend shape|are blend shapes} of {n:?its|their} own; animations set all weights",
+    "F007.fbx-continued": "{n:#curve} that {n:?continues|continue} before or after {n:?its|their} "
+    "keys {n:?is|are} held after 20000 frames",
+    "F007.fbx-skins": "mesh {mesh:quoted}: only the first of {n} skin deformers is used",
+    "F007.fbx-no-bone": "mesh {mesh:quoted}: {n:#skin cluster} without a joint ignored",
+    "F007.fbx-color-sets": "mesh {mesh:quoted}: only the first of {n} colour sets is used",
+    "F007.fbx-opacity": "material {material:quoted}: the opacity texture {texture:quoted} is not "
+    "used, only the alpha of the colour texture",
 }
 
 PHRASES = {
@@ -205,4 +262,20 @@ PHRASES = {
     "gltf-materials": "{n:#material}",
     "gltf-images": "{n:#image}",
     "gltf-lights": "{n:#light}",
+    # FBX
+    "fbx-mesh": "mesh {mesh:quoted}: {what} {row}",
+    "fbx-node": "node {node:quoted} ({row}): transform",
+    "fbx-keys": "keys of {node:quoted}: {path}",
+    "fbx-value": "{of:text}",
+    "fbx-position": "position",
+    "fbx-normal": "normal",
+    "fbx-color": "colour",
+    "fbx-bind-matrix": "bind matrix",
+    "fbx-weight": "weight",
+    "fbx-offset": "offset",
+    "fbx-influence": "influence",
+    "fbx-uv": "texture coordinate",
+    "fbx-axes": "y up, right-handed",
+    "ended-by-signal": "it crashed with signal {number}",
+    "ended-with-error": "exit code {code}{error:+: {}}",
 }
