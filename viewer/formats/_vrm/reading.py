@@ -236,7 +236,7 @@ def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
         Number of nodes; other indices are ignored.
 
     >>> told = {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1, 9], "center": 2}]}}}
-    >>> sorted(named_nodes(told, 3))
+    >>> sorted(_named_nodes(told, 3))
     [1, 2]
     """
     found: set[int] = set()

@@ -10,10 +10,11 @@ inches are preserved; others are converted to y up and metres.
 
 from __future__ import annotations
 
-from viewer.formats._scene_graph.figures import figure_group
-from viewer.formats._source import Source
-from viewer.formats.fbx.contents import node_file
-from viewer.rig.figure_group import FigureGroup
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viewer.formats._source import Source
+    from viewer.rig.figure_group import FigureGroup
 
 
 def read(source: Source) -> FigureGroup:
@@ -34,4 +35,8 @@ def read(source: Source) -> FigureGroup:
     FormatError
         If ufbx is not installed, cannot read the file, crashes, or takes too long.
     """
+    # The child process imports this package, too, and needs neither module.
+    from viewer.formats._scene_graph.figures import figure_group
+    from viewer.formats.fbx.contents import node_file
+
     return figure_group(node_file(source), source)

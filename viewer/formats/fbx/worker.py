@@ -1,9 +1,13 @@
 """Child process that reads an ``.fbx`` with ufbx and writes its contents to standard output.
 
-``python -m viewer.formats._fbx.worker FILE`` returns everything except the keys; with the number of
+``python -m viewer.formats.fbx.worker FILE`` returns everything except the keys; with the number of
 an animation stack after the file, it returns the keys of that stack. It writes an ``.npz``: arrays,
-and JSON under
-``"json"``. Only some uses of ufbx's binding are safe: see ``_Scene``.
+and JSON under ``"json"``. Only some uses of ufbx's binding are safe: see ``_Scene``.
+
+ufbx bakes the curves of a stack, with their pivots and layers, at the file's frame rate and at
+their keys. Two things are added: samples before the first and after the last key of curves that
+continue there, and samples within frames in which a joint rotates so far that the shorter arc
+between two samples would be the wrong way round.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ import gc
 import os
 import sys
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +25,29 @@ from viewer.formats.fbx.message import Arrays, packed
 
 _METRES = (1.0, 0.01, 0.001, 0.0254)  # metres per unit, for the units that figures can have
 _LIGHT = 1e-6  # relative rounding error of a unit stated by an exporter
+_METHODS = ("lbs", "lbs", "dqs", "mix")  # method of each value of ufbx.SkinningMethod
+
+# Elements without equivalent, by the list of the scene that contains them.
+_UNUSED = {
+    "lights": "light",
+    "nurbs_curves": "NURBS curve",
+    "nurbs_surfaces": "NURBS surface",
+    "line_curves": "line",
+    "cache_deformers": "cache deformer",
+    "constraints": "constraint",
+}
+_PHYSICAL = range(3, 11)  # values of ufbx.ShaderType from OSL standard surface to ShaderFX graph
+
+# Sampling of the keys.
+_PATHS = ("translation", "rotation", "scale")
+_STANDARD_RATE = 30.0  # frames per second of files that state none
+_RATES = (1.0, 1000.0)  # frame rates that files use
+_JUMP = 1e-6  # time between the two samples on either side of a jump, seconds
+_LARGEST_ARC = 45.0  # maximum rotation between two samples, degrees
+_MOST_FRAMES = 20_000  # maximum number of frames for which a curve is continued
+_LONGEST = 1_000_000  # maximum number of frames between two keys
+_MOST_PIECES = 64  # maximum number of samples for each interval between two others
+_Times = NDArray[np.float64]
 
 
 def main(arguments: list[str]) -> None:
@@ -111,8 +138,8 @@ class _Scene:
     def message(self, stack: list[str]) -> tuple[Arrays, dict[str, Any]]:
         """Return everything except the keys, or the keys of one stack."""
         if stack:
-            return self.arrays, _keys_of(self, int(stack[0]))
-
+            sampled = _Sampled(self, self.items(self.scene, "anim_stacks")[int(stack[0])])
+            return self.arrays, sampled.result()
         return self.arrays, _contents_of(self)
 
 
@@ -121,43 +148,7 @@ def _vector(axis: int) -> np.ndarray[Any, Any]:
     return np.eye(3)[axis % 6 // 2] * (1.0 if axis % 2 == 0 else -1.0)
 
 
-if __name__ == "__main__":
-    main(sys.argv[1:])
-
-
-_METHODS = ("lbs", "lbs", "dqs", "mix")  # method of each value of ufbx.SkinningMethod
-
-# Elements without equivalent, by the list of the scene that contains them.
-_UNUSED = {
-    "lights": "light",
-    "nurbs_curves": "NURBS curve",
-    "nurbs_surfaces": "NURBS surface",
-    "line_curves": "line",
-    "cache_deformers": "cache deformer",
-    "constraints": "constraint",
-}
-_PHYSICAL = range(3, 11)  # values of ufbx.ShaderType from OSL standard surface to ShaderFX graph
-
-
-class _KeptScene(Protocol):
-    """A scene whose objects are held; see ``worker.py``."""
-
-    ufbx: Any
-    scene: Any
-    arrays: Arrays
-    converted: list[str]
-
-    def keep(self, value: Any) -> Any:
-        """Hold a value."""
-
-    def get(self, item: Any, *names: str) -> Any:
-        """Return an attribute."""
-
-    def items(self, item: Any, *names: str) -> list[Any]:
-        """Return the objects of a list attribute."""
-
-
-def _contents_of(kept: _KeptScene) -> dict[str, Any]:
+def _contents_of(kept: _Scene) -> dict[str, Any]:
     """Return the JSON, after adding its arrays to the scene's."""
     scene = kept.scene
     settings, metadata = kept.get(scene, "settings"), kept.get(scene, "metadata")
@@ -197,7 +188,7 @@ def _contents_of(kept: _KeptScene) -> dict[str, Any]:
     }
 
 
-def _moved(kept: _KeptScene, stack: Any, nodes: list[Any]) -> list[int]:
+def _moved(kept: _Scene, stack: Any, nodes: list[Any]) -> list[int]:
     """Return the nodes that a stack moves, or whose blend shapes it changes."""
     elements = {
         int(kept.get(each, "element").element_id)
@@ -218,7 +209,7 @@ def _moved(kept: _KeptScene, stack: Any, nodes: list[Any]) -> list[int]:
     return sorted(found)
 
 
-def _add_nodes(kept: _KeptScene, nodes: list[Any]) -> None:
+def _add_nodes(kept: _Scene, nodes: list[Any]) -> None:
     count = len(nodes)
     parents = np.full(count, -1, dtype=np.int32)
     local = np.zeros((count, 10))
@@ -231,7 +222,7 @@ def _add_nodes(kept: _KeptScene, nodes: list[Any]) -> None:
     kept.arrays |= {"parents": parents, "local": local, "geometry": geometry}
 
 
-def _transform(kept: _KeptScene, transform: Any) -> list[float]:
+def _transform(kept: _Scene, transform: Any) -> list[float]:
     """Return a translation, a quaternion (x, y, z, w) and a scale: 10 numbers."""
     parts = (kept.get(transform, name) for name in ("translation", "rotation", "scale"))
     return [float(number) for part in parts for number in part]
@@ -244,7 +235,7 @@ def _matrix(matrix: Any) -> NDArray[np.float64]:
     return result
 
 
-def integers(values: Any) -> NDArray[np.int32]:
+def _integers(values: Any) -> NDArray[np.int32]:
     """Return a list of integers, which the binding does not expose as a buffer."""
     return np.array([values[index] for index in range(len(values))], dtype=np.int64).astype("i4")
 
@@ -254,15 +245,15 @@ def _numbers(values: Any, width: int) -> NDArray[np.float64]:
     return np.array(memoryview(values), dtype=np.float64).reshape(-1, width)
 
 
-def _mesh(kept: _KeptScene, at: int, mesh: Any) -> dict[str, Any]:
+def _mesh(kept: _Scene, at: int, mesh: Any) -> dict[str, Any]:
     def put(name: str, values: NDArray[Any]) -> None:
         kept.arrays[f"mesh{at}.{name}"] = values
 
     put("vertices", _numbers(kept.get(mesh, "vertices"), 3))
     faces = np.array(memoryview(kept.get(mesh, "faces")), dtype=np.int64).reshape(-1, 2)
     put("faces", faces)
-    put("corners", integers(kept.get(mesh, "vertex_indices")))
-    put("face_materials", integers(kept.get(mesh, "face_material")))
+    put("corners", _integers(kept.get(mesh, "vertex_indices")))
+    put("face_materials", _integers(kept.get(mesh, "face_material")))
     attributes = [("normals", kept.get(mesh, "vertex_normal"), 3)]
     uv_sets, colors = kept.items(mesh, "uv_sets"), kept.items(mesh, "color_sets")
     attributes += [
@@ -272,7 +263,7 @@ def _mesh(kept: _KeptScene, at: int, mesh: Any) -> dict[str, Any]:
     for name, attribute, width in attributes:
         if kept.get(attribute, "exists"):
             put(name, _numbers(kept.get(attribute, "values"), width))
-            put(f"{name}.corners", integers(kept.get(attribute, "indices")))
+            put(f"{name}.corners", _integers(kept.get(attribute, "indices")))
     instances = kept.items(mesh, "instances")
     skins, shapes = kept.items(mesh, "skin_deformers"), _shapes(kept, mesh, put)
     return {
@@ -291,14 +282,14 @@ def _mesh(kept: _KeptScene, at: int, mesh: Any) -> dict[str, Any]:
     }
 
 
-def _skin(kept: _KeptScene, skin: Any, put: Any) -> dict[str, Any]:
+def _skin(kept: _Scene, skin: Any, put: Any) -> dict[str, Any]:
     clusters = kept.items(skin, "clusters")
     bones, matrices, vertices, weights = [], [], [], []
     for cluster in clusters:
         bone = kept.get(cluster, "bone_node")
         bones.append(-1 if bone is None else int(bone.typed_id))
         matrices.append(_matrix(kept.get(cluster, "geometry_to_bone")))
-        vertices.append(integers(kept.get(cluster, "vertices")))
+        vertices.append(_integers(kept.get(cluster, "vertices")))
         weights.append(_numbers(kept.get(cluster, "weights"), 1)[:, 0])
     put("skin.matrices", np.array(matrices).reshape(-1, 4, 4))
     put("skin.bones", np.array(bones, dtype=np.int32))
@@ -306,14 +297,14 @@ def _skin(kept: _KeptScene, skin: Any, put: Any) -> dict[str, Any]:
     put("skin.vertices", np.concatenate([*vertices, np.zeros(0, np.int32)]))
     put("skin.weights", np.concatenate([*weights, np.zeros(0)]))
     put("skin.blend", _numbers(kept.get(skin, "dq_weights"), 1)[:, 0])
-    put("skin.blend.vertices", integers(kept.get(skin, "dq_vertices")))
+    put("skin.blend.vertices", _integers(kept.get(skin, "dq_vertices")))
     return {
         "name": str(kept.get(skin, "name")),
         "method": _METHODS[int(kept.get(skin, "skinning_method"))],
     }
 
 
-def _shapes(kept: _KeptScene, mesh: Any, put: Any) -> list[dict[str, Any]]:
+def _shapes(kept: _Scene, mesh: Any, put: Any) -> list[dict[str, Any]]:
     """Return every target of the blend channels: the last of each channel, and in-between ones."""
     told: list[dict[str, Any]] = []
     for deformer in kept.items(mesh, "blend_deformers"):
@@ -330,7 +321,7 @@ def _shapes(kept: _KeptScene, mesh: Any, put: Any) -> list[dict[str, Any]]:
                 if len(weights) == len(offsets):
                     offsets = offsets * weights
                     normals = normals * weights if len(normals) == len(weights) else normals
-                put(f"shape{row}.vertices", integers(kept.get(shape, "offset_vertices")))
+                put(f"shape{row}.vertices", _integers(kept.get(shape, "offset_vertices")))
                 put(f"shape{row}.offsets", offsets)
                 put(f"shape{row}.normals", normals)
                 told.append(
@@ -345,7 +336,7 @@ def _shapes(kept: _KeptScene, mesh: Any, put: Any) -> list[dict[str, Any]]:
     return told
 
 
-def _camera(kept: _KeptScene, camera: Any) -> dict[str, Any]:
+def _camera(kept: _Scene, camera: Any) -> dict[str, Any]:
     is_parallel = int(kept.get(camera, "projection_mode")) == 1
     angle, height = kept.get(camera, "field_of_view_deg").y, kept.get(camera, "orthographic_size").y
     return {
@@ -359,7 +350,7 @@ def _camera(kept: _KeptScene, camera: Any) -> dict[str, Any]:
     }
 
 
-def _material(kept: _KeptScene, material: Any) -> dict[str, Any]:
+def _material(kept: _Scene, material: Any) -> dict[str, Any]:
     maps = kept.get(material, "pbr")
     told: dict[str, Any] = {
         "name": str(kept.get(material, "name")),
@@ -379,7 +370,7 @@ def _material(kept: _KeptScene, material: Any) -> dict[str, Any]:
     return told
 
 
-def _texture(kept: _KeptScene, at: int, texture: Any) -> dict[str, Any]:
+def _texture(kept: _Scene, at: int, texture: Any) -> dict[str, Any]:
     content = kept.get(texture, "content")
     video = kept.get(texture, "video")
     if not content and video is not None:
@@ -396,37 +387,10 @@ def _texture(kept: _KeptScene, at: int, texture: Any) -> dict[str, Any]:
     }
 
 
-# Keys of one animation stack of a scene of ufbx: samples of its curves, pivots and layers.
-#
-# ufbx bakes curves at the file's frame rate and at their keys. Two things are added: samples
-# before the first and after the last key of curves that continue there, and samples within frames
-# in which a joint rotates so far that the shorter arc between two samples would be the wrong way
-# round.
-
-_PATHS = ("translation", "rotation", "scale")
-_STANDARD_RATE = 30.0  # frames per second of files that state none
-_RATES = (1.0, 1000.0)  # frame rates that files use
-_JUMP = 1e-6  # time between the two samples on either side of a jump, seconds
-_LARGEST_ARC = 45.0  # maximum rotation between two samples, degrees
-_MOST_FRAMES = 20_000  # maximum number of frames for which a curve is continued
-_LONGEST = 1_000_000  # maximum number of frames between two keys
-_MOST_PIECES = 64  # maximum number of samples for each interval between two others
-_Times = NDArray[np.float64]
-
-
-def _keys_of(kept: _KeptScene, stack: int) -> dict[str, Any]:
-    """Return a list of channels, ``"keys"``, and the number of curves that end early, ``"cut"``.
-
-    A channel states its node or element, its path, and the name of its array: times in seconds and
-    values, for linear interpolation, or slerp for rotations.
-    """
-    return _Sampled(kept, kept.items(kept.scene, "anim_stacks")[stack]).result()
-
-
 class _Sampled:
     """The curves of a stack, and their samples."""
 
-    def __init__(self, kept: _KeptScene, stack: Any) -> None:
+    def __init__(self, kept: _Scene, stack: Any) -> None:
         self.kept, self.animation = kept, kept.get(stack, "anim")
         self.start, self.end = float(stack.time_begin), float(stack.time_end)
         rate = float(kept.get(kept.scene, "settings").frames_per_second)
@@ -442,7 +406,11 @@ class _Sampled:
                 self.animated.setdefault(element, []).append(row)
 
     def result(self) -> dict[str, Any]:
-        """Return the JSON of all channels."""
+        """Return the channels, ``"keys"``, and the number of curves that end early, ``"cut"``.
+
+        A channel states its node or element, its path, and the name of its array: times in seconds
+        and values, for linear interpolation, or slerp for rotations.
+        """
         self._add_nodes()
         self._add_weights()
         return {"keys": self.told, "cut": self.cut}
@@ -631,3 +599,7 @@ class _Sampled:
             for row in np.flatnonzero(counts > 1.0).tolist()
         ]
         return np.concatenate([np.zeros(0), *found])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
