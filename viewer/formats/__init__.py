@@ -8,11 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
-from viewer.formats._borrowed import HOMES
 from viewer.formats._file_bytes import MAX_SIZE, unreadable
-from viewer.formats._format import Format
 from viewer.formats._kept import kept_or_read
 from viewer.formats._source import Source
 
@@ -87,6 +86,26 @@ _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
 _ANY_TEXT = (".txt",)  # suffixes that do not identify the content
 _HEAD = 1 << 16  # number of bytes from which a file must be identified
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """Properties of a format that menus and dialogs need before its module is imported."""
+
+    title: str
+    """Name in menus and the manual."""
+    suffixes: tuple[str, ...]
+    """Suffixes with their dots; files are written with the first suffix."""
+    signature: bytes = b""
+    """Regular expression that matches in the head of every such text file; empty for none."""
+    keys: tuple[str, ...] = ()
+    """Keys that identify an archive (``.pkl``, ``.npz``) of this format: any one is sufficient."""
+    files: tuple[str, ...] = ()
+    """Files that identify a folder of this format: any one is sufficient."""
+    writes: bool = True
+    """Whether there is a writer."""
+    meshes: tuple[str, ...] = ()
+    """Suffixes of files that may contain only a mesh, without a rig."""
 
 
 FORMATS = {
@@ -190,10 +209,26 @@ FORMATS = {
 """Modules in this folder; each has ``read(source)``, ``write(content, path)``, or both."""
 
 
+_REEXPORTED = {
+    "viewer.formats._mesh.texture": ("read_picture",),
+    "viewer.formats._references": ("referenced_path",),
+    "viewer.media.file_names": ("file_stem", "folder_name", "opened_text"),
+    "viewer.media.image": ("is_picture", "save_image"),
+    "viewer.media.named_arrays": ("save_arrays",),
+    "viewer.media.saving": (
+        *("all_or_none", "free_path", "keeping_written"),
+        *("save_bytes", "save_parts", "save_text"),
+    ),
+    "viewer.media.targets": ("check_folder_target", "check_targets"),
+}
+"""Names that the package re-exports, by module; each module is imported on first use."""
+
+
 def __getattr__(name: str) -> Any:
-    if name not in HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(HOMES[name]), name)
+    for module, names in _REEXPORTED.items():
+        if name in names:
+            return getattr(import_module(module), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def detect(source: Source) -> str:
@@ -307,7 +342,7 @@ def _is_archive(source: Source) -> bool:
 def _detect_archive(source: Source) -> str:
     from viewer.formats._archive.recognition import archive_format
 
-    return archive_format(source, FORMATS)
+    return archive_format(source, {key: kind.keys for key, kind in FORMATS.items()})
 
 
 def read(source: Source) -> Content:

@@ -8,26 +8,26 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive, describe
-from viewer.formats._format import Format
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
 
-def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
+def archive_format(source: Source, formats: Mapping[str, Collection[str]]) -> str:
     """Return the key of an archive's format, determined by its keys and the shapes of its arrays.
 
-    ``formats`` are all formats by key. Raises FormatError with the archive's keys if none matches.
+    ``formats`` are the keys that identify an archive of each format. Raises FormatError with the
+    archive's keys if none matches.
     """
     archive = archive_of(source)
     keys = archive.keys
-    for kind, form in formats.items():
-        if kind == "smpl" and set(keys).intersection(formats["skel_body"].keys):
+    for kind, marks in formats.items():
+        if kind == "smpl" and set(keys).intersection(formats["skel_body"]):
             continue  # SKEL also contains SMPL's arrays
-        if set(keys).intersection(form.keys):
+        if set(keys).intersection(marks):
             if kind not in ("amass", "pose"):
                 return kind
             if not _has_tool(archive):
-                return _pose_or_motion(archive, formats["pose"].keys)
+                return _pose_or_motion(archive, formats["pose"])
             return "video_mocap"
     if _is_video_mocap(archive):
         return "video_mocap"
