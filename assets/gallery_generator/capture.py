@@ -11,7 +11,7 @@ import numpy as np
 
 from gallery_generator.walk import Walk
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.kinematics import world_matrices

@@ -12,7 +12,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import render
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Scene
 

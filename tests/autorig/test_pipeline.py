@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.pipeline import METHODS, TransferSettings, transfer
+from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import clip_for
+from viewer.autorig.settings import METHODS, TransferSettings
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
 from viewer.rig.figure import Figure

@@ -16,7 +16,7 @@ import viewer
 from viewer.formats import Source
 from viewer.formats._archive.opening import open_archive
 from viewer.rig.blendshapes import Correctives
-from viewer.rig.bodies.sparse_offsets import SparseOffsets
+from viewer.rig.bodies.offsets import SparseOffsets
 
 GOAL = 1.5
 MEMORY_GOAL = 3.0

@@ -19,8 +19,9 @@ import transfer_targets as made
 
 import viewer
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
-from viewer.autorig.correspondence.matching import Template
-from viewer.autorig.pipeline import TransferSettings, transfer
+from viewer.autorig.correspondence import Template
+from viewer.autorig.pipeline import transfer
+from viewer.autorig.settings import TransferSettings
 from viewer.autorig.weights.weight_transfer import (
     WeightSettings,
     nearest_weights,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from plain_smpl import rotation, smpl_forward
 
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
-from viewer.rig.smpl_family import FAMILY
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export_animation
 from viewer.formats import Source, read
-from viewer.rig.smpl_family import ShapeSpace
+from viewer.rig.bodies.smpl_family import ShapeSpace
 
 ATOL = 1e-12  # metres and radians
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55}

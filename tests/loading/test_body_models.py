@@ -17,10 +17,10 @@ from viewer.loading import Contents, MotionSettings
 from viewer.loading.assembly import begin
 from viewer.media.targets import check_targets
 from viewer.models import save_model_folder
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
-from viewer.rig.smpl_family import ShapeSpace
 
 SCALES = {"NEUTRAL": 1.0, "FEMALE": 0.9, "MALE": 1.1}
 LEFT_KNEE, LEFT_HIP = 4, 1

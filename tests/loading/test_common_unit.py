@@ -16,7 +16,7 @@ from viewer.formats.rigged import save
 from viewer.loading import Contents, begin, bundled_body, load
 from viewer.loading.cast import Cast
 from viewer.loading.placing import placed_views, stand_up
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.scene import scene_unit
 
 

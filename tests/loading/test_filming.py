@@ -15,7 +15,7 @@ from viewer.errors import FormatError, RigError
 from viewer.loading import MotionSettings, load
 from viewer.loading.driving import filmed
 from viewer.media.video import VideoSink
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.capture import Capture
 
 SIZE = (64, 48)

@@ -10,9 +10,8 @@ from viewer.commands._info_clips import animation_lines, describe_animations
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading import Contents, MotionSettings, begin
-from viewer.rig.figure import Figure
-from viewer.rig.figure_group import FigureGroup
-from viewer.rig.motion.animation import Animation
+from viewer.rig.figure import Figure, FigureGroup
+from viewer.rig.motion.transform_clip import Animation
 
 
 def opened(*figures, animation="", files=None):

@@ -13,7 +13,7 @@ from rendering.golden_scenes import LINES, Shot, options, posed_fox
 import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.keypoint_layouts import keypoint_layout
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure

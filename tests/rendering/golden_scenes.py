@@ -22,7 +22,7 @@ from rendering.picture_metrics import OTHER_SSIM_ERROR
 import viewer
 from viewer.rendering.camera import VIEWS, Camera, fit
 from viewer.rendering.options import DisplayOptions, Light, Lights
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from rendering.drawn_figures import arm
 
-from viewer.rig.captures.camera_view import CameraMotion, CameraView
+from viewer.rig.captures.cameras import CameraMotion, CameraView
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing

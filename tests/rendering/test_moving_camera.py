@@ -11,7 +11,7 @@ from viewer.rendering.camera import camera_from_view, eye, follow_view
 from viewer.rendering.camera_views import drawn_cameras, with_cameras
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Recording, _Cameras
-from viewer.rig.captures.camera_view import view_at
+from viewer.rig.captures.cameras import view_at
 from viewer.rig.scene import Scene
 
 POINT = np.array([0.3, 0.7, -0.4])

@@ -13,7 +13,7 @@ from viewer.rendering.camera import Camera, camera_axes, camera_from_view, eye, 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.pinhole import distortion_error, picture_size
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene

@@ -11,8 +11,7 @@ from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion.animation import Animation
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rig.motion.transform_clip import Animation, TransformChannel, TransformClip
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.vertex_facts import vertex_facts
+from viewer.rig.inspection.single_vertices import vertex_facts
 from viewer.rig.mesh import Mesh
 from viewer.rig.scalars._asked import Asked
 from viewer.rig.scalars.weights import weight

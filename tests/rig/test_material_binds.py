@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.formats.gltf.textures import transform_matrix
+from viewer.rig.expressions import MaterialBinds
 from viewer.rig.material import Material, Outline, Rim, Texture
-from viewer.rig.material_binds import MaterialBinds
 
 TOON = Material(
     base_color=(0.5, 0.5, 0.5, 1.0),

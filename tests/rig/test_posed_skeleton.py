@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import viewer
 from viewer.rig import kinematics
 from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matrices
+from viewer.rig.memo import NumberKey
 from viewer.rig.motion.instances import posed_worlds
-from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import pose_key, pose_of
 
 ARRAYS = ("dofs", "translations", "rotations", "scales", "shape_weights")

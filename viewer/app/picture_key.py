@@ -9,7 +9,7 @@ from viewer.app.core.state import AppState
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation, Marks
 from viewer.rendering.passes.ghost_pass import Ghost
-from viewer.rig.number_key import NumberKey
+from viewer.rig.memo import NumberKey
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor
 

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from viewer.autorig.alignment.posed_alignment import align_posed
+from viewer.autorig.alignment.surface_alignment import Alignment, alignment_lines
+from viewer.autorig.checks import (
+    check_lines,
+    newly_outside,
+    residual_of,
+    with_joint_name,
+)
+from viewer.autorig.correspondence import Template, with_reversed_winding
 from viewer.autorig.rigged import Rigged, with_fields
-from viewer.autorig.robust import robust
 from viewer.autorig.seed import nearest
-from viewer.autorig.settings import METHODS, Report, TransferSettings
+from viewer.autorig.settings import Report, TransferSettings
+from viewer.autorig.transfer.corrective_transfer import transfer_correctives
+from viewer.autorig.transfer.inverse_skinning import invert_skinning, repair_tears
+from viewer.autorig.transfer.joint_transfer import boundary_weights, surface_shifts, transfer_joints
+from viewer.autorig.transfer.rest_skeleton import RestSkeleton, fit_rest_skeleton
+from viewer.autorig.weights.result import WeightTransfer
+from viewer.autorig.weights.weight_transfer import transferred_weights
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh
+from viewer.rig.kinematics import skinning_matrices, world_matrices
+from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
 from viewer.rig.pose import Pose
-from viewer.rig.shape import shaped
-
-__all__ = ["METHODS", "Report", "TransferSettings", "transfer"]
+from viewer.rig.shape import pose_weights, shaped
+from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rig.skinning import joint_matrices
+from viewer.rig.units import UNIT_NAMES, unit_of_scaled
 
 
 def transfer(
@@ -81,3 +102,212 @@ def _silent(fraction: float, what: str) -> None:
 def _parts(figure: Figure) -> str:
     parts = {"mesh": figure.mesh, "skeleton": figure.skeleton, "skin": figure.skin}
     return " and ".join(name for name, part in parts.items() if part is not None) or "none"
+
+
+_JOINT_REACH = 0.08  # maximum distance between the two surfaces, as a fraction of the target's size
+
+
+def robust(
+    template: Figure, pose: Pose, target: Mesh, how: TransferSettings, report: Report, name: str
+) -> Rigged:
+    """Transfer a rig; see ``pipeline.transfer``, which checks the arguments.
+
+    Parameters
+    ----------
+    template : Figure
+        Template with bindings, and with its shape applied.
+    pose : Pose
+        Pose without shape weights.
+    target : Mesh
+        Mesh with triangles.
+    how : TransferSettings
+        All settings except the method.
+    report : callable
+        Called with progress.
+    name : str
+        Name of the new figure.
+    """
+    met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
+    alignment, pose, posed = met.alignment, met.pose, met.positions
+    original, template = template.skeleton, met.figure
+    aligned = alignment.similarity.apply(posed)
+    weights = _weighed(template, aligned, target, how, report)
+    report(0.8, "joints")
+    rest, transferred, lines = _transferred_skeleton(
+        template, original, pose, alignment, aligned, target, how
+    )
+    report(0.85, "rest pose")
+    scale = alignment.similarity.scale * pose.figure_scale
+    figure, guarded = _at_rest(template, rest, weights, target, scale, how, name)
+    report(0.95, "checks")
+    joints = joint_matrices(figure, rest.pose)[:, :3, 3]
+    out = newly_outside(template, pose, posed, target, joints, transferred)
+    residual = residual_of(figure, rest.pose, np.eye(4), target)
+    lines = [
+        *alignment_lines(alignment),
+        *met.lines,
+        *(with_joint_name(line, figure) for line in weights.lines),
+        *lines,
+        *rest.lines,
+        *_judged(template, figure, weights),
+        *_dropped_parts(template, figure, how),
+        *check_lines(figure, guarded, out, residual),
+    ]
+    return Rigged(
+        figure=figure,
+        pose=rest.pose,
+        placement=np.eye(4),
+        alignment=alignment,
+        weights=weights,
+        guarded=guarded,
+        residual=residual,
+        outside=out,
+        length_scale=alignment.similarity.scale,
+        figure_scale=pose.figure_scale,
+        path_scale=rest.root_scale / pose.figure_scale,
+        lines=tuple(lines),
+    )
+
+
+def _weighed(
+    template: Figure, aligned: Floats, target: Mesh, how: TransferSettings, report: Report
+) -> WeightTransfer:
+    """Transfer the weights of a template aligned with the target."""
+    mesh, skin = template.require_mesh(), template.require_skin()
+    return transferred_weights(
+        Template(aligned, mesh.triangles),
+        skin,
+        target.positions,
+        target.triangles,
+        how.weights,
+        _within(report, 0.4, 0.8),
+    )
+
+
+def _within(report: Report, low: float, high: float) -> Report:
+    return lambda fraction, what: report(low + (high - low) * fraction, what)
+
+
+def _transferred_skeleton(
+    template: Figure,
+    original: Skeleton | None,
+    pose: Pose,
+    alignment: Alignment,
+    aligned: Floats,
+    target: Mesh,
+    how: TransferSettings,
+) -> tuple[RestSkeleton, Bools | None, list[Diagnostic]]:
+    """Move the joints to the target; return those that were transferred, and messages."""
+    mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
+    assert mesh is not None and skeleton is not None and skin is not None  # checked by the caller
+    joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
+    if how.joints == "alignment":
+        rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
+        return rest, None, [Diagnostic("R008.aligned")]
+    reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
+    normals = vertex_normals(aligned, mesh.triangles)
+    ways, matched = surface_shifts(aligned, normals, target.positions, target.triangles, reach)
+    given = template.joint_regressor
+    # Entries that mix coordinates are not weights of vertices.
+    regressor = None if given is not None and given.axes is not None else given
+    found = transfer_joints(
+        joints,
+        skeleton.parents,
+        regressor or boundary_weights(skin, skeleton.parents),
+        ways,
+        matched,
+    )
+    rest = fit_rest_skeleton(
+        template, pose, alignment.similarity, found.positions, found.transferred, original
+    )
+    missed = np.flatnonzero(found.measurable & ~found.transferred)
+    labels = [joint_label(skeleton, joint) for joint in missed.tolist()]
+    without = int((~found.measurable).sum())
+    values = {
+        "n": int(found.transferred.sum()),
+        "all": skeleton.n_joints,
+        "by": Phrase("by-joint-regressor" if regressor else "by-boundaries"),
+        "missed": Phrase("joints-missed", names=labels) if labels else "",
+        "without": Phrase("joints-without-boundary", n=without) if without else "",
+    }
+    return rest, found.transferred, [Diagnostic("R008.transferred", values=values)]
+
+
+def _at_rest(
+    template: Figure,
+    rest: RestSkeleton,
+    weights: WeightTransfer,
+    target: Mesh,
+    scale: float,
+    how: TransferSettings,
+    name: str,
+) -> tuple[Figure, Bools]:
+    """Apply inverse skinning to the target and assemble the figure."""
+    skin = weights.skin(rest.inverse_bind)
+    skeleton, pose = rest.skeleton, rest.pose
+    palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
+    posed = target.positions - pose.figure_translation
+    found = invert_skinning(posed, skin, palette)
+    positions = repair_tears(found, posed, target.triangles) if how.repairs else found.positions
+    correctives = _correctives(template, weights, target, scale) if how.correctives else None
+    if correctives is not None:
+        # The pose's effect on the rest mesh is removed here, and added back when posing.
+        weights_there = pose_weights(correctives, skeleton, pose)
+        positions = positions - correctives.displacement(weights_there)
+    mesh = replace(target, positions=positions, normals=vertex_normals(positions, target.triangles))
+    mesh = with_reversed_winding(mesh, weights.backwards)
+    figure = Figure(
+        name=name,
+        mesh=mesh,
+        skeleton=skeleton,
+        skin=skin,
+        up=template.up,
+        unit=unit_of_scaled(template.unit, scale),
+        correctives=correctives,
+        hands=template.hands,
+        pose_layout=template.pose_layout,
+        facts=(("rig", f"transferred from {template.name}"),),
+    )
+    return figure, found.guarded
+
+
+def _correctives(
+    template: Figure, weights: WeightTransfer, target: Mesh, scale: float
+) -> Correctives | None:
+    if template.correctives is None or template.mesh is None or weights.points is None:
+        return None
+    return transfer_correctives(
+        template.correctives,
+        weights.points,
+        template.mesh.triangles,
+        weights.matched,
+        target.positions,
+        target.triangles,
+        scale,
+    )
+
+
+def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:
+    """Return messages about the target's winding and unit."""
+    lines = []
+    n_reversed = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
+    if n_reversed:
+        lines.append(Diagnostic("R014.wound", values={"n": n_reversed}))
+    if template.unit in UNIT_NAMES:
+        lines.append(
+            Diagnostic("R014.unit", values={"unit": UNIT_NAMES[figure.unit]})
+            if figure.unit in UNIT_NAMES
+            else Diagnostic("R014.unit-unknown")
+        )
+    return lines
+
+
+def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
+    """Return messages about template data that is missing in the new figure."""
+    lines = []
+    if template.blend_shapes is not None:
+        lines.append(Diagnostic("R013.shapes", values={"n": template.n_shapes}))
+    if template.correctives is not None and figure.correctives is None:
+        key = "R013.correctives-too-large" if how.correctives else "R013.correctives"
+        lines.append(Diagnostic(key))
+    return lines

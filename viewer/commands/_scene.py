@@ -22,8 +22,8 @@ from viewer.loading.cleaning_settings import CleanUp
 from viewer.models import named_files, resolve
 from viewer.phrases import printable
 from viewer.progress import report
+from viewer.rig.bodies.smpl_family import GENDERS
 from viewer.rig.scene import Scene
-from viewer.rig.smpl_family import GENDERS
 from viewer.rig.units import METRES
 from viewer.streams import summary_stream
 

@@ -23,7 +23,7 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
-    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.captures.cameras import CameraView
 
 _SWITCHES = (
     ("no-shadows", "omit shadows"),

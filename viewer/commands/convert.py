@@ -68,7 +68,7 @@ from viewer.interrupts import raising
 from viewer.loading import Contents, MotionSettings, begin
 from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import printable
-from viewer.rig.motion.own_animations import has_own_animations, own_animations
+from viewer.rig.motion.animation_choice import has_own_animations, own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, frame_range
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip

@@ -12,7 +12,7 @@ import numpy as np
 
 from viewer.autorig.alignment.orientation_search import AXES
 from viewer.autorig.alignment.surface_alignment import SCALES, AlignmentSettings
-from viewer.autorig.correspondence.matching import MatchSettings
+from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
@@ -39,14 +39,13 @@ from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.motion.baking import baked
 from viewer.rig.motion.clip import Clip, is_course_rig
+from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
-from viewer.rig.posing.posed_mesh import posed_mesh
 from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skinning import joint_matrices
+from viewer.rig.skinning import joint_matrices, posed_mesh
 from viewer.streams import require_stdout, summary_stream
 
 _SMOOTHING = 10  # number of iterations if --smooth has no value

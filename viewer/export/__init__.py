@@ -16,13 +16,13 @@ from viewer.export._left_out import other_animations_note
 from viewer.export._motion_paths import animation_files
 from viewer.export._options import MotionOptions, VrmMeta
 from viewer.formats import all_or_none
+from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.figure import Figure
-from viewer.rig.motion.own_animations import own_animations
+from viewer.rig.motion.animation_choice import own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
-from viewer.rig.smpl_family import member_of
 
 __all__ = [
     "EXPORTERS",

@@ -15,6 +15,7 @@ from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -23,7 +24,6 @@ from viewer.rig.motion.evaluation import Frames, frames_of, rest_translations_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's blend shapes are numbered

@@ -25,9 +25,9 @@ from viewer.diagnostics import Diagnostic
 from viewer.export._family import FamilyFrames, member_of_figure
 from viewer.export._options import MotionOptions
 from viewer.export.amass import padded, write_layout
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.smpl_family import FAMILY
 
 __all__ = ["export_animation"]
 

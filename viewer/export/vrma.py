@@ -30,8 +30,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
-from viewer.rig.motion.joint_positions import joint_positions
+from viewer.rig.motion.evaluation import Frames, frames_of, joint_positions, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.scene import figure_pose

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     )
     from viewer.media.targets import check_folder_target, check_targets
     from viewer.rig.captures.capture import Capture
-    from viewer.rig.figure import Figure
-    from viewer.rig.figure_group import FigureGroup
+    from viewer.rig.figure import Figure, FigureGroup
     from viewer.rig.morph_target import MorphTarget
     from viewer.rig.motion.body_motion import BodyMotion
     from viewer.rig.motion.clip import Clip

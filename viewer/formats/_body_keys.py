@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
 from viewer.phrases import printable
-from viewer.rig.smpl_family import gender_of, model_title
+from viewer.rig.bodies.smpl_family import gender_of, model_title
 
 __all__ = ["GENDERS", "MODELS", "RATES", "gender_in", "model_in", "scale_in"]
 

@@ -77,7 +77,7 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
         return known.content
     n_found, n_read = len(source.diagnostics), len(source.also_read)
     content = reader(source)
-    from viewer.rig.figure_group import FigureGroup
+    from viewer.rig.figure import FigureGroup
 
     if isinstance(content, Figure | FigureGroup):
         also = tuple(source.also_read[n_read:])

@@ -7,7 +7,7 @@ from pathlib import Path
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.media.video_frames import VideoFrames
-from viewer.rig.captures.camera_images import CameraImage
+from viewer.rig.captures.cameras import CameraImage
 
 
 class VideoImages:

@@ -27,9 +27,9 @@ from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
-from viewer.rig.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 
 __all__ = ["has_frames", "read"]
 

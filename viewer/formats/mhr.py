@@ -30,8 +30,8 @@ from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.bodies.model_parameters import PER_JOINT, ModelParameters, driven_dofs
-from viewer.rig.bodies.network_feature import NetworkFeature
-from viewer.rig.bodies.sparse_offsets import SparseOffsets
+from viewer.rig.bodies.offsets import SparseOffsets
+from viewer.rig.bodies.pose_features import NetworkFeature
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.mesh import Mesh, vertex_normals

@@ -55,11 +55,11 @@ from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
 from viewer.rig.retargeting.pose_transfer import JointRotations
-from viewer.rig.smpl_family import ShapeSpace
 
 _HANDS = ("left_hand_pose", "right_hand_pose", "hand_pose")
 _VECTORS = ("own_numbers", "poses", "pose", "fullpose")

@@ -22,14 +22,14 @@ from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
-from viewer.rig.bodies.anatomical_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
-from viewer.rig.bodies.mapped_feature import MappedFeature
+from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
+from viewer.rig.bodies.pose_features import MappedFeature
+from viewer.rig.bodies.smpl_family import ShapeSpace, gender_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, skin_from_entries
-from viewer.rig.smpl_family import ShapeSpace, gender_of
 
 __all__ = ["read"]
 

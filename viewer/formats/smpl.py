@@ -30,8 +30,16 @@ from viewer.phrases import printable
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
-from viewer.rig.bodies.animals import Animal, animal_of, upright_axis
-from viewer.rig.bodies.quaternion_feature import QuaternionFeature
+from viewer.rig.bodies.pose_features import QuaternionFeature
+from viewer.rig.bodies.smpl_family import (
+    Animal,
+    Member,
+    ShapeSpace,
+    animal_of,
+    gender_of,
+    member_of,
+    upright_axis,
+)
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.hands import Hand
@@ -40,7 +48,6 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, skin_from_entries
-from viewer.rig.smpl_family import Member, ShapeSpace, gender_of, member_of
 
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Required keys, which identify such a model."""

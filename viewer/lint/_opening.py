@@ -21,7 +21,7 @@ from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.phrases import printable
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
-from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Track
 from viewer.lint._tracks import track_of
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.ground_height import Ground, ground_of, resting_frames
 from viewer.rig.inspection.soles import extent

@@ -11,7 +11,7 @@ from viewer.lint._tracks import track_of
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.skeleton import joint_labels
 

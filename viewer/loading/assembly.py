@@ -23,8 +23,8 @@ from viewer.loading.placing import (
 )
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
 from viewer.rig.mesh import hidden_parts
-from viewer.rig.motion.animation import Animation
 from viewer.rig.motion.animation_choice import (
     NONE,
     chosen_animation,
@@ -34,9 +34,9 @@ from viewer.rig.motion.animation_choice import (
 )
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.posing.pose_record import PARTS, PoseRecord
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.smpl_family import FAMILY, members_by_numbers, model_of_joints
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder

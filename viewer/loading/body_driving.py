@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.smpl_family import FAMILY
 
 __all__ = ["body_drive", "has_joints", "with_joints"]
 

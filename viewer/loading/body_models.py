@@ -18,8 +18,8 @@ from viewer.loading.pairing import joined_figures
 from viewer.loading.settings import MotionSettings
 from viewer.models import family_model, models_of_kind, named_files
 from viewer.models.bundled import bundled_body
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
-from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["BodyModels", "Choice", "is_body"]
 

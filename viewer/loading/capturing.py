@@ -14,7 +14,8 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.bodies.smpl_family import ShapeSpace
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip, PointLayout
@@ -23,15 +24,13 @@ from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.evaluation import frame_rate, pose_actor
 from viewer.rig.motion.parameter_clip import parameter_clip
-from viewer.rig.motion.retimed import with_rate
-from viewer.rig.motion.sampled_clip import SampledClip, joined
+from viewer.rig.motion.sampled_clip import SampledClip, joined, with_rate
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.smpl_family import ShapeSpace
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _COLORS = (

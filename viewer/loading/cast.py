@@ -12,9 +12,8 @@ from viewer.rig.scene import Actor, free_title
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.captures.camera_images import CameraImages
-    from viewer.rig.captures.camera_view import CameraView
-    from viewer.rig.figure_group import FigureGroup
+    from viewer.rig.captures.cameras import CameraImages, CameraView
+    from viewer.rig.figure import FigureGroup
 
 __all__ = ["Cast"]
 

@@ -16,12 +16,9 @@ from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
 from viewer.rig.cleanup.foot_lock import legs_of, lock_feet
-from viewer.rig.cleanup.frame_rows import Captured, runs_of
-from viewer.rig.cleanup.gap_filling import interpolate_gaps
-from viewer.rig.cleanup.joining_tracks import common_frames, joined_tracks
-from viewer.rig.cleanup.resampling import resampled
+from viewer.rig.cleanup.frames import Captured, resampled, runs_of, trimmed
 from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
-from viewer.rig.cleanup.trimming import trimmed
+from viewer.rig.cleanup.tracks import common_frames, interpolate_gaps, joined_tracks
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.ground_height import resting_height
 from viewer.rig.mesh import bounding_box, box_size

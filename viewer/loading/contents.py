@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from viewer.formats import Content
     from viewer.formats.rig import NamedFiles
     from viewer.rig.captures.capture import Capture
-    from viewer.rig.figure_group import FigureGroup
+    from viewer.rig.figure import FigureGroup
     from viewer.rig.morph_target import MorphTarget
     from viewer.rig.motion.body_motion import BodyMotion
     from viewer.rig.motion.clip import Clip
@@ -183,7 +183,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
-        from viewer.rig.captures.capture_rate import capture_rate
+        from viewer.rig.captures.capture import capture_rate
 
         source.used_options |= {"images", "video"}
         video = _video_rate(settings)

@@ -21,10 +21,9 @@ from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.refusals import map_refusal, model_refusal
 from viewer.loading.settings import MotionSettings
-from viewer.rig.captures.camera_images import CameraImages
-from viewer.rig.captures.camera_view import CameraView
-from viewer.rig.captures.capture import Capture
-from viewer.rig.captures.capture_rate import capture_rate
+from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
+from viewer.rig.captures.cameras import CameraImages, CameraView
+from viewer.rig.captures.capture import Capture, capture_rate
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
@@ -34,7 +33,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.scene import Actor
-from viewer.rig.smpl_family import FAMILY, ShapeSpace
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone

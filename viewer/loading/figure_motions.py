@@ -11,10 +11,9 @@ from viewer.errors import RigError
 from viewer.formats import Source
 from viewer.loading.cast import Cast
 from viewer.loading.skeleton_motions import drive_somebody
-from viewer.rig.figure import Figure
-from viewer.rig.figure_group import FigureGroup
+from viewer.rig.figure import Figure, FigureGroup
 from viewer.rig.motion.animation_choice import chosen_animation
-from viewer.rig.motion.baking import baked
+from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor

@@ -15,8 +15,8 @@ from viewer.rig.units import METRES
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.captures.camera_view import CameraView
-    from viewer.rig.figure_group import FigureGroup
+    from viewer.rig.captures.cameras import CameraView
+    from viewer.rig.figure import FigureGroup
 
 __all__ = [
     "place_side_by_side",
@@ -118,6 +118,6 @@ def placed_views(cast: Cast) -> list[CameraView]:
     placed += [(group.views, placement) for group, placement in placements.items()]
     if not any(views for views, _ in placed):
         return []
-    from viewer.rig.captures.camera_view import placed_view
+    from viewer.rig.captures.cameras import placed_view
 
     return [placed_view(view, placement) for views, placement in placed for view in views]

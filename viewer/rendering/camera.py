@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 
 if TYPE_CHECKING:
-    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.captures.cameras import CameraView
     from viewer.rig.scene import Scene
 
 

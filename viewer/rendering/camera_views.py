@@ -29,8 +29,7 @@ from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.overlay.annotation import Annotation
-    from viewer.rig.captures.camera_images import CameraImage
-    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.captures.cameras import CameraImage, CameraView
 
 _FRAMED = 24  # number of framed positions along the path of a moving camera
 # Frusta.
@@ -75,7 +74,7 @@ def with_cameras(
     """
     if not options.cameras or not scene.views:
         return points
-    from viewer.rig.captures.camera_view import motion_times, view_at
+    from viewer.rig.captures.cameras import motion_times, view_at
     from viewer.rig.captures.carried_view import view_in
 
     cameras = [

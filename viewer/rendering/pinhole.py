@@ -12,7 +12,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.mesh import box_size
 
 if TYPE_CHECKING:
-    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.captures.cameras import CameraView
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
 _UNBOUNDED = 1e9  # value that replaces an infinite distortion

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
-from viewer.rig.bodies.deferred_offsets import DeferredOffsets
-from viewer.rig.bodies.feature import Feature
-from viewer.rig.bodies.shape_space import ShapeSpace
-from viewer.rig.bodies.sparse_offsets import SparseOffsets
-from viewer.rig.expressions import ExpressionRules
-from viewer.rig.material_binds import MaterialBinds
-
-__all__ = [
-    "BlendShapes",
-    "Correctives",
-    "JointRegressor",
-    "corrective_weights",
-    "regress_joints",
-]
-
+from viewer.rig.bodies.offsets import DeferredOffsets, SparseOffsets
+from viewer.rig.bodies.pose_features import Feature
+from viewer.rig.expressions import ExpressionRules, MaterialBinds
 
 _BLOCK = 9  # number of correctives per joint in SMPL
 _LONGEST = 252  # maximum number of rows in one range of correctives; a multiple of _BLOCK
@@ -379,3 +369,24 @@ def _values(offsets: Floats | Deferred) -> Floats:
 def _check_shape(name: str, found: tuple[int, ...], wanted: tuple[int, ...]) -> None:
     if found != wanted:
         raise RigError(f"{name}: expected shape {wanted}, found {found}")
+
+
+class ShapeSpace(Protocol):
+    """Displacement of the rest mesh and joints by weights; 0 for weights of 0. Immutable."""
+
+    def displacement(self, weights: Floats) -> Floats:
+        """Return the displacement of the rest vertices.
+
+        Parameters
+        ----------
+        weights : (N,)
+            N <= S; missing weights are treated as 0.
+
+        Returns
+        -------
+        (V, 3)
+            Figure units.
+        """
+
+    def joint_displacement(self, weights: Floats) -> Floats | None:
+        """Return the displacement of the rest joints, (J, 3); None if a regressor moves them."""

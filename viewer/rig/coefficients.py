@@ -7,9 +7,9 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
-from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["apply_coefficients", "space_misfit", "unused_coefficients"]
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
-
-__all__ = ["OLD_PRESETS", "OVERRIDES", "PROCEDURAL", "ExpressionRules"]
+from viewer.rig.material import TEXTURES, Material, Rim, Texture
 
 PROCEDURAL = {
     "mouth": ("aa", "ih", "ou", "ee", "oh"),
@@ -15,10 +19,8 @@ PROCEDURAL = {
     "look": ("lookUp", "lookDown", "lookLeft", "lookRight"),
 }
 """Expressions that others can suppress, by kind (VRM 1.0, "Procedural override")."""
-
 OVERRIDES = ("none", "block", "blend")
 """Effect on other expressions: none; off while this one is above 0; faded out by its weight."""
-
 OLD_PRESETS = {
     **{"neutral": "neutral", "joy": "happy", "angry": "angry", "sorrow": "sad", "fun": "relaxed"},
     **{"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"},
@@ -26,7 +28,6 @@ OLD_PRESETS = {
     **{f"look{way.lower()}": f"look{way}" for way in ("Up", "Down", "Left", "Right")},
 }
 """Names of expressions in VRM 0.x, in lower case, and their names in VRM 1.0."""
-
 _HALF = 0.5  # a binary expression is fully on above this weight, and off otherwise
 
 
@@ -93,3 +94,140 @@ class ExpressionRules:
         weights = weights.copy()
         weights[self.rows[known]] = result[known]
         return weights
+
+
+COLOR_KINDS = (
+    *("color", "emissionColor", "shadeColor", "rimColor", "matcapColor", "outlineColor"),
+)
+"""Colours that expressions change, by their names in VRM 1.0."""
+TRANSFORM = "transform"
+"""Kind of the placement of all textures of a material, except its matcap."""
+_STRAIGHT = 1e-9  # sine of the largest angle of a transform without rotation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaterialBinds:
+    """Targets of properties of materials: x = x_0 + sum_b w_b (t_b - x_0), with the weights w.
+
+    Attributes
+    ----------
+    shapes : (B,) int32
+        Blend shape that has the weight.
+    materials : (B,) int32
+        Material of the mesh.
+    kinds : tuple of B str
+        Entry of ``COLOR_KINDS``, or ``TRANSFORM``.
+    targets : (B, 4)
+        Linear colour and opacity, which only ``"color"`` uses; or scale and offset of texture
+        coordinates whose origin is at the top, as in glTF.
+    """
+
+    shapes: Ints
+    materials: Ints
+    kinds: tuple[str, ...]
+    targets: Floats
+
+    def __post_init__(self) -> None:
+        count = len(self.kinds)
+        for name in ("shapes", "materials"):
+            values = frozen(name, getattr(self, name), (count,), np.int32)
+            object.__setattr__(self, name, values)
+        object.__setattr__(self, "targets", frozen("targets", self.targets, (count, 4)))
+        unknown = set(self.kinds) - {*COLOR_KINDS, TRANSFORM}
+        if unknown:
+            raise RigError(f"kinds: found {', '.join(sorted(unknown))}")
+
+    def changed(self, materials: Sequence[Material], weights: Floats) -> dict[int, Material]:
+        """Return the materials that differ from the given ones, by index.
+
+        Parameters
+        ----------
+        materials : sequence of Material
+            Materials of the mesh.
+        weights : (N,)
+            Displayed weights of the blend shapes; missing weights are treated as 0.
+        """
+        whole = np.zeros(max(int(self.shapes.max(initial=-1)) + 1, len(weights)))
+        whole[: len(weights)] = weights
+        active = whole[self.shapes]
+        found: dict[int, Material] = {}
+        for index in np.unique(self.materials[active != 0.0]).tolist():
+            rows = np.flatnonzero((self.materials == index) & (active != 0.0)).tolist()
+            given = [(self.kinds[row], float(active[row]), self.targets[row]) for row in rows]
+            found[index] = _changed(materials[index], given)
+        return found
+
+    @property
+    def n_materials(self) -> dict[int, int]:
+        """Number of materials that each blend shape changes."""
+        pairs = {*zip(self.shapes.tolist(), self.materials.tolist(), strict=True)}
+        counts: dict[int, int] = {}
+        for shape, _ in pairs:
+            counts[shape] = counts.get(shape, 0) + 1
+        return counts
+
+
+def _changed(material: Material, binds: list[tuple[str, float, Floats]]) -> Material:
+    """Return a material with weighted targets of its properties."""
+
+    def mixed(kind: str, value: Sequence[float], most: float) -> Any:
+        start = np.array(value)
+        found = start.copy()
+        for name, weight, target in binds:
+            if name == kind:
+                found += weight * (target[: len(start)] - start)
+        return tuple(found.clip(0.0, most).tolist())
+
+    values: dict[str, Any] = {
+        "base_color": mixed("color", material.base_color or (1.0, 1.0, 1.0, 1.0), 1.0),
+        "emissive": mixed("emissionColor", material.emissive, np.inf),
+    }
+    if material.shade_color is not None:
+        values["shade_color"] = mixed("shadeColor", material.shade_color, 1.0)
+        rim = material.rim or Rim()
+        color = mixed("rimColor", rim.color, np.inf)
+        factor = mixed("matcapColor", rim.matcap_factor, np.inf)
+        values["rim"] = replace(rim, color=color, matcap_factor=factor)
+    if material.outline is not None:
+        color = mixed("outlineColor", material.outline.color, 1.0)
+        values["outline"] = replace(material.outline, color=color)
+    moves = [(weight, target) for kind, weight, target in binds if kind == TRANSFORM]
+    return replace(material, **_moved(material, values, moves) if moves else values)
+
+
+def _moved(
+    material: Material, values: dict[str, Any], moves: list[tuple[float, Floats]]
+) -> dict[str, Any]:
+    """Return the properties with placed textures."""
+    for name in TEXTURES:
+        texture = getattr(material, name)
+        if texture is not None:
+            values[name] = _placed(texture, moves)
+    for name in ("rim", "outline"):
+        owner = values.get(name)
+        if owner is not None and owner.texture is not None:
+            values[name] = replace(owner, texture=_placed(owner.texture, moves))
+    return values
+
+
+def _placed(texture: Texture, moves: list[tuple[float, Floats]]) -> Texture:
+    """Return a texture with weighted targets of its scale and offset; its rotation is unchanged.
+
+    With v flipped, M = [[a, -b, b + x], [-c, d, 1 - d - y]] for the linear part (a, b; c, d) = R S
+    and the offset (x, y).
+    """
+    matrix = texture.matrix
+    (a, b), (c, d) = (matrix[0, 0], -matrix[0, 1]), (-matrix[1, 0], matrix[1, 1])
+    linear, scale = np.array([[a, b], [c, d]]), np.hypot([a, b], [c, d])
+    scale[1] *= -1.0 if a * d - b * c < 0.0 else 1.0
+    if max(abs(b), abs(c)) <= _STRAIGHT * np.abs(scale).max():
+        # A negative scale along u would be a rotation by 180 degrees, too.
+        scale = np.array([a, d])
+    rotation = linear / scale if scale.all() else np.eye(2)
+    start = np.array([*scale, matrix[0, 2] - b, 1.0 - d - matrix[1, 2]])
+    found = start.copy()
+    for weight, target in moves:
+        found += weight * (target - start)
+    (a, b), (c, d) = rotation * found[:2]
+    placed = np.array([[a, -b, b + found[2]], [-c, d, 1.0 - d - found[3]]])
+    return replace(texture, transform=placed)

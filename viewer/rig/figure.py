@@ -9,25 +9,24 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.smpl_family import ShapeSpace
 
 if TYPE_CHECKING:
     from viewer.diagnostics import Diagnostic
     from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
     from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
     from viewer.rig.bodies.model_parameters import ModelParameters
+    from viewer.rig.captures.cameras import CameraView
     from viewer.rig.captures.points import PointLayout
     from viewer.rig.file_record import FileRecord
     from viewer.rig.hands import Hand
-    from viewer.rig.motion.animation import Animation
+    from viewer.rig.motion.transform_clip import Animation
     from viewer.rig.posing.pose_vector import PoseLayout
     from viewer.rig.skin import Skin
-
-__all__ = ["AttachedFigure", "Figure", "skeleton_points"]
 
 
 class AttachedFigure(NamedTuple):
@@ -252,3 +251,26 @@ def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
     corners = skeleton.boxes[:, choice, np.arange(3)]
     placed = np.einsum("jab,jcb->jca", world[:, :3, :3], corners) + world[:, None, :3, 3]
     return np.concatenate([world[:, :3, 3], placed.reshape(-1, 3)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FigureGroup:
+    """All figures of a file, in one common space, and its cameras.
+
+    Attributes
+    ----------
+    name : str
+        Title of the group.
+    figures : tuple of Figure
+        At least one; all have the same up axis and unit.
+    views : tuple of CameraView
+        Cameras of the file, in the space of the figures.
+    """
+
+    name: str
+    figures: tuple[Figure, ...]
+    views: tuple[CameraView, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.figures:
+            raise RigError(f"{self.name}: expected at least one figure, found none")

@@ -10,7 +10,7 @@ from viewer.errors import RigError
 from viewer.rig.annotations import Keypoints, keypoint_positions
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives
-from viewer.rig.bodies.sparse_offsets import SparseOffsets
+from viewer.rig.bodies.offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh

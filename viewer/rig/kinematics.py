@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.pose import Pose, local_matrices
-from viewer.rig.posed_skeleton import PosedSkeleton
+from viewer.rig.pose import Pose, PosedSkeleton, local_matrices
 from viewer.rig.skeleton import Skeleton
 
 __all__ = [

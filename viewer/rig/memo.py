@@ -8,7 +8,9 @@ from threading import Lock
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-__all__ = ["Memo"]
+import numpy as np
+
+from viewer.rig.arrays import Floats
 
 _Owner = TypeVar("_Owner")
 _Value = TypeVar("_Value")
@@ -51,3 +53,60 @@ class Memo(Generic[_Owner, _Value]):
                 del known[next(iter(known))]
             known[key] = value
         return value
+
+
+class NumberKey:
+    """A snapshot of the contents of some arrays.
+
+    Keys of equal contents are equal, and ``array`` returns the contents.
+
+    Parameters
+    ----------
+    *arrays : (...)
+        Arrays of any shapes.
+
+    >>> angles = np.zeros(3)
+    >>> key = NumberKey(angles)
+    >>> angles[1] = 0.5
+    >>> key.updated(angles) is key, key.updated(np.zeros(3)) is key, key == NumberKey(np.zeros(3))
+    (False, True, True)
+    """
+
+    __slots__ = ("_parts",)
+
+    def __init__(self, *arrays: Floats) -> None:
+        self._parts = tuple(map(bytearray, arrays))
+
+    def updated(self, *arrays: Floats) -> NumberKey:
+        """Return the key of the arrays' current contents: this key if they are bitwise equal.
+
+        Arrays are compared without copying, and only those that changed are copied.
+        """
+        old = self._parts
+        if len(arrays) != len(old):
+            return NumberKey(*arrays)
+        changed = False
+        parts = []
+        for part, array in zip(old, arrays, strict=True):
+            packed = array if array.flags.c_contiguous else np.ascontiguousarray(array)
+            # A bytearray compares with the array's memory directly, without a temporary array.
+            if part != packed:
+                part, changed = bytearray(packed), True
+            parts.append(part)
+        if not changed:
+            return self
+        key = NumberKey()
+        key._parts = tuple(parts)
+        return key
+
+    def array(self, index: int) -> Floats:
+        """Return a flat copy of the contents of one of the arrays: (N,)."""
+        return np.array(np.frombuffer(self._parts[index]))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, NumberKey):
+            return NotImplemented
+        return self is other or self._parts == other._parts
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(bytes, self._parts)))

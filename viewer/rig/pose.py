@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,11 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.memo import Memo
-from viewer.rig.number_key import NumberKey
-from viewer.rig.posed_skeleton import PosedSkeleton
+from viewer.rig.memo import Memo, NumberKey
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
+
+if TYPE_CHECKING:
+    from viewer.rig.skin import Skin
 
 _orders: Memo[Skeleton, _AxisProducts] = Memo()
 
@@ -315,3 +316,46 @@ def _by_rank(joints: Ints) -> list[_Indices]:
     starts = np.maximum.accumulate(np.where(is_first, np.arange(len(ordered)), 0))
     rank = np.arange(len(ordered)) - starts
     return [order[rank == number] for number in range(int(rank.max(initial=-1)) + 1)]
+
+
+class PosedSkeleton:
+    """Read-only world and skinning matrices of one pose, each computed once.
+
+    A pose caches its latest instance; see ``viewer.rig.kinematics.posed_skeleton``.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Skeleton of the shaped figure.
+    key : NumberKey
+        The pose's ``skinning_key``.
+    world : (J, 4, 4)
+        Joint-to-figure matrices of that pose; made read-only.
+    """
+
+    __slots__ = ("_palette", "_skin", "key", "skeleton", "world")
+
+    def __init__(self, skeleton: Skeleton, key: NumberKey, world: Floats) -> None:
+        self.skeleton, self.key, self.world = skeleton, key, world
+        world.flags.writeable = False
+        self._skin: Skin | None = None
+        self._palette: Floats = world
+
+    def palette(self, skin: Skin) -> Floats:
+        """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
+
+        Parameters
+        ----------
+        skin : Skin
+            Skin of the shaped figure.
+
+        Returns
+        -------
+        (J, 4, 4)
+            Bind-to-posed matrices, read-only.
+        """
+        if self._skin is not skin:
+            self._palette = self.world @ skin.inverse_bind
+            self._palette.flags.writeable = False
+            self._skin = skin
+        return self._palette

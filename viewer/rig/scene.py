@@ -13,12 +13,12 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped_skeleton
-from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = [
     "Actor",
@@ -36,8 +36,7 @@ __all__ = [
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from viewer.rig.captures.camera_images import CameraImages
-    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.captures.cameras import CameraImages, CameraView
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.sampled_clip import SampledClip

@@ -16,7 +16,7 @@ from viewer.loading.cleaning import clean_up
 from viewer.loading.cleaning_settings import CleanUp
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing

@@ -16,7 +16,7 @@ from viewer.app.playback.animations import choose_animation, played
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.loading import Contents, begin
-from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, Scene, figure_pose
 
 SIZE = (1180, 760)

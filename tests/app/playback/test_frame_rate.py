@@ -13,7 +13,7 @@ from viewer.app.files.stream import keep_rate
 from viewer.app.playback.timeline_panel import foreign_rate, rate_of, set_rate
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import with_rate
 from viewer.rig.scene import Actor, Scene
 
 SIZE = (1280, 800)

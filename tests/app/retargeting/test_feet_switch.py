@@ -24,7 +24,7 @@ from viewer.loading import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import with_rate
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip

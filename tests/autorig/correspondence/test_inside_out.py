@@ -8,7 +8,7 @@ pytest.importorskip("scipy")
 
 from dataclasses import replace
 
-from viewer.autorig.correspondence.inside_out import with_reversed_winding, wound_backwards
+from viewer.autorig.correspondence import with_reversed_winding, wound_backwards
 from viewer.autorig.surface.welding import weld
 from viewer.rig.mesh import volume
 

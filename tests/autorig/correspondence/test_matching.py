@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from viewer.autorig.correspondence.matching import MatchSettings, Template, match, sheet_normals
+from viewer.autorig.correspondence import MatchSettings, Template, match, sheet_normals
 from viewer.autorig.surface.welding import weld
 from viewer.errors import RigError
 

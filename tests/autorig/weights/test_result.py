@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from faults import told
 
-from viewer.autorig.correspondence.matching import Matches
+from viewer.autorig.correspondence import Matches
 from viewer.autorig.weights.result import RigidIslands, match_lines, nothing_matched, rigid_lines
 from viewer.rig.geometry.closest_point import SurfacePoints
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from faults import told
 
-from viewer.autorig.correspondence.matching import MatchSettings, Template
+from viewer.autorig.correspondence import MatchSettings, Template
 from viewer.autorig.weights.weight_transfer import (
     WeightSettings,
     nearest_weights,

@@ -14,7 +14,7 @@ from two_parts import clips, two_parts
 
 import viewer
 from viewer.export import export_clips, export_figures
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rig.scene import Actor, Scene

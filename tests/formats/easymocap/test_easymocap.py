@@ -8,8 +8,8 @@ from formats.capture_files import body, noticed, opened, points, rows_of, waves,
 from numpy.testing import assert_array_equal
 
 from viewer.formats import Source, detect, read
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.captures.capture import Capture
-from viewer.rig.smpl_family import FAMILY
 
 BODY = FAMILY[24].names[:22]
 FACE = ("jaw", "left_eye", "right_eye")

@@ -13,8 +13,7 @@ from spec_evaluator import Evaluator
 
 from viewer.formats import Source
 from viewer.formats.gltf import read
-from viewer.rig.figure import Figure
-from viewer.rig.figure_group import FigureGroup
+from viewer.rig.figure import Figure, FigureGroup
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.skinning import deform
 

@@ -13,7 +13,7 @@ from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._scene_graph.grouping import group_nodes
 from viewer.loading.assembly import assemble
 from viewer.loading.contents import Contents
-from viewer.rig.figure_group import FigureGroup
+from viewer.rig.figure import FigureGroup
 
 EYE = (NodeCamera("eye", 0.8, 1.5),)
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source, read
-from viewer.rig.bodies.anatomical_posing import DOF_NAMES, JOINTS
+from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS
 from viewer.rig.motion.instances import worlds
 from viewer.rig.posing.pose_vector import read_vector
 from viewer.rig.scene import figure_pose

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.errors import FormatError
-from viewer.rig.bodies.animals import animal_of
+from viewer.rig.bodies.smpl_family import animal_of
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.posing.pose_vector import read_vector
 from viewer.rig.scene import figure_pose

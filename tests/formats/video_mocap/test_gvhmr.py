@@ -23,7 +23,7 @@ from viewer.commands.info import describe
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import open_results
-from viewer.rig.captures.camera_view import view_at
+from viewer.rig.captures.cameras import view_at
 
 SPACES = {"world": "smpl_params_global", "camera": "smpl_params_incam"}
 

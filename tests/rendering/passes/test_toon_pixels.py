@@ -26,10 +26,9 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.expressions import ExpressionRules
+from viewer.rig.expressions import ExpressionRules, MaterialBinds
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Outline, Rim
-from viewer.rig.material_binds import MaterialBinds
 from viewer.rig.scene import Actor, Scene, scene_box
 
 DARK = (0.0, 0.0, 0.0)

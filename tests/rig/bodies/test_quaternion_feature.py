@@ -7,7 +7,7 @@ from rig.hand_made import mesh, skeleton
 
 from viewer.errors import RigError
 from viewer.rig.blendshapes import Correctives
-from viewer.rig.bodies.quaternion_feature import QuaternionFeature
+from viewer.rig.bodies.pose_features import QuaternionFeature
 from viewer.rig.figure import Figure
 from viewer.rig.pose import rest_pose
 from viewer.rig.shape import pose_weights, rest_positions

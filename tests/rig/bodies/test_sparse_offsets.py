@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.rig.blendshapes import Correctives
-from viewer.rig.bodies.sparse_offsets import SparseOffsets
+from viewer.rig.bodies.offsets import SparseOffsets
 
 ROWS, VERTICES = 200, 50
 

@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.captures.camera_view import (
-    CameraMotion,
-    CameraView,
-    motion_times,
-    placed_view,
-    view_at,
-)
+from viewer.rig.captures.cameras import CameraMotion, CameraView, motion_times, placed_view, view_at
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.motion.timing import Timing
 

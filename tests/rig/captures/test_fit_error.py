@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rig.hand_made import mesh, skeleton
 
-from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
-from viewer.rig.captures.keypoint_layouts import keypoint_layout
+from viewer.rig.captures.keypoint_layouts import fitted_body, keypoint_distances, keypoint_layout
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from viewer.errors import RigError
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.captures.keypoint_layouts import (
     TITLES,
     joined_layout,
     keypoint_layout,
     matching_joints,
 )
-from viewer.rig.smpl_family import FAMILY
 
 
 def limbs(layout):

@@ -5,7 +5,7 @@ from numpy.testing import assert_allclose
 from turning import angles_of, turning
 
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.gap_filling import Gaps, inner_gaps, interpolate_gaps
+from viewer.rig.cleanup.tracks import Gaps, inner_gaps, interpolate_gaps
 
 
 def test_uniform_rotation_is_interpolated_exactly():

@@ -9,7 +9,7 @@ from turning import angles_of, turning
 
 from viewer.errors import RigError
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.joining_tracks import common_frames, joined_tracks
+from viewer.rig.cleanup.tracks import common_frames, joined_tracks
 
 EARLY = turning(np.array([0.0, 0.1, 0.2]), rows=[0, 1, 2, -1, -1, -1])
 LATE = turning(np.array([1.2, 1.3, 1.4]), rows=[-1, -1, 0, 1, 2, -1])

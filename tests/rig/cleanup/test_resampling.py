@@ -7,8 +7,7 @@ from turning import angles_of, turning
 
 from viewer.errors import RigError
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.resampling import resampled
-from viewer.rig.cleanup.trimming import trimmed
+from viewer.rig.cleanup.frames import resampled, trimmed
 
 
 def test_original_frames_are_exact_and_new_ones_are_on_the_arc():

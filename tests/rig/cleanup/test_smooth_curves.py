@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.cleanup.smooth_curves import smooth_curves
+from viewer.rig.cleanup.curves import smooth_curves
 
 SPAN = 4.0
 

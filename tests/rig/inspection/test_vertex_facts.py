@@ -13,8 +13,12 @@ from viewer.errors import RigError
 from viewer.rig.annotations import BodyParts
 from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.single_vertices import deform_vertices
-from viewer.rig.inspection.vertex_facts import facts_text, nearest_corner, vertex_facts
+from viewer.rig.inspection.single_vertices import (
+    deform_vertices,
+    facts_text,
+    nearest_corner,
+    vertex_facts,
+)
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists

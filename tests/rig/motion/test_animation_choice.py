@@ -8,7 +8,6 @@ from numpy.testing import assert_array_equal
 from rig.animated import animated_leg, animation, bow, channel, clip_of, wave
 
 from viewer.errors import FormatError, RigError
-from viewer.rig.motion.animation import Animation
 from viewer.rig.motion.animation_choice import (
     animation_labels,
     chosen_animation,
@@ -16,6 +15,7 @@ from viewer.rig.motion.animation_choice import (
     play_animation,
 )
 from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, figure_pose
 
 

@@ -10,12 +10,12 @@ from numpy.testing import assert_allclose
 from rig.hand_made import skeleton
 
 from viewer.errors import RigError
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import deform
-from viewer.rig.smpl_family import FAMILY
 
 ATOL = 1e-12  # metres; a hundred rounding errors of values near 1
 TURN, MOVE = np.array([0.7, -1.9, 0.4]), np.array([0.5, 2.0, -1.0])

@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import Frames, world_frames
-from viewer.rig.motion.joint_positions import joint_positions
+from viewer.rig.motion.evaluation import Frames, joint_positions, world_frames
 from viewer.rig.skeleton import ball_skeleton
 
 PARENTS = np.array([-1, 0, 1, 0, -1, 4], dtype=np.int32)

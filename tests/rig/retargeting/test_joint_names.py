@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rig.retargeting.joint_tables import TABLES
 
+from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.retargeting.joint_names import canonical_names
-from viewer.rig.smpl_family import FAMILY
 
 
 def tree(text: str) -> tuple[list[str], list[str], np.ndarray]:

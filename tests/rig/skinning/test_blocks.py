@@ -11,8 +11,9 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import figure_pose
 from viewer.rig.skin import skin_from_lists
-from viewer.rig.skinning import Skinning, _blocks, deform, deform_frames, joint_matrices, lbs
-from viewer.rig.skinning._blocks import blocks_of
+from viewer.rig.skinning import Skinning, deform, deform_frames, joint_matrices, lbs
+from viewer.rig.skinning import lbs as _blocks
+from viewer.rig.skinning.lbs import blocks_of
 
 ROUNDING = 2e-14  # for sums of about ten terms of size 10
 

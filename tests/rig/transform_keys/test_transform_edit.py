@@ -12,6 +12,7 @@ from viewer.rig.transform_keys.edit import (
     add_transform_key,
     added_key,
     delete_transform_keys,
+    key_transform_pose,
     move_transform_keys,
     set_clip_interpolation,
     set_transform_key,
@@ -19,7 +20,6 @@ from viewer.rig.transform_keys.edit import (
     value_at,
     with_interpolation,
 )
-from viewer.rig.transform_keys.keying import key_transform_pose
 from viewer.rig.transform_keys.rows import row_values, rows_of
 from viewer.rig.transform_keys.sampling import sample_transforms
 

@@ -10,7 +10,6 @@ from rig.animated import STACKED, about, animated_leg, channel, clip_of, leg, pl
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.baking import baked
 from viewer.rig.motion.evaluation import (
     frames_between,
     frames_of,
@@ -22,7 +21,7 @@ from viewer.rig.motion.evaluation import (
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.motion.motion_paths import motion_path, path_times
 from viewer.rig.motion.onion import onion
-from viewer.rig.motion.sampled_animation import frame_range, sample_animation
+from viewer.rig.motion.sampled_animation import baked, frame_range, sample_animation
 from viewer.rig.motion.single_frame import single_frame
 from viewer.rig.pose import joint_rotations, local_matrices
 from viewer.rig.scene import Actor, Scene, figure_pose

@@ -20,7 +20,7 @@ from viewer.app.core.widgets import (
 from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
 from viewer.errors import ViewerError
 from viewer.phrases import printable
-from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
+from viewer.rig.captures.keypoint_layouts import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
 from viewer.rig.motion.spring_motion import has_springs, release_springs, springs_for
 from viewer.rig.scalars import length_unit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewer.app.core.state import AppState
 from viewer.rendering.camera import Camera, camera_from_view, follow_view
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.carried_view import view_in
 
 __all__ = ["follow_calibrated", "look_through_view"]

@@ -7,8 +7,7 @@ from functools import partial
 
 from viewer.data_classes import dataclass
 from viewer.rig.figure import Figure
-from viewer.rig.motion.animation import Animation
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.transform_clip import Animation, TransformClip
 from viewer.rig.scene import Actor
 
 __all__ = ["Animations", "edited_aside", "keep_edited", "with_edited_keys"]

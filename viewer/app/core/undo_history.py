@@ -12,8 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.retimed import with_rate
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.pose import Pose, PoseKey, pose_key, pose_of
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor, Motion, Scene, Swinging

@@ -31,13 +31,14 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.transform_keys.edit import (
     add_transform_key,
     delete_transform_keys,
+    joint_values,
+    key_transform_pose,
     move_transform_keys,
     set_clip_interpolation,
     set_clip_range,
     set_transform_key,
     set_transform_slope,
 )
-from viewer.rig.transform_keys.keying import joint_values, key_transform_pose
 from viewer.rig.transform_keys.rows import TransformRow, key_values, row_values, rows_of
 
 _GAP = 1e-3  # minimum distance between dragged keys, seconds

@@ -36,10 +36,11 @@ from viewer.export.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import printable
 from viewer.progress import receiving
+from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.own_animations import has_own_animations, keeps_keys, own_animations
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.timing import frame_at
@@ -47,7 +48,6 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.smpl_family import member_of
 
 
 @dataclass(slots=True)

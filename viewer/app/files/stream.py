@@ -14,8 +14,7 @@ from viewer.progress import Cancelled, receiving
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frame_rate
-from viewer.rig.motion.retimed import with_rate
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor
 

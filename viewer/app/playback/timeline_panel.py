@@ -30,8 +30,7 @@ from viewer.app.playback.tracks import draw_tracks
 from viewer.rig.captures.points import PointClip
 from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.retimed import with_rate
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Motion

@@ -14,8 +14,7 @@ from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.progress import Receiver, receiving
 from viewer.rig.motion.evaluation import frame_rate
-from viewer.rig.motion.retimed import with_rate
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor

@@ -19,12 +19,11 @@ from viewer.export._rigged_files import files_of, write_rigged
 from viewer.phrases import printable
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.comparison.pairs import Pairs
-from viewer.rig.comparison.weights import row_distances
+from viewer.rig.comparison.pairs import Pairs, row_distances
 from viewer.rig.hierarchy import depth_first
-from viewer.rig.motion.baking import baked
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.evaluation import JointMotion
+from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose

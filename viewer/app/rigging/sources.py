@@ -13,9 +13,9 @@ from viewer.phrases import one_of, printable
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import pose_key
-from viewer.rig.posing.posed_mesh import posed_mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skin import Skin
+from viewer.rig.skinning import posed_mesh
 
 __all__ = [
     "choose_target",

@@ -34,8 +34,8 @@ from viewer.app.rigging.state import (
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings, alignment_lines
-from viewer.autorig.correspondence.matching import MatchSettings, match
-from viewer.autorig.correspondence.matching import Template as Surface
+from viewer.autorig.correspondence import MatchSettings, match
+from viewer.autorig.correspondence import Template as Surface
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import METHODS, TransferSettings

@@ -25,8 +25,12 @@ from viewer.rendering.picking import Pick
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.inspection.single_vertices import deform_vertices
-from viewer.rig.inspection.vertex_facts import facts_text, nearest_corner, vertex_facts
+from viewer.rig.inspection.single_vertices import (
+    deform_vertices,
+    facts_text,
+    nearest_corner,
+    vertex_facts,
+)
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning

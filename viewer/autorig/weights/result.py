@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.autorig.correspondence.matching import Matches
+from viewer.autorig.correspondence import Matches
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Bools, Floats, Ints

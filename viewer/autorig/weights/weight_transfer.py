@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.autorig.correspondence.inside_out import wound_backwards
-from viewer.autorig.correspondence.matching import Matches, MatchSettings, Template, match
+from viewer.autorig.correspondence import Matches, MatchSettings, Template, match, wound_backwards
 from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import Welded, edges, weld
 from viewer.autorig.weights.result import (

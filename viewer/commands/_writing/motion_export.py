@@ -33,8 +33,8 @@ from viewer.rig.arrays import Bools
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.captures.sampled_points import SampledPoints, sample_upright_points
+from viewer.rig.motion.animation_choice import keeps_keys
 from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning

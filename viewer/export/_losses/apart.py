@@ -21,7 +21,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
-from viewer.rig.skinning._blocks import blocks_of
+from viewer.rig.skinning.lbs import blocks_of
 
 _BLOCK = 128  # poses per block, whose matrices fit into the processor's cache
 _BARE_BLOCK = 512  # poses per block of skeletons without a mesh

@@ -19,8 +19,13 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.evaluation import Frames, frames_between, pose_of, world_frames
-from viewer.rig.motion.joint_positions import joint_positions
+from viewer.rig.motion.evaluation import (
+    Frames,
+    frames_between,
+    joint_positions,
+    pose_of,
+    world_frames,
+)
 from viewer.rig.shape import joint_shifts
 from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
 from viewer.rig.skinning import Skinning, deform, skin_used

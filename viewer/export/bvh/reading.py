@@ -32,10 +32,10 @@ from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
     frames_of,
+    joint_positions,
     rest_translations_of,
     world_frames,
 )
-from viewer.rig.motion.joint_positions import joint_positions
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.shape import joint_shifts
 from viewer.rig.skinning import Skinning

@@ -41,7 +41,7 @@ from viewer.export.gltf.sampled import (
 )
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraPath, CameraView
+from viewer.rig.captures.cameras import CameraPath, CameraView
 from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations

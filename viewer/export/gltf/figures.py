@@ -30,8 +30,8 @@ from viewer.export.gltf.skin import shape_of
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
+from viewer.rig.motion.animation_choice import still_pose
 from viewer.rig.motion.evaluation import Frames, frames_of
-from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose

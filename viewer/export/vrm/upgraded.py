@@ -20,10 +20,9 @@ from viewer.formats._vrm.materials import old_binds
 from viewer.formats._vrm.old import modern_toon
 from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.expressions import OLD_PRESETS
+from viewer.rig.expressions import OLD_PRESETS, TRANSFORM
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
-from viewer.rig.material_binds import TRANSFORM
 from viewer.rig.springs.springs import Springs
 
 _MUSCLES = {

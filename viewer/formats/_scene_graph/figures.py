@@ -26,10 +26,9 @@ from viewer.formats._scene_graph.surfaces import (
 )
 from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure
-from viewer.rig.figure_group import FigureGroup
+from viewer.rig.figure import Figure, FigureGroup
 from viewer.rig.file_record import FileRecord, VrmRecord
-from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.skeleton import Skeleton
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ from typing import TypeAlias
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeAnimation, NodeChannel
 from viewer.rig.arrays import Ints
-from viewer.rig.motion.animation import Animation
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rig.motion.transform_clip import Animation, TransformChannel, TransformClip
 
 Reader: TypeAlias = Callable[[], tuple[NodeChannel, ...]]
 """Returns the channels of an animation."""

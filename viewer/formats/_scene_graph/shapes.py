@@ -20,9 +20,8 @@ from viewer.formats._scene_graph.surfaces import (
 )
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.bodies.deferred_offsets import DeferredOffsets
-from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
-from viewer.rig.material_binds import MaterialBinds
+from viewer.rig.bodies.offsets import DeferredOffsets
+from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules, MaterialBinds
 
 
 def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> dict[int, Ints]:

@@ -19,9 +19,9 @@ from viewer.formats._scene_graph.content import (
 from viewer.formats._scene_graph.grouping import Members
 from viewer.formats._scene_graph.joints import Joints, make_joints, rest_worlds, skeleton_of
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraMount, CameraPath, CameraView, extrinsics
+from viewer.rig.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
 from viewer.rig.file_record import FileRecord
-from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import Animation
 
 _HEIGHT = 1080  # height of a view, pixels
 _ASPECT = 16.0 / 9.0  # aspect ratio of cameras that specify none

@@ -19,7 +19,7 @@ import numpy as np
 
 from viewer.formats._vrm.parts import is_index, listed, part, rows_of
 from viewer.rig.arrays import Floats
-from viewer.rig.material_binds import COLOR_KINDS, TRANSFORM
+from viewer.rig.expressions import COLOR_KINDS, TRANSFORM
 from viewer.rig.srgb import decode_srgb
 
 Bind = tuple[int, str, Floats]

@@ -27,9 +27,9 @@ from viewer.formats.easymocap.json_frames import (
     width_of,
 )
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
-from viewer.rig.smpl_family import FAMILY, members_by_numbers
 
 _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]

@@ -37,7 +37,7 @@ from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 
 _INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"

@@ -11,8 +11,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.media.image import decode_picture, picture_dimensions
 from viewer.phrases import listed, printable
-from viewer.rig.captures.camera_images import CameraImage
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraImage, CameraView
 
 _FOLDER = "images"
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")

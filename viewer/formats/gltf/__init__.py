@@ -35,7 +35,7 @@ from viewer.formats.gltf.nodes import (
     shown_scene,
 )
 from viewer.formats.gltf.toon import stored_textures, stored_toon
-from viewer.rig.figure_group import FigureGroup
+from viewer.rig.figure import FigureGroup
 
 if TYPE_CHECKING:
     from viewer.rig.motion.skeleton_motion import SkeletonMotion

@@ -55,8 +55,8 @@ from viewer.formats.video_mocap.numbers import (
 from viewer.formats.video_mocap.results import Results, Track
 from viewer.phrases import counted, printable
 from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.bodies.smpl_family import FAMILY, gender_of, members_by_numbers
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
-from viewer.rig.smpl_family import FAMILY, gender_of, members_by_numbers
 
 _AMASS = {
     *("poses", "pose", "fullpose", "smpl_poses"),

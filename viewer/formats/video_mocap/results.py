@@ -15,16 +15,15 @@ from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_
 from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.camera_view import CameraMotion, CameraView
-from viewer.rig.captures.capture import Capture, CapturePart, RestRoots
-from viewer.rig.captures.capture_rate import capture_rate
+from viewer.rig.bodies.smpl_family import ShapeSpace
+from viewer.rig.captures.cameras import CameraMotion, CameraView
+from viewer.rig.captures.capture import Capture, CapturePart, RestRoots, capture_rate
 from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.parameter_clip import ParameterMotion
 from viewer.rig.motion.timing import Timing
-from viewer.rig.smpl_family import ShapeSpace
 
 _LARGEST = 1 << 20  # maximum width and height of a video, pixels
 _MOST_FRAMES = 1 << 22  # maximum number of frames: 38 hours at 30 frames per second

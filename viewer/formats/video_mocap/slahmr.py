@@ -25,7 +25,7 @@ from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, has, intrinsics_of, rotations_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track, moved
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.smpl_family import members_by_numbers
+from viewer.rig.bodies.smpl_family import members_by_numbers
 
 _RESULT = re.compile(r".*?_?(\d{1,9})_(?:\w+_)?world_results\.npz")
 _TRACKS = "track_info.json"

@@ -34,7 +34,7 @@ from viewer.formats.video_mocap.numbers import (
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track, inverse, moved
 from viewer.rig.arrays import Floats
-from viewer.rig.smpl_family import FAMILY
+from viewer.rig.bodies.smpl_family import FAMILY
 
 _TRACK = re.compile(r"hps_track_(\d{1,6})\.npy")
 _FOLDER, _CAMERA = "hps", "camera.npy"

@@ -25,7 +25,7 @@ from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_su
 from viewer.rendering.gpu.upload import buffer, float32, offset_texture, pair_texture
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import active_rows
-from viewer.rig.bodies.sparse_offsets import SparseOffsets
+from viewer.rig.bodies.offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.shell import Shell, shell_of
 from viewer.rig.mesh import bounding_box, visible_vertices

@@ -11,8 +11,7 @@ from viewer.rendering.gpu.upload import checked
 from viewer.rendering.pinhole import frustum_corners, picture_size
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_images import CameraImage
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraImage, CameraView
 
 _UNIT = 0
 

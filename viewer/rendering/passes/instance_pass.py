@@ -43,7 +43,7 @@ from viewer.rendering.view import View, set_lights
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, skinning_matrices
-from viewer.rig.number_key import NumberKey
+from viewer.rig.memo import NumberKey
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import pose_weights, shaped

@@ -16,8 +16,8 @@ from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import posed_skeleton, world_matrices
+from viewer.rig.memo import NumberKey
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton, shown_joints

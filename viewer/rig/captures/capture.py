@@ -8,13 +8,11 @@ from dataclasses import field
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_images import CameraImages
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.cameras import CameraImages, CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.parameter_clip import ParameterMotion
-
-__all__ = ["Capture", "CapturePart", "RestRoots"]
+from viewer.rig.motion.timing import DEFAULT_RATE
 
 RestRoots = Callable[[Floats | None], Floats]
 """Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
@@ -97,3 +95,21 @@ class Capture:
     space: str = ""
     is_in_camera: bool = False
     in_space: Callable[[str], Capture] | None = None
+
+
+def capture_rate(requested: float | None, own: float | None, video: float | None) -> float:
+    """Return the first rate that is known, otherwise ``DEFAULT_RATE``, in frames per second.
+
+    Parameters
+    ----------
+    requested : float or None
+        Rate requested by the user.
+    own : float or None
+        Rate of the files, or of the tool that wrote them.
+    video : float or None
+        Rate of the source video.
+
+    >>> capture_rate(None, None, 25.0), capture_rate(None, None, None)
+    (25.0, 30.0)
+    """
+    return requested or own or video or DEFAULT_RATE

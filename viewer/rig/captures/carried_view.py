@@ -8,15 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraPath, CameraView, extrinsics, view_at
+from viewer.rig.captures.cameras import CameraPath, CameraView, extrinsics, view_at
 from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.motion.animation import Animation
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.transform_clip import Animation, TransformClip
 from viewer.rig.pose import local_matrices, rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
-from viewer.rig.transform_keys.posing import apply_transforms
-from viewer.rig.transform_keys.sampling import sample_transforms
+from viewer.rig.transform_keys.sampling import apply_transforms, sample_transforms
 
 __all__ = ["carrier_of", "moving_alone", "played_with", "view_in"]
 

@@ -11,13 +11,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from viewer.errors import RigError
+from viewer.rig.bodies.smpl_family import FAMILY
+from viewer.rig.captures.person import is_tracked
 from viewer.rig.captures.points import PointLayout
-from viewer.rig.smpl_family import FAMILY
-
-__all__ = ["TITLES", "joined_layout", "keypoint_layout", "matching_joints"]
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.scene import Actor
+from viewer.rig.skinning import joint_matrices
 
 Pairs = tuple[tuple[int, int], ...]
-
 _BODY25 = (
     "nose neck right_shoulder right_elbow right_wrist left_shoulder left_elbow left_wrist mid_hip "
     "right_hip right_knee right_ankle left_hip left_knee left_ankle right_eye left_eye right_ear "
@@ -43,6 +44,7 @@ _PANOPTIC = (
     "right_shoulder right_elbow right_wrist right_hip right_knee right_ankle left_eye left_ear "
     "right_eye right_ear"
 )
+
 # The specification's list ends at the ankles; eyes and ears are connected as in body25.
 _PANOPTIC_LIMBS = (
     "0-1 0-2 0-3 3-4 4-5 0-9 9-10 10-11 2-6 2-12 6-7 7-8 12-13 13-14 1-15 15-16 1-17 17-18"
@@ -60,6 +62,7 @@ _MEDIAPIPE_LIMBS = (
     "27-31 28-32"
 )
 _FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+
 # First keypoint, name, number of keypoints, and whether their outline is closed.
 _FACE = (
     (0, "face_contour", 17, False),
@@ -73,7 +76,6 @@ _FACE = (
     (60, "inner_lip", 8, True),
 )
 _CONTOUR, _FACE_68, _FACE_70 = 17, 68, 70
-
 _WORDS = {
     "body25": (_BODY25, _BODY25_LIMBS, 25),
     "body15": (_BODY25, _BODY25_LIMBS, 15),
@@ -84,6 +86,7 @@ _WORDS = {
     "mediapipe": (_MEDIAPIPE, _MEDIAPIPE_LIMBS, 33),
 }
 _JOINTS = {"smpl": 24, "smplh": 52, "smplx": 55}
+
 # Combined layouts of body, hands and face; the 468 points of a face mesh have no names.
 _SETS = {
     "hand": ("hand",),
@@ -97,7 +100,6 @@ _SETS = {
     "body25_hands_face": ("body25", "left_hand", "right_hand", "face468"),
     "mediapipe_total": ("mediapipe", "left_hand", "right_hand", "face468"),
 }
-
 TITLES: dict[int, tuple[str, ...]] = {
     25: ("body25",),
     15: ("body15",),
@@ -275,3 +277,47 @@ def matching_joints(layout: PointLayout) -> dict[int, str]:
     fingers = {name for name in FAMILY[52].names if name[-1] in "123" and "spine" not in name}
     same = {name: name for name in (*_ALIKE.split(), *fingers)} | _SAME
     return {index: same[name] for index, name in enumerate(layout.names) if name in same}
+
+
+def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
+    """Return the body of the person to whom captured keypoints belong, or None.
+
+    Keypoints of untracked people cannot be associated with a body.
+    """
+    for actor in actors:
+        same = actor.person == points.person and is_tracked(actor.person)
+        if same and actor.pose is not None and actor.figure.mesh is not None:
+            return actor
+    return None
+
+
+def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
+    """Return the distance from each visible keypoint to the corresponding joint.
+
+    The joints are the model's: regressed from its shaped mesh, then posed.
+
+    Parameters
+    ----------
+    points : Actor
+        Captured keypoints at the current time.
+    body : Actor
+        A posed figure with the SMPL family's joint names.
+
+    Returns
+    -------
+    dict of str to float
+        Keypoint names to distances in scene units; empty if either actor is absent.
+    """
+    layout, skeleton = points.figure.points, body.figure.skeleton
+    if layout is None or points.points is None or skeleton is None or body.pose is None:
+        return {}
+    if not (points.is_present and body.is_present):
+        return {}
+    joints = apply_transform(body.placement, joint_matrices(body.figure, body.pose)[:, :3, 3])
+    places = apply_transform(points.placement, points.points[:, :3])
+    found = {}
+    for index, name in matching_joints(layout).items():
+        if name in skeleton.names and points.points[index, 3] > 0.0:
+            step = places[index] - joints[skeleton.names.index(name)]
+            found[layout.names[index]] = float(np.linalg.norm(step))
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.frames import runs_of
 
 __all__ = ["contacts", "mean_speeds"]
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.easing import EASE, faded
+from viewer.rig.cleanup.curves import EASE, faded
 from viewer.rig.cleanup.foot_contacts import contacts
-from viewer.rig.cleanup.frame_rows import in_frame_order, runs_of
+from viewer.rig.cleanup.frames import in_frame_order, runs_of
 from viewer.rig.cleanup.leg_ik import Leg, leg_rotations, lowering
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.soles import extent

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.cleanup.easing import EASE
+from viewer.rig.cleanup.curves import EASE
 from viewer.rig.geometry.quaternion import between, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.geometry.vectors import unit

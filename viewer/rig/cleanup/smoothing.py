@@ -12,7 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frame_rows import Captured, in_frame_order, runs_of
+from viewer.rig.cleanup.frames import Captured, in_frame_order, runs_of
 from viewer.rig.geometry.quaternion import (
     align_signs,
     conjugate,

@@ -10,9 +10,15 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
-from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
+from viewer.rig.comparison.pairs import (
+    Pairs,
+    pair_joints,
+    pair_names,
+    rotation_distance,
+    row_distances,
+    skin_at,
+)
 from viewer.rig.comparison.steps import FrameRange, Steps, steps_of
-from viewer.rig.comparison.weights import row_distances, skin_at
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints
 from viewer.rig.geometry.rotation import nearest_rotations

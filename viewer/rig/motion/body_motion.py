@@ -10,6 +10,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, freeze, frozen
+from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.coefficients import space_misfit, unused_coefficients
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
@@ -18,7 +19,6 @@ from viewer.rig.hands import Hand
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.shape import joint_shifts, rest_joints
-from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["BodyMotion", "body_clip", "rest_roots", "root_positions"]
 

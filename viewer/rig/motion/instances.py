@@ -23,14 +23,12 @@ from viewer.rig.motion.clip import Clip, evaluate_all
 from viewer.rig.motion.evaluation import place_pose, pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.pose import Pose, dof_rotations
-from viewer.rig.posed_skeleton import PosedSkeleton
+from viewer.rig.pose import Pose, PosedSkeleton, dof_rotations
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
-from viewer.rig.transform_keys.posing import apply_placements, apply_transforms
-from viewer.rig.transform_keys.sampling import sample_transforms
+from viewer.rig.transform_keys.sampling import apply_placements, apply_transforms, sample_transforms
 
 __all__ = [
     "local_rotations",

@@ -21,19 +21,11 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
 )
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import frame_at, frame_times
+from viewer.rig.motion.timing import Timing, frame_at, frame_times
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion, Scene
-
-__all__ = [
-    "SampledAnimation",
-    "frame_range",
-    "frames_at",
-    "rotated_frames",
-    "sample_animation",
-    "upright_animation",
-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -208,3 +200,37 @@ def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
     matrix = np.round(quaternion_to_matrix(rotation))
     place = (inner + frames.figure_translations) @ matrix.T - inner
     return replace(frames, rotations=rotations, figure_translations=place)
+
+
+def baked(
+    figure: Figure, clip: TransformClip, rate: float | None = None, base: Pose | None = None
+) -> SampledClip:
+    """Return a clip's poses at a fixed rate, from its start to its last whole frame.
+
+    Parameters
+    ----------
+    figure : Figure
+        With the skeleton that the clip moves.
+    clip : TransformClip
+        The motion.
+    rate : float, optional
+        Frames per second; the rate of the keys if omitted.
+    base : Pose, optional
+        Provides what the clip does not animate; the figure's own pose if omitted.
+
+    Raises
+    ------
+    RigError
+        If the figure has no skeleton.
+    """
+    rate = frame_rate(clip) if rate is None else rate
+    times = frame_times(clip.start, clip.end, rate)
+    frames = frames_of(figure, clip, times, base)
+    return SampledClip(
+        clip.name,
+        Timing(rate, np.arange(len(times), dtype=np.int32), start=clip.start),
+        frames.rotations,
+        frames.translations,
+        shape_weights=frames.shape_weights if figure.n_shapes else None,
+        scales=frames.scales,
+    )

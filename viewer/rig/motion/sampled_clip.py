@@ -10,10 +10,9 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.motion.timing import Timing
-
-__all__ = ["SampledClip", "SampledRows", "joined", "sample_rows"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -206,3 +205,18 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
         stack("shape_weights"),
         stack("scales"),
     )
+
+
+def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:
+    """Return a clip with the same frames at a different rate; its start time is unchanged.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Clip, returned unchanged if it already has that rate.
+    rate : float
+        Frames per second.
+    """
+    if clip.timing.frame_rate == rate:
+        return clip
+    return replace(clip, timing=replace(clip.timing, frame_rate=rate))

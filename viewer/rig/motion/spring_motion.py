@@ -11,6 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.vectors import unit
+from viewer.rig.motion.animation_choice import still_pose
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (
     JointMotion,
@@ -19,7 +20,6 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
     world_frames,
 )
-from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing, frame_times
 from viewer.rig.motion.transform_clip import TransformClip

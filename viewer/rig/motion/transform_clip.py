@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, get_args
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -11,24 +12,13 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = [
-    "INTERPOLATIONS",
-    "TRANSFORM_PATHS",
-    "Interpolation",
-    "TransformChannel",
-    "TransformClip",
-    "TransformPath",
-]
-
 TransformPath = Literal["translation", "rotation", "scale", "weights"]
 TRANSFORM_PATHS: tuple[TransformPath, ...] = get_args(TransformPath)
 """Properties that keys can change."""
-
 Interpolation = Literal["step", "linear", "cubic"]
 INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
 """Values between keys: the earlier value, a line (slerp for rotations), or a cubic Hermite
 spline."""
-
 _COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
 
 
@@ -126,3 +116,56 @@ class TransformClip:
         object.__setattr__(self, "end", float(self.end))
         if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
             raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
+
+
+if TYPE_CHECKING:
+    pass
+
+
+class Animation:
+    """An animation of a figure.
+
+    Parameters
+    ----------
+    name : str
+        As in the file; may repeat or be empty.
+    start, end : float
+        Playback range in seconds.
+    read : callable
+        Returns the keys, or raises a ``FormatError``; called at most once.
+    place : str
+        JSON pointer to the animation in the file; empty if unknown.
+    number : int
+        Index of the animation in its file, which may move several figures; -1 if unknown.
+    """
+
+    __slots__ = ("_clip", "_read", "end", "name", "number", "place", "start")
+
+    def __init__(
+        self,
+        name: str,
+        start: float,
+        end: float,
+        read: Callable[[], TransformClip],
+        place: str = "",
+        number: int = -1,
+    ) -> None:
+        self.name, self.start, self.end, self._read = name, start, end, read
+        self.place, self.number = place, number
+        self._clip: TransformClip | None = None
+
+    def plays(self, clip: object) -> bool:
+        """Return whether a motion is the clip of this animation."""
+        return clip is not None and clip is self._clip
+
+    def clip(self) -> TransformClip:
+        """Return the motion; always the same object.
+
+        Raises
+        ------
+        FormatError
+            If the file's keys are invalid, or the file can no longer be read.
+        """
+        if self._clip is None:
+            self._clip = self._read()
+        return self._clip

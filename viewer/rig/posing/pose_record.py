@@ -12,6 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.bodies.smpl_family import ShapeSpace, members_by_numbers
 from viewer.rig.coefficients import apply_coefficients
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -26,7 +27,6 @@ from viewer.rig.retargeting.pose_transfer import (
     rotate_joints,
 )
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
-from viewer.rig.smpl_family import ShapeSpace, members_by_numbers
 
 __all__ = ["PARTS", "PosePartError", "PoseRecord", "apply_record", "record_of"]
 

@@ -22,8 +22,7 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rig.retargeting.postures import SIDES, Postures, unit
-from viewer.rig.retargeting.rest_poses import shortest_arc
+from viewer.rig.retargeting.rest_poses import SIDES, Postures, shortest_arc, unit
 from viewer.rig.skeleton import Skeleton
 
 _TRUNK = ("pelvis", "spine", "neck", "head", "collar")

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.foot_lock import legs_of
-from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.cleanup.leg_ik import Leg, reach
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix

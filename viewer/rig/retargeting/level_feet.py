@@ -14,9 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.cleanup.easing import falling
+from viewer.rig.cleanup.curves import falling, smooth_curves
 from viewer.rig.cleanup.leg_ik import Leg
-from viewer.rig.cleanup.smooth_curves import smooth_curves
 from viewer.rig.geometry.quaternion import (
     align_signs,
     conjugate,

@@ -18,10 +18,9 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.cleanup.easing import falling
-from viewer.rig.cleanup.frame_rows import in_frame_order
+from viewer.rig.cleanup.curves import falling, smooth_curves
+from viewer.rig.cleanup.frames import in_frame_order
 from viewer.rig.cleanup.leg_ik import Leg, leg_rotations, lowering
-from viewer.rig.cleanup.smooth_curves import smooth_curves
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_legs import (

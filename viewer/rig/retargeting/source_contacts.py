@@ -15,9 +15,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.easing import falling
+from viewer.rig.cleanup.curves import falling
 from viewer.rig.cleanup.foot_contacts import mean_speeds
-from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.frames import runs_of
 
 __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"]
 

@@ -19,7 +19,7 @@ from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.anatomical_rest import anatomical_rest, limb_axes, upright_frames
-from viewer.rig.retargeting.postures import SIDES, Postures, postures_of, rest_posture
+from viewer.rig.retargeting.rest_poses import SIDES, Postures, postures_of, rest_posture
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["SourceRest", "rest_fault", "with_source_rest", "with_upright_rest"]

@@ -118,10 +118,10 @@ SCALARS = {
     "normalized": _Quantity("Effect of normalising weights", "distances", "a skin"),
     "correctives": _Quantity("Effect of pose correctives", "distances", "pose correctives"),
     "asymmetry": _Quantity("Asymmetry", "distances", "a symmetry map"),
-    "parts": _Quantity("Body parts", "parts", "body parts", "categorical", "", moves=False),
-    "field": _Quantity("Field", "fields", "fields", unit="", moves=False, about="field"),
+    "parts": _Quantity("Body parts", "annotations", "body parts", "categorical", "", moves=False),
+    "field": _Quantity("Field", "annotations", "fields", unit="", moves=False, about="field"),
     "class": _Quantity(
-        "Classes", "fields", "classes", "categorical", "", moves=False, about="field"
+        "Classes", "annotations", "classes", "categorical", "", moves=False, about="field"
     ),
 }
 """Quantities by name, in menu order."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -22,19 +23,6 @@ from viewer.rig.shape import rest_positions, shaped, shaped_skeleton
 
 if TYPE_CHECKING:
     from viewer.rig.skin import Skin
-
-__all__ = [
-    "METHODS",
-    "PURE",
-    "Method",
-    "Skinning",
-    "deform",
-    "deform_frames",
-    "file_method",
-    "joint_matrices",
-    "skin_used",
-    "skinned",
-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +67,6 @@ METHODS = {
     ),
 }
 """Modules in this folder, each with ``deform`` and a GLSL chunk in ``shaders/skin``."""
-
 PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 """Methods that are not interpolated between others; the first is the reference."""
 
@@ -298,3 +285,25 @@ def skin_used(skin: Skin, skinning: Skinning) -> Skin:
         (count, normalize),
         lambda: limit_influences(skin, count) if count else normalized(skin),
     )
+
+
+def posed_mesh(figure: Figure, pose: Pose | None) -> Mesh:
+    """Return a figure's mesh with the positions and normals of a pose.
+
+    Parameters
+    ----------
+    figure : Figure
+        A figure with a mesh; without a skin, its mesh is returned as it is.
+    pose : Pose or None
+        Pose of the figure; that of the file if omitted.
+
+    Raises
+    ------
+    RigError
+        If the figure has no mesh.
+    """
+    mesh = figure.require_mesh()
+    if not figure.is_attached:
+        return mesh
+    positions, normals = deform(figure, pose)
+    return replace(mesh, positions=positions, normals=normals)

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
+from viewer.data_classes import dataclass
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.skin import Skin
-from viewer.rig.skinning._blocks import Block, blocks_of
+from viewer.rig.memo import Memo
+from viewer.rig.skin import Skin, has_influence
 from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
-
-__all__ = ["blended_matrices", "deform", "move"]
 
 # Number of matrices per chunk, which fits into the processor's cache and limits the memory.
 _CHUNK = 1 << 14
@@ -122,7 +121,7 @@ def _blended(skin: Skin, palette: Floats) -> Iterator[tuple[slice, Floats]]:
     """Yield runs of consecutive vertices and their blended matrices, (3, 4, n)."""
     # One row per joint, so that selecting a block's joints copies contiguous memory.
     rows = palette[:, :3, :].reshape(len(palette), 12)
-    run: list[Block] = []
+    run: list[_Block] = []
     for block in blocks_of(skin):
         if run and block.rows.stop - run[0].rows.start > _CHUNK:
             yield _run(run, rows)
@@ -132,7 +131,7 @@ def _blended(skin: Skin, palette: Floats) -> Iterator[tuple[slice, Floats]]:
         yield _run(run, rows)
 
 
-def _run(run: list[Block], rows: Floats) -> tuple[slice, Floats]:
+def _run(run: list[_Block], rows: Floats) -> tuple[slice, Floats]:
     """Blend the matrices of consecutive blocks: one dense product per block."""
     first, last = run[0].rows.start, run[-1].rows.stop
     blended = np.empty((12, last - first))
@@ -151,3 +150,73 @@ def _product(matrices: Floats, vectors: Floats) -> Floats:
     product += matrices[:, 1] * y
     product += matrices[:, 2] * z
     return product
+
+
+# Weights as dense blocks: a few hundred vertices times the joints that influence any of them.
+#
+# Vertices that are close to each other in a file usually have the same joints, so the blocks stay
+# small, and one product of two dense matrices per block is several times faster than summing a
+# flat list in numpy.
+
+# Vertices per block: smaller blocks need more calls, larger ones contain more zeros (bench_deform).
+_VERTICES = 512
+
+# Weights cached per skin (128 MB); only files with a random vertex order need more.
+_MOST = 1 << 24
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """The weights of consecutive vertices.
+
+    Attributes
+    ----------
+    rows : slice
+        Indices of the vertices.
+    joints : (B,) int32
+        Joints that influence any of these vertices.
+    weights : (B, n)
+        Weight of each joint for each vertex; 0 without influence.
+    free : (F,) int32
+        Rows within the block without influence, whose matrix is the identity.
+    """
+
+    rows: slice
+    joints: Ints
+    weights: Floats
+    free: Ints
+
+
+_kept: Memo[Skin, tuple[_Block, ...] | None] = Memo()
+
+
+def blocks_of(skin: Skin) -> Iterator[_Block]:
+    """Yield a skin's blocks, cached for the skin's lifetime unless they are unusually large."""
+    kept = _kept.get(skin, None, lambda: _within_limit(skin))
+    yield from _blocks(skin) if kept is None else kept
+
+
+def _within_limit(skin: Skin) -> tuple[_Block, ...] | None:
+    """Return all blocks of a skin, or None if they are too large to be cached."""
+    blocks, size = [], 0
+    for block in _blocks(skin):
+        size += block.weights.size
+        if size > _MOST:
+            return None
+        blocks.append(block)
+    return tuple(blocks)
+
+
+def _blocks(skin: Skin) -> Iterator[_Block]:
+    """Compute the blocks of a skin one by one."""
+    is_free = ~has_influence(skin)
+    for first in range(0, skin.n_vertices, _VERTICES):
+        last = min(first + _VERTICES, skin.n_vertices)
+        span = slice(skin.starts[first], skin.starts[last])
+        joints, columns = np.unique(skin.joints[span], return_inverse=True)
+        owners = np.repeat(np.arange(last - first), np.diff(skin.starts[first : last + 1]))
+        weights = np.zeros((len(joints), last - first))
+        # A vertex may list a joint twice: the weights are summed.
+        np.add.at(weights, (columns, owners), skin.weights[span])
+        free = np.flatnonzero(is_free[first:last]).astype(np.int32)
+        yield _Block(slice(first, last), joints, weights, free)

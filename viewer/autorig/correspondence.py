@@ -8,6 +8,7 @@ is close to the wrong part but faces the other way: its weights are inpainted.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -20,7 +21,7 @@ from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import vertex_normals
+from viewer.rig.mesh import Mesh, vertex_normals
 
 _INSIDE_OUT = math.radians(120.0)  # angle above which a triangle is reversed rather than folded
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
@@ -256,7 +257,6 @@ def _replaced(points: SurfacePoints, rows: Any, others: SurfacePoints, of: Bools
 # template if each is the nearest vertex to the other, it moved along the surface by less than
 # half the length of its edges, and nearly all of its edges correspond to edges of the template. A
 # different tessellation of the same surface has very few such vertices.
-
 _EDGES = 0.8  # minimum fraction of a vertex's edges that are also edges of the template
 _SLID = 0.5  # maximum shift along the surface, relative to the mean length of a vertex's edges
 _FEW = 10_000  # number of points below which starting threads costs more time than it saves
@@ -337,3 +337,78 @@ def _keys(pairs: Ints, template: Welded) -> Ints:
     low, high = pairs.min(axis=1).astype(np.int64), pairs.max(axis=1)
     keys: Ints = low * len(template.positions) + high
     return keys
+
+
+# Detection and reversal of parts of a target whose triangles are wound the wrong way.
+#
+# A part whose normals are opposite to the template's may be a lining, which is correct. It is an
+# error if it encloses a volume, or if it makes up most of the target.
+
+# Squared number of border edges per triangle, below which the volume's sign is reliable.
+_CLOSED = 0.25
+_MOST_REVERSED = 0.5  # fraction of the target's area above which an island is reversed
+
+
+def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
+    """Return the vertices of parts whose triangles should be reversed.
+
+    Parameters
+    ----------
+    target : Welded
+        W welded vertices that represent V.
+    facing_away : (I,)
+        Islands that face away from the template's surface.
+
+    Returns
+    -------
+    (V,) bool
+        Vertices of islands with a negative volume, sum a . (b x c) / 6 about their middle, that
+        are closed except for small holes, or have more than half of the area.
+    """
+    count = target.n_islands
+    of = target.islands[target.triangles[:, 0]]
+    corners = target.positions[target.triangles]
+    members = np.bincount(of, minlength=count)
+    sums = [np.bincount(of, corners[:, :, k].mean(axis=1), minlength=count) for k in range(3)]
+    middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
+    a, b, c = (corners[:, k] - middle[of] for k in range(3))
+    volumes = np.bincount(of, np.einsum("ta,ta->t", a, np.cross(b, c)), minlength=count)
+    areas = np.bincount(of, np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
+    is_whole = _border_edges(target, of) ** 2 <= _CLOSED * members
+    is_most = areas > _MOST_REVERSED * areas.sum()
+    wrong = (volumes < 0.0) & (is_whole | is_most)
+    chosen = np.isin(np.arange(count), facing_away) & wrong
+    return chosen[target.islands][target.vertices]
+
+
+def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
+    """Return a mesh with the triangles at some vertices reversed, and with matching normals.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        V vertices.
+    vertices : (V,) bool
+        Vertices of whole parts.
+    """
+    rows = np.logical_or.reduce(vertices[mesh.triangles], axis=1)
+    if not rows.any():
+        return mesh
+    triangles = _reversed(mesh.triangles, rows)
+    uvs = None if mesh.uv_triangles is None else _reversed(mesh.uv_triangles, rows)
+    normals = vertex_normals(mesh.positions, triangles)
+    return replace(mesh, triangles=triangles, uv_triangles=uvs, normals=normals)
+
+
+def _reversed(triangles: Ints, rows: Bools) -> Ints:
+    return np.where(rows[:, None], triangles[:, ::-1], triangles)
+
+
+def _border_edges(target: Welded, of: Ints) -> Any:
+    """Return the number of edges of each island that belong to only one triangle."""
+    edges = target.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    low, high = edges.min(axis=1).astype(np.int64), edges.max(axis=1)
+    _, first, counts = np.unique(
+        low * len(target.positions) + high, return_index=True, return_counts=True
+    )
+    return np.bincount(of[first[counts == 1] // 3], minlength=target.n_islands)

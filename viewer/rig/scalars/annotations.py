@@ -1,13 +1,19 @@
-"""Quantities of precomputed fields, such as distances to another figure."""
+"""The quantity of body parts."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
 from viewer.rig.scalars._asked import Asked, field_of
 
-__all__ = ["class_", "field"]
+
+def parts(asked: Asked) -> Floats:
+    """Return the body part of each vertex: (V,), integral indices into the parts' names."""
+    assert asked.figure.body_parts is not None  # required by the quantity
+    return asked.figure.body_parts.of_vertex.astype(np.float64)
 
 
 def field(asked: Asked) -> Floats:

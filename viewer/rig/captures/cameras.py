@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Floats, frozen
+from viewer.rig.arrays import Bytes, Floats, frozen
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import (
     matrix_to_quaternion,
@@ -19,19 +19,9 @@ from viewer.rig.motion.timing import Timing
 
 if TYPE_CHECKING:
     from viewer.rig.file_record import FileRecord
-    from viewer.rig.motion.animation import Animation
+    from viewer.rig.motion.transform_clip import Animation
     from viewer.rig.skeleton import Skeleton
 
-__all__ = [
-    "CameraMotion",
-    "CameraMount",
-    "CameraPath",
-    "CameraView",
-    "extrinsics",
-    "motion_times",
-    "placed_view",
-    "view_at",
-]
 
 # OpenCV's cameras look along z with y down, those of glTF along -z with y up.
 _FLIP = np.diag([1.0, -1.0, -1.0])
@@ -245,3 +235,30 @@ def placed_view(view: CameraView, placement: Floats) -> CameraView:
     translations = scale * view.motion.translations - rotations @ place
     motion = replace(view.motion, rotations=rotations, translations=translations)
     return replace(moved, motion=motion)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraImage:
+    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, with lens distortion."""
+
+    pixels: Bytes
+
+
+class CameraImages(Protocol):
+    """Source of camera images, which are read when they are drawn."""
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the cameras that have images."""
+
+    def at(self, camera: str, seconds: float) -> CameraImage | None:
+        """Return the image of a camera at a time of the scene; None if there is none.
+
+        While the image stays the same, the same object is returned. File errors become notes.
+        """
+
+    def size_of(self, camera: str) -> tuple[int, int] | None:
+        """Return the width and height of a camera's images, pixels; None if it has no images."""
+
+    def notes_of(self, camera: str) -> list[str]:
+        """Return messages about a camera's missing or unusable images, one line each."""

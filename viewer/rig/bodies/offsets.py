@@ -11,8 +11,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from viewer.rig.arrays import Deferred, Floats, Ints
 
-__all__ = ["SparseOffsets"]
-
 _DENSE = 0.25  # fraction of nonzero entries above which the whole array is stored
 _FIRST = 64  # rows after which this fraction is estimated
 
@@ -117,3 +115,28 @@ class _Entries:
             products = weights[self._rows] * self._values
             result[self._columns] = np.add.reduceat(products, self._starts)
         return result.reshape(-1, 3)
+
+
+class DeferredOffsets(Deferred):
+    """Offsets of blend shapes whose weighted sum does not need the whole array.
+
+    Parameters
+    ----------
+    shape : (int, int, int)
+        S, V, 3.
+    load : callable
+        Returns the array; see ``Deferred``.
+    total : callable
+        Returns sum_s w_s d_s, (V, 3), for weights (S,).
+    """
+
+    __slots__ = ("total",)
+
+    def __init__(
+        self,
+        shape: tuple[int, int, int],
+        load: Callable[[], Floats],
+        total: Callable[[Floats], Floats],
+    ) -> None:
+        super().__init__(shape, np.float64, load)
+        self.total = total

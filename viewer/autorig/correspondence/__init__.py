@@ -1,1 +1,0 @@
-"""Correspondence between a target's vertices and the template's surface."""

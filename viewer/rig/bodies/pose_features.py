@@ -1,0 +1,158 @@
+"""Features: weights of a body model's correctives as functions of the pose."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.skeleton import Skeleton
+
+
+class Feature(Protocol):
+    """Weights of pose correctives as a function of the pose; immutable."""
+
+    @property
+    def n_weights(self) -> int:
+        """Number of weights, P."""
+
+    def weights(self, skeleton: Skeleton, pose: Pose) -> Floats:
+        """Return the weights of a pose: (P,).
+
+        Parameters
+        ----------
+        skeleton : Skeleton
+            Skeleton of the shaped figure.
+        pose : Pose
+            DOFs in lengths and radians.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class MappedFeature:
+    """Nine entries of R - I for each joint of another model, as in SMPL.
+
+    Attributes
+    ----------
+    targets : tuple of J int
+        Joint of the other model that each joint drives; 0, its root, drives nothing. If several
+        joints have the same target, the last one drives it.
+    n_targets : int
+        Number of joints of the other model.
+    """
+
+    targets: tuple[int, ...]
+    n_targets: int
+
+    @property
+    def n_weights(self) -> int:
+        """Number of weights, P."""
+        return 9 * (self.n_targets - 1)
+
+    def weights(self, skeleton: Skeleton, pose: Pose) -> Floats:
+        """Return the weights of a pose: (P,)."""
+        found = np.zeros((self.n_targets, 3, 3))
+        rotations = joint_rotations(skeleton, pose) - np.eye(3)
+        for target, rotation in zip(self.targets, rotations, strict=True):
+            found[target] = rotation
+        return found[1:].reshape(-1)
+
+
+# Feature of STAR and SUPR: a quaternion for each joint, and a shape coefficient in STAR.
+#
+# Osman et al. 2020 (STAR), eq. 3, and Osman et al. 2022 (SUPR), eq. 5: the correctives of a joint
+# are driven by the four numbers (x, y, z, w - 1) of its unit quaternion, which are 0 at rest.
+
+
+@dataclass(frozen=True, slots=True)
+class QuaternionFeature:
+    """Quaternions of joints, with w >= 0, and optionally the weight of one blend shape.
+
+    Attributes
+    ----------
+    n_joints : int
+        Number of joints of the skeleton, J.
+    has_root : bool
+        Whether the root's quaternion is included, as in SUPR.
+    shape : int
+        Blend shape whose weight comes last, as in STAR; -1 for none.
+    """
+
+    n_joints: int
+    has_root: bool
+    shape: int = -1
+
+    @property
+    def n_weights(self) -> int:
+        """Number of weights, P."""
+        return 4 * (self.n_joints - (not self.has_root)) + (self.shape >= 0)
+
+    def weights(self, skeleton: Skeleton, pose: Pose) -> Floats:
+        """Return the weights of a pose: (P,)."""
+        rotations = joint_rotations(skeleton, pose)[0 if self.has_root else 1 :]
+        quaternions = matrix_to_quaternion(rotations)
+        quaternions *= np.where(quaternions[:, 3:] < 0.0, -1.0, 1.0)
+        quaternions[:, 3] -= 1.0
+        if self.shape < 0:
+            return quaternions.reshape(-1)
+        given = pose.shape_weights[self.shape : self.shape + 1]
+        return np.append(quaternions.reshape(-1), given if len(given) else 0.0)
+
+
+# Feature of MHR: a sparse linear layer of joint rotations with a ReLU.
+#
+# The input has six numbers for each joint from the third on: the first two columns of its
+# rotation relative to its rest, minus those of the identity. ``MHRPoseCorrectivesModel`` of the
+# Momentum Human Rig::
+#
+#     h = max(0, W x)
+
+_FIRST = 2  # joints before this index position the whole body
+_WIDTH = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetworkFeature:
+    """The sparse layer.
+
+    Attributes
+    ----------
+    n_joints : int
+        Number of joints of the skeleton, J.
+    n_weights : int
+        Number of outputs, P.
+    outputs, inputs : (N,) int32
+        Row and column of each entry of the (P, 6 (J - 2)) matrix.
+    entries : (N,)
+        Value of each entry.
+    """
+
+    n_joints: int
+    n_weights: int
+    outputs: Ints
+    inputs: Ints
+    entries: Floats
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("outputs", np.int32), ("inputs", np.int32), ("entries", np.float64)):
+            values = frozen(name, getattr(self, name), (len(self.outputs),), dtype)
+            object.__setattr__(self, name, values)
+        ends = {"outputs": self.n_weights, "inputs": _WIDTH * max(self.n_joints - _FIRST, 0)}
+        for name, end in ends.items():
+            values = getattr(self, name)
+            if len(values) and not 0 <= values.min() <= values.max() < end:
+                raise RigError(f"{name}: expected indices 0 to {end - 1}")
+
+    def weights(self, skeleton: Skeleton, pose: Pose) -> Floats:
+        """Return the weights of a pose: (P,)."""
+        beneath = np.swapaxes(quaternion_to_matrix(skeleton.rest_rotations), 1, 2)
+        rotations = (beneath @ joint_rotations(skeleton, pose))[_FIRST:] - np.eye(3)
+        columns = np.swapaxes(rotations[..., :2], -1, -2).reshape(-1)
+        terms = self.entries * columns[self.inputs]
+        sums = np.bincount(self.outputs, terms, minlength=self.n_weights)
+        return np.maximum(sums, 0.0)

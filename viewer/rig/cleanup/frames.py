@@ -1,0 +1,187 @@
+"""Rows of clips in the order of their frames."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
+from viewer.rig.motion.timing import Timing
+
+Captured = SampledClip | PointClip
+"""A clip of sampled frames, of joints or of points."""
+_Indices = NDArray[np.intp]
+
+
+def runs_of(flags: Bools) -> list[tuple[int, int]]:
+    """Return the runs of True as half-open ranges of indices.
+
+    >>> runs_of(np.array([True, True, False, True]))
+    [(0, 2), (3, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _with_rows(clip: Captured, frames: _Indices) -> Captured:
+    """Return a clip of some of the frames, each with a separate row, in time order.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Any clip.
+    frames : (F,)
+        Consecutive indices of frames, from 0; rate, first frame and start are adjusted.
+    """
+    timing = clip.timing
+    chosen = timing.rows[frames]
+    kept = chosen[chosen >= 0]
+    rows = np.where(chosen >= 0, np.cumsum(chosen >= 0) - 1, -1).astype(np.int32)
+    first = int(frames[0]) if len(frames) else 0
+    moved = replace(
+        timing, rows=rows, first_frame=timing.first_frame + first, start=timing.time(first)
+    )
+    count = len(clip.points) if isinstance(clip, PointClip) else clip.n_rows
+    arrays: dict[str, Any] = {}
+    for field in fields(clip):
+        value = getattr(clip, field.name)
+        # A single row that applies to all frames is unchanged.
+        if (
+            isinstance(value, np.ndarray)
+            and len(value) == count
+            and not is_shared(clip, field.name)
+        ):
+            arrays[field.name] = value[kept]
+    return replace(clip, timing=moved, **arrays)
+
+
+def is_shared(clip: Captured, name: str) -> bool:
+    """Return whether an array of a clip has a single row, which applies to all frames."""
+    if name not in ("shape_weights", "scales"):
+        return False
+    rows = getattr(clip, name)
+    return rows is not None and len(rows) == 1
+
+
+def points_between(clip: PointClip, times: Floats, interpolate: bool = False) -> Floats:
+    """Return points (T, K, 4), interpolated where they are visible on both sides.
+
+    Other points keep the values of the previous row or, with ``interpolate``, which also
+    interpolates across gaps, are invisible.
+
+    Parameters
+    ----------
+    clip : PointClip
+        Points.
+    times : (T,)
+        Seconds.
+    interpolate : bool
+        See above.
+    """
+    before, after, fraction = clip.timing.locate(times, interpolate)
+    start, end = clip.points[before], clip.points[after]
+    mixed = start + fraction[:, None, None] * (end - start)
+    both = (start[..., 3:] > 0.0) & (end[..., 3:] > 0.0)
+    return np.where(both, mixed, 0.0 if interpolate else start)
+
+
+def in_frame_order(clip: Captured) -> Captured:
+    """Return the same motion with one row for each present frame, in time order."""
+    return _with_rows(clip, np.arange(clip.timing.n_frames))
+
+
+def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
+    """Return a range of frames of a clip, with unchanged times and numbers.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Any clip.
+    first, stop : int, optional
+        First frame and end frame (exclusive), in the numbering of the file; the ends of the clip if
+        omitted.
+
+    Raises
+    ------
+    RigError
+        If the range is empty or exceeds the clip.
+    """
+    low = clip.timing.first_frame
+    high = low + clip.timing.n_frames
+    start, end = low if first is None else first, high if stop is None else stop
+    if not low <= start < end <= high:
+        asked = ":".join("" if number is None else str(number) for number in (first, stop))
+        raise RigError(
+            f"frames to keep: expected a range within {low}:{high} (frames {low} to {high - 1}), "
+            f"found {asked}"
+        )
+    return _with_rows(clip, np.arange(start - low, end - low))
+
+
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, for times that are treated as that frame
+_MOST_FRAMES = 1_000_000  # maximum number of frames: 9 hours at 30 frames per second
+
+
+def resampled(clip: Captured, rate: float) -> Captured:
+    """Return a clip with another frame rate, which begins at the same time.
+
+    Rotations are interpolated along the shorter arc, everything else linearly. At the times of the
+    original frames, values are unchanged. A new frame between two original frames is missing if
+    either of those is missing. Frames are counted from 0.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Any clip.
+    rate : float
+        Frames per second.
+
+    Raises
+    ------
+    RigError
+        If there would be more than a million frames.
+    """
+    timing = clip.timing
+    count = int(np.floor((timing.n_frames - 1) / timing.frame_rate * rate + _ON_FRAME)) + 1
+    if count > _MOST_FRAMES:
+        raise RigError(
+            f"{clip.name}: expected at most {_MOST_FRAMES:,} frames, found {count:,} at "
+            f"{rate:g} fps: choose a lower rate or trim the motion"
+        )
+    times = timing.start + np.arange(count if timing.n_frames else 0) / rate
+    present = _present(timing, times)
+    rows: Ints = np.where(present, np.cumsum(present) - 1, -1).astype(np.int32)
+    again = replace(timing, frame_rate=rate, rows=rows, first_frame=0)
+    if isinstance(clip, PointClip):
+        return replace(clip, timing=again, points=points_between(clip, times[present]))
+    found = sample_rows(clip, times[present])
+    return SampledClip(
+        clip.name,
+        again,
+        found.rotations,
+        found.translations,
+        found.figure_translations,
+        found.figure_scales,
+        clip.shape_weights if is_shared(clip, "shape_weights") else found.shape_weights,
+        clip.scales if is_shared(clip, "scales") else found.scales,
+    )
+
+
+def _present(timing: Timing, times: Floats) -> Bools:
+    """Return whether the frames on both sides of each time, or the frame at it, exist: (T,)."""
+    if not timing.n_frames:
+        return np.zeros(0, dtype=np.bool_)
+    place = (times - timing.start) * timing.frame_rate
+    nearest = np.round(place)
+    place = np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
+    last = timing.n_frames - 1
+    before = np.clip(np.floor(place).astype(int), 0, last)
+    after = np.clip(np.ceil(place).astype(int), 0, last)
+    both: Bools = timing.present[before] & timing.present[after]
+    return both
