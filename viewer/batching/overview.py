@@ -367,7 +367,7 @@ img { display: block; max-width: 160px; max-height: 120px; border-radius: 4px; }
 def _text_of(value: object) -> str:
     """Return text as HTML: one line, escaped.
 
-    >>> text_of("<b> & co")
+    >>> _text_of("<b> & co")
     '&lt;b&gt; &amp; co'
     """
     return escape(printable(value, _LONGEST))

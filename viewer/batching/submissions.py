@@ -225,7 +225,7 @@ _Chosen = tuple[str, ...]
 def _is_junk(name: str) -> bool:
     """Return whether a file was added by an operating system or is hidden.
 
-    >>> is_junk("__MACOSX/._arm.skel"), is_junk("a/.DS_Store"), is_junk("a/arm.skel")
+    >>> _is_junk("__MACOSX/._arm.skel"), _is_junk("a/.DS_Store"), _is_junk("a/arm.skel")
     (True, True, False)
     """
     *folders, last = name.lower().split("/")

@@ -196,7 +196,7 @@ def unit_of(text: str) -> str:
 def _number_with_unit(text: str, value: float) -> str:
     """Return a number in the format of a field, which may be a word for a special value.
 
-    >>> number_with_unit("%.1f s", 2.0), number_with_unit("no limit", 0.0)
+    >>> _number_with_unit("%.1f s", 2.0), _number_with_unit("no limit", 0.0)
     ('2.0 s', 'no limit')
     """
     return text % value if _FORMAT.search(text) else text

@@ -239,7 +239,7 @@ def _draw_time(clock: Clock, area: tuple[float, float, float, float]) -> None:
 def _nice_step(smallest: float) -> int:
     """Return the smallest of 1, 2, 5, 10, 20, 50 … that is at least as large as a number.
 
-    >>> [nice_step(x) for x in (0.2, 1.5, 3, 11, 60)]
+    >>> [_nice_step(x) for x in (0.2, 1.5, 3, 11, 60)]
     [1, 2, 5, 20, 100]
     """
     power = 10 ** max(math.floor(math.log10(max(smallest, 1.0))), 0)

@@ -216,9 +216,9 @@ def _merged_extras(given: list[tuple[str, Any]]) -> Any:
 
     ``given``: name and application data of each figure that has some.
 
-    >>> merged_extras([("a", {"k": 1}), ("b", {"k": 1})])
+    >>> _merged_extras([("a", {"k": 1}), ("b", {"k": 1})])
     {'k': 1}
-    >>> merged_extras([("a", 1), ("b", 2), ("c", 1)])["sources"]
+    >>> _merged_extras([("a", 1), ("b", 2), ("c", 1)])["sources"]
     [{'figures': ['a', 'c'], 'extras': 1}, {'figures': ['b'], 'extras': 2}]
     """
     owners: dict[str, list[str]] = {}

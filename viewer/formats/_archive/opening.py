@@ -213,7 +213,7 @@ _UNPACKERS: dict[str, Callable[[], _Unpacker]] = {
 def _is_compressed(head: bytes) -> bool:
     r"""Return whether a file that begins with these bytes may be a compressed pickle.
 
-    >>> is_compressed(zlib.compress(bytes([128, 4]) + b"}." * 20)), is_compressed(b"x^2 + y^2")
+    >>> _is_compressed(zlib.compress(bytes([128, 4]) + b"}." * 20)), _is_compressed(b"x^2 + y^2")
     (True, False)
     """
     if any(kind.match(head) for kind in _UNSUPPORTED.values()):

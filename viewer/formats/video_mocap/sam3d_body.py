@@ -464,9 +464,9 @@ def _frames_and_people(names: list[str]) -> dict[str, tuple[int, int]]:
     names : list of str
         Names of files, with their suffixes.
 
-    >>> frames_and_people(["a_subj00.npz", "a_subj01.npz", "b_subj00.npz"])["a_subj01.npz"]
+    >>> _frames_and_people(["a_subj00.npz", "a_subj01.npz", "b_subj00.npz"])["a_subj01.npz"]
     (0, 1)
-    >>> frames_and_people(["f10.npz", "f9.npz"])
+    >>> _frames_and_people(["f10.npz", "f9.npz"])
     {'f9.npz': (0, 0), 'f10.npz': (1, 0)}
     """
     ordered = sorted(names, key=_natural)

@@ -320,7 +320,7 @@ def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
         Radians, in the space of ``base``.
 
     >>> half_turn = np.array([0.0, 0.0, 1.0, 0.0])
-    >>> relative_vectors(np.array([0.0, 0.0, 0.0, 1.0]), half_turn).round(6).tolist()
+    >>> _relative_vectors(np.array([0.0, 0.0, 0.0, 1.0]), half_turn).round(6).tolist()
     [0.0, 0.0, 3.141593]
     """
     found = multiply(conjugate(base), quaternions)
