@@ -357,7 +357,7 @@ def _map_options(text: str) -> _MapOptions:
     """Return the options and the file of a map; the file's name may contain spaces.
 
     >>> _map_options("-s 2 3 1 -clamp on -bm 0.5 two words.png")  # doctest: +NORMALIZE_WHITESPACE
-    MapOptions(file='two words.png', scale=(2.0, 3.0), offset=(0.0, 0.0), clamps=True,
+    _MapOptions(file='two words.png', scale=(2.0, 3.0), offset=(0.0, 0.0), clamps=True,
     channel=0, strength=0.5)
     """
     found: dict[str, list[str]] = {}
