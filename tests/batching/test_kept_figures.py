@@ -9,7 +9,7 @@ import pytest
 from app.tiny import SKEL
 
 from viewer.formats import Source, read
-from viewer.formats._kept import keeping_figures
+from viewer.formats._figure_cache import keeping_figures
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
+from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._file_bytes import MAX_SIZE, unreadable
-from viewer.formats._kept import kept_or_read
 from viewer.formats._source import Source
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from viewer.diagnostics import Collector, Diagnostic, Part
+from viewer.diagnostics import Collector, Diagnostic, Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import (
     FOLDER,
@@ -502,3 +502,23 @@ def _lone_returns(block: bytes) -> int:
     is_return = np.concatenate([letters == ord("\r"), [False]])
     begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T
     return int((ends - begins)[letters[ends + 1] != ord("\n")].sum())
+
+
+class InvalidValueError(Exception):
+    """An invalid value; the caller adds the file and the line.
+
+    Attributes
+    ----------
+    problem : Phrase
+        ``expected …, found …``.
+    """
+
+    def __init__(self, problem: Phrase) -> None:
+        self.problem = problem
+        super().__init__(str(problem))
+
+
+def remark_on(key: str, fault: Diagnostic) -> Diagnostic:
+    """Return a note at the location of an error, which its message includes as ``problem``."""
+    problem = replace(fault, path=None, line=None)
+    return Diagnostic(key, fault.path, fault.line, values={"problem": problem})

@@ -17,11 +17,11 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
-from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.machine import Machine, run
 from viewer.formats._pickle.reading import named_archive
 from viewer.formats._pickle.tensors import Storage, storage_of
 from viewer.formats._pickle.values import Span, noun
+from viewer.formats._source import InvalidValueError
 from viewer.phrases import printable
 
 _PICKLE = "/data.pkl"
@@ -72,17 +72,17 @@ class _Storages:
         """Return the storage of a persistent id, after comparing its size with the archive's."""
         found = storage_of(persistent)
         if found is None:
-            raise MisfitError(Phrase("tensor-persistent"))
+            raise InvalidValueError(Phrase("tensor-persistent"))
         key, storage = found
         member = self._members.get(self._folder + key)
         if member is None:
-            raise MisfitError(Phrase("tensor-key", item=key))
+            raise InvalidValueError(Phrase("tensor-key", item=key))
         if member.file_size != storage.size:
             values = {"item": key, "expected": storage.size, "found": member.file_size}
-            raise MisfitError(Phrase("tensor-member", **values))
+            raise InvalidValueError(Phrase("tensor-member", **values))
         known = self._known.setdefault(key, storage)
         if (known.code, known.count) != (storage.code, storage.count):
-            raise MisfitError(Phrase("tensor-storages", item=key))
+            raise InvalidValueError(Phrase("tensor-storages", item=key))
         known.order, known.load = self._order, partial(_read_member, self._file, member)
         return known
 
@@ -171,12 +171,12 @@ def _declare(storages: dict[str, Storage], order: Literal["<", ">"], persistent:
     """Return the storage of a persistent id, the same one for the same key."""
     found = storage_of(persistent)
     if found is None:
-        raise MisfitError(Phrase("tensor-persistent"))
+        raise InvalidValueError(Phrase("tensor-persistent"))
     key, storage = found
     storage.order = order
     known = storages.setdefault(key, storage)
     if (known.code, known.count) != (storage.code, storage.count):
-        raise MisfitError(Phrase("tensor-storages", item=key))
+        raise InvalidValueError(Phrase("tensor-storages", item=key))
     return known
 
 

@@ -24,7 +24,7 @@ from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, 
 from viewer.formats._archive.values import Archive
 from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in, scale_in
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
-from viewer.formats._neutral import held_rows
+from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints

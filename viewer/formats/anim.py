@@ -23,10 +23,10 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.errors import FormatError, UnsupportedFormatError
-from viewer.formats._reach import FARTHEST
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
+from viewer.formats._translation_limit import FARTHEST
 from viewer.media.saving import save_text
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (

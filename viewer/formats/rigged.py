@@ -35,7 +35,7 @@ from viewer.diagnostics import Part
 from viewer.errors import FormatError, RigError
 from viewer.formats._archive.checking import archive_of, corners_of, finite
 from viewer.formats._archive.values import Archive
-from viewer.formats._neutral import neutral_positions
+from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
 from viewer.rig.annotations import VertexField

@@ -22,7 +22,7 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
 from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
-from viewer.formats._neutral import neutral_positions
+from viewer.formats._placeholders import neutral_positions
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST

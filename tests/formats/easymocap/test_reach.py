@@ -9,7 +9,7 @@ from viewer.diagnostics import Collector, Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, amass, anim
 from viewer.formats import bvh as bvh_reader
-from viewer.formats._reach import is_beyond
+from viewer.formats._translation_limit import is_beyond
 
 TOO_FAR = [2e9, -1e20, 1e38]
 

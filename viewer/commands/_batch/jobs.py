@@ -17,7 +17,7 @@ from viewer.commands._batch.options import TIMEOUT, add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass
-from viewer.formats._kept import keeping_figures
+from viewer.formats._figure_cache import keeping_figures
 from viewer.loading import bundled_body, bundled_files
 from viewer.media.array_cache import without_cache
 from viewer.phrases import printable

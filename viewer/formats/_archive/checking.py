@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
-from viewer.formats._neutral import neutral_corners
-from viewer.formats._reach import FARTHEST
+from viewer.formats._placeholders import neutral_corners
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
+from viewer.formats._translation_limit import FARTHEST
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["archive_of", "are_indices", "corners_of", "finite", "finite_or_nan", "within_reach"]

@@ -30,8 +30,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, item_count, shaped
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
-from viewer.formats._misfit import MisfitError
-from viewer.formats._source import Source
+from viewer.formats._source import InvalidValueError, Source
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
@@ -271,7 +270,7 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
     _fill(storage, key, flat, stream)
     try:
         return shaped(flat, header.shape, header.is_fortran)
-    except MisfitError as problem:
+    except InvalidValueError as problem:
         raise storage.fault(key, problem.problem) from None
 
 

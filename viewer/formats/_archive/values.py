@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
-from viewer.formats._misfit import MisfitError
-from viewer.formats._source import Source
+from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys, nearest_place
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
@@ -73,11 +72,11 @@ class Sparse:
     def __post_init__(self) -> None:
         parts = (self.data, self.indices, self.indptr)
         if any(part.ndim != 1 for part in parts) or self.data.dtype.kind not in "biuf":
-            raise MisfitError(Phrase("sparse-shapes"))
+            raise InvalidValueError(Phrase("sparse-shapes"))
         if self.indices.dtype.kind not in "iu" or self.indptr.dtype.kind not in "iu":
-            raise MisfitError(Phrase("sparse-indices"))
+            raise InvalidValueError(Phrase("sparse-indices"))
         if not all(0 <= side <= _MAX_SIDE for side in self.shape):
-            raise MisfitError(Phrase("sparse-size", most=_MAX_SIDE, shape=self.shape))
+            raise InvalidValueError(Phrase("sparse-size", most=_MAX_SIDE, shape=self.shape))
         if self.layout == "coo":
             self._check_indices(self.indices, self.shape[0])
             self._check_indices(self.indptr, self.shape[1])
@@ -87,7 +86,7 @@ class Sparse:
     def _check_counts(self) -> None:
         across, along = self.shape if self.layout == "csc" else self.shape[::-1]
         if len(self.indptr) != along + 1:
-            raise MisfitError(
+            raise InvalidValueError(
                 Phrase(
                     "sparse-starts",
                     expected=along + 1,
@@ -99,19 +98,19 @@ class Sparse:
         # Unsigned differences wrap around, so compare instead of subtracting.
         ordered = bool((self.indptr[1:] >= self.indptr[:-1]).all())
         if not ordered or int(self.indptr[0]) != 0 or int(self.indptr[-1]) != count:
-            raise MisfitError(Phrase("sparse-order", count=count))
+            raise InvalidValueError(Phrase("sparse-order", count=count))
         self._check_indices(self.indices, across)
 
     def _check_indices(self, indices: NDArray[Any], across: int) -> None:
         """Check the rows or columns of all stored values."""
         count = len(self.data)
         if len(indices) != count:
-            raise MisfitError(Phrase("sparse-count", expected=count, found=len(indices)))
+            raise InvalidValueError(Phrase("sparse-count", expected=count, found=len(indices)))
         if count == 0:
             return
         low, high = int(indices.min()), int(indices.max())
         if low < 0 or high >= across:
-            raise MisfitError(Phrase("sparse-range", last=across - 1, low=low, high=high))
+            raise InvalidValueError(Phrase("sparse-range", last=across - 1, low=low, high=high))
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
         """Return row, column and value of every stored entry.
@@ -508,7 +507,7 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
     if array.dtype.kind == "U" and array.size:
         last = int(array.reshape(-1).view(np.uint32).max())
         if last > _LAST_LETTER:
-            raise MisfitError(Phrase("array-letter", found=last))
+            raise InvalidValueError(Phrase("array-letter", found=last))
     return array
 
 

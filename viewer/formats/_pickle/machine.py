@@ -17,10 +17,9 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import item_count
 from viewer.formats._archive.zip import Data
-from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle import names as names
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
-from viewer.formats._source import Source
+from viewer.formats._source import InvalidValueError, Source
 
 # Maximum number of items; a body model needs a few hundred, a motion in plain lists about 100,000.
 # Results of trackers, which write a dict per frame and person, need one for every eight bytes.
@@ -256,7 +255,7 @@ def _guarded(machine: Machine, action: Callable[[], _Result]) -> _Result:
         return action()
     except UnicodeError:
         raise machine.fail(Phrase("pickle-bytes")) from None
-    except MisfitError as problem:
+    except InvalidValueError as problem:
         raise machine.source.fault("F002.pickle", problem=problem.problem) from None
 
 
@@ -534,9 +533,9 @@ def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], ob
     kind, padding = state.get("subclass"), state.get("numpy_array_alignment_bytes")
     is_usual = isinstance(kind, StandIn) and kind.role == "ndarray"
     if not is_usual or not is_sizes(shape) or not isinstance(dtype, Dtype):
-        raise MisfitError(Phrase("joblib-wrapper", name=wrapper.of.name))
+        raise InvalidValueError(Phrase("joblib-wrapper", name=wrapper.of.name))
     if not isinstance(order, Span) or order.raw() not in (b"C", b"F"):
-        raise MisfitError(Phrase("joblib-wrapper", name=wrapper.of.name))
+        raise InvalidValueError(Phrase("joblib-wrapper", name=wrapper.of.name))
     if dtype.code.startswith("O"):
         return _objects(machine, run)
     if padding is not None:
@@ -546,7 +545,7 @@ def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], ob
     if found is None or n_items is None:
         # The size of the elements is unknown, and therefore also the position at which the pickle
         # continues.
-        raise MisfitError(Phrase("joblib-dtype", dtype=dtype.what(), shape=shape))
+        raise InvalidValueError(Phrase("joblib-dtype", dtype=dtype.what(), shape=shape))
     start = machine.skip(n_items * found.itemsize)
     array = Array()
     array.fill(shape, dtype, order.raw() == b"F", Span(machine.data, start, machine.at))
@@ -560,7 +559,7 @@ def _objects(machine: Machine, run: Callable[[Machine], object]) -> object:
     machine.at = inner.at
     machine.rejoin(inner)
     if not isinstance(found, Array):
-        raise MisfitError(Phrase("joblib-objects"))
+        raise InvalidValueError(Phrase("joblib-objects"))
     return found
 
 

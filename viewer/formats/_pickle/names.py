@@ -2,7 +2,7 @@
 
 ``find`` looks up a pair of module and name in a literal table. It imports nothing and returns a
 stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy, torch, joblib
-and Python themselves write. All four raise ``MisfitError`` for anything else.
+and Python themselves write. All four raise ``InvalidValueError`` for anything else.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import TypeGuard
 
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import Opaque
-from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.tensors import CALLS as TORCH_CALLS
 from viewer.formats._pickle.tensors import ROLES as TORCH_ROLES
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
+from viewer.formats._source import InvalidValueError
 from viewer.phrases import printable
 
 __all__ = ["SPARSE", "as_key", "build", "call", "create", "find"]
@@ -90,9 +90,9 @@ def find(module: str, name: str) -> StandIn:
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
     role = _ROLES.get((module, name))
     if module.startswith("joblib.numpy_pickle") and name in _OLD_WRAPPERS:
-        raise MisfitError(Phrase("joblib-old", name=full))
+        raise InvalidValueError(Phrase("joblib-old", name=full))
     if role is None:
-        raise MisfitError(Phrase("pickle-global", name=full))
+        raise InvalidValueError(Phrase("pickle-global", name=full))
     return StandIn(full, role)
 
 
@@ -107,7 +107,7 @@ def call(function: object, arguments: object) -> tuple[object, int]:
         A tuple; anything else is refused.
     """
     if not isinstance(function, StandIn) or function.role not in (*_CALLS, *TORCH_CALLS):
-        raise MisfitError(Phrase("pickle-call", found=noun(function)))
+        raise InvalidValueError(Phrase("pickle-call", found=noun(function)))
     if isinstance(arguments, tuple) and len(arguments) <= _MOST_ARGUMENTS:
         made = _called(function.role, arguments)
         if made is not _WRONG:
@@ -115,7 +115,7 @@ def call(function: object, arguments: object) -> tuple[object, int]:
             sizes = [len(each) for each in arguments if isinstance(each, list | Span)]
             return made, sum(sizes) if copies else 0
     found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
-    raise MisfitError(Phrase("pickle-arguments", name=function.name, found=found))
+    raise InvalidValueError(Phrase("pickle-arguments", name=function.name, found=found))
 
 
 def _called(role: str, arguments: tuple[object, ...]) -> object:
@@ -128,7 +128,7 @@ def _called(role: str, arguments: tuple[object, ...]) -> object:
 def create(of: object, arguments: object) -> Instance:
     """Return a new object of a class, whose state is set later by ``build``."""
     if not isinstance(of, StandIn) or of.role not in _CLASSES or arguments != ():
-        raise MisfitError(Phrase("pickle-create", found=noun(of)))
+        raise InvalidValueError(Phrase("pickle-create", found=noun(of)))
     return Instance(of)
 
 
@@ -141,10 +141,10 @@ def build(target: object, state: object) -> None:
     elif isinstance(target, Instance):
         if not isinstance(state, dict):
             problem = Phrase("pickle-state", name=target.of.name, found=noun(state))
-            raise MisfitError(problem)
+            raise InvalidValueError(problem)
         target.state = state
     else:
-        raise MisfitError(Phrase("pickle-build", found=noun(target)))
+        raise InvalidValueError(Phrase("pickle-build", found=noun(target)))
 
 
 def as_key(value: object) -> str | bytes | int:
@@ -162,7 +162,7 @@ def as_key(value: object) -> str | bytes | int:
         return value.raw() if value.coding is None else value.text()
     if type(value) is int and abs(value) < _LARGEST_KEY:
         return value
-    raise MisfitError(Phrase("pickle-as-key", found=noun(value)))
+    raise InvalidValueError(Phrase("pickle-as-key", found=noun(value)))
 
 
 def _is_text(value: object, text: str) -> bool:
@@ -297,7 +297,7 @@ def _build_array(target: Array, state: object) -> None:
                 target.what, target.items = dtype.what(), payload
                 target.shape, target.is_fortran = shape, bool(order)
                 return
-    raise MisfitError(Phrase("pickle-array-state", found=noun(state)))
+    raise InvalidValueError(Phrase("pickle-array-state", found=noun(state)))
 
 
 def _build_dtype(target: Dtype, state: object) -> None:
@@ -305,11 +305,11 @@ def _build_dtype(target: Dtype, state: object) -> None:
         case (3 | 4, order, sub, names, fields, size, int(), int(), *_) if len(state) <= 9:
             letter = _short(order)
             if letter is None or letter not in _ORDERS:
-                raise MisfitError(Phrase("pickle-byte-order", found=noun(order)))
+                raise InvalidValueError(Phrase("pickle-byte-order", found=noun(order)))
             if any(part is not None for part in (sub, names, fields)):
                 target.code = "V"  # records may have any size
             target.order = letter
             dtype = target.dtype()
             if dtype is None or size in (-1, dtype.itemsize):
                 return
-    raise MisfitError(Phrase("pickle-dtype-state", found=noun(state)))
+    raise InvalidValueError(Phrase("pickle-dtype-state", found=noun(state)))

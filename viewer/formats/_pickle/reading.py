@@ -29,12 +29,11 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Sparse, Value
-from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.names import SPARSE
 from viewer.formats._pickle.tensors import Storage, Tensor
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
-from viewer.formats._source import Source
+from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
@@ -285,7 +284,7 @@ class _Resolver:
         data, indices, indptr = (self.part(state, name) for name in ("data", *names))
         try:
             return Sparse((shape[0], shape[1]), data, indices, indptr, matrix.of.role)
-        except MisfitError as problem:
+        except InvalidValueError as problem:
             raise self.fail(problem.problem) from None
 
     def part(self, state: dict[str | bytes | int, object], name: str) -> NDArray[Any]:

@@ -19,8 +19,8 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import item_count, shaped
 from viewer.formats._archive.zip import MAX_RATIO, SMALL
-from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Span, StandIn, is_sizes
+from viewer.formats._source import InvalidValueError
 from viewer.rig.arrays import Deferred
 
 __all__ = ["CALLS", "ROLES", "Storage", "Tensor", "storage_of"]
@@ -77,7 +77,7 @@ class Storage:
         """Return the elements as a type of this size, as stored."""
         if self._bytes is None:
             if self.load is None:
-                raise MisfitError(Phrase("tensor-no-storage"))
+                raise InvalidValueError(Phrase("tensor-no-storage"))
             self._bytes = np.frombuffer(self.load(), np.uint8)
         dtype = _stored(code).newbyteorder(self.order)
         whole = len(self._bytes) // dtype.itemsize * dtype.itemsize
@@ -103,9 +103,9 @@ class Tensor:
         )
         if n_items is None or (n_items and last >= room) or self.offset > room:
             values = {"shape": self.shape, "strides": self.strides, "offset": self.offset}
-            raise MisfitError(Phrase("tensor-range", **values, found=room))
+            raise InvalidValueError(Phrase("tensor-range", **values, found=room))
         if n_items * size > max(SMALL, MAX_RATIO * self.storage.size):
-            raise MisfitError(Phrase("tensor-ratio", shape=self.shape, most=MAX_RATIO))
+            raise InvalidValueError(Phrase("tensor-ratio", shape=self.shape, most=MAX_RATIO))
 
     def deferred(self, fail: Callable[[Phrase], Exception]) -> Deferred:
         """Return the deferred array; bfloat16, which numpy lacks, as float32."""
@@ -115,7 +115,7 @@ class Tensor:
     def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[Any]:
         try:
             flat = self.storage.flat(self.code)[self.offset :]
-        except MisfitError as problem:
+        except InvalidValueError as problem:
             raise fail(problem.problem) from None
         if math.prod(self.shape) == 0:
             values = np.empty(self.shape, flat.dtype)

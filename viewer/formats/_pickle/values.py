@@ -20,7 +20,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import array_dtype, item_count, shaped
 from viewer.formats._archive.zip import Data
-from viewer.formats._misfit import MisfitError
+from viewer.formats._source import InvalidValueError
 from viewer.rig.arrays import Deferred
 
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
@@ -178,7 +178,9 @@ class Array:
         n_items = item_count(shape, found.itemsize)
         if n_items is None or n_items * found.itemsize != len(packed):
             size = len(packed)
-            raise MisfitError(Phrase("array-bytes", shape=shape, dtype=found.name, found=size))
+            raise InvalidValueError(
+                Phrase("array-bytes", shape=shape, dtype=found.name, found=size)
+            )
         self.shape, self.dtype, self.payload = shape, found, packed
         self.is_fortran = is_fortran
 
@@ -200,7 +202,7 @@ class Array:
             If a string contains invalid code points.
         """
         if self.payload is None or self.dtype is None:
-            raise MisfitError(Phrase("array-not-numbers", found=self.what))
+            raise InvalidValueError(Phrase("array-not-numbers", found=self.what))
         flat = np.empty(0, self.dtype)
         if len(self.payload):  # numpy cannot create a view of zero bytes
             n_items = len(self.payload) // self.dtype.itemsize
@@ -215,7 +217,7 @@ class Array:
     def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[Any]:
         try:
             return self.values()
-        except MisfitError as problem:
+        except InvalidValueError as problem:
             raise fail(problem.problem) from None
 
 

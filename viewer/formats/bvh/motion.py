@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._neutral import held_rows
-from viewer.formats._reach import FARTHEST, is_beyond
+from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, to_number
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
+from viewer.formats._translation_limit import FARTHEST, is_beyond
 from viewer.formats.bvh.hierarchy import BvhJoint, called
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.quaternion import align_signs

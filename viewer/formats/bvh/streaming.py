@@ -15,9 +15,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._reach import is_beyond
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._translation_limit import is_beyond
 from viewer.formats.bvh import has_few_channels, skeleton_motion
 from viewer.formats.bvh.guess import examined_frames, frame_rate
 from viewer.formats.bvh.hierarchy import read_hierarchy

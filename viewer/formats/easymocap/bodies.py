@@ -16,8 +16,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
-from viewer.formats._reach import within_text
 from viewer.formats._text.numbers import LARGEST
+from viewer.formats._translation_limit import within_text
 from viewer.formats.easymocap.json_frames import (
     RecordError,
     has_numbers,

@@ -31,8 +31,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
-from viewer.formats._misfit import remark_on
-from viewer.formats._source import Source
+from viewer.formats._source import Source, remark_on
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
 from viewer.phrases import printable

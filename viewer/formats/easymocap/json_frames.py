@@ -14,8 +14,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
-from viewer.formats._misfit import MisfitError
-from viewer.formats._reach import FARTHEST, within_text
+from viewer.formats._source import InvalidValueError
 from viewer.formats._text.json_places import (
     MOST_DIGITS,
     Keys,
@@ -26,6 +25,7 @@ from viewer.formats._text.json_places import (
     repeated_key,
 )
 from viewer.formats._text.numbers import LARGEST
+from viewer.formats._translation_limit import FARTHEST, within_text
 from viewer.phrases import printable
 
 Record = dict[str, Any]
@@ -35,7 +35,7 @@ _OF_PERSON = {"poses", "keypoints3d"}
 _WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
 
 
-class RecordError(MisfitError):
+class RecordError(InvalidValueError):
     """A person's record, or a part of it, that is invalid.
 
     Attributes

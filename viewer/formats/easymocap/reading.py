@@ -17,7 +17,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
-from viewer.formats._misfit import remark_on
+from viewer.formats._source import remark_on
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.easymocap.bodies import (
     COEFFICIENTS,

@@ -34,7 +34,7 @@ from viewer.formats._mesh.polygons import (
     stated_up,
     triangulate,
 )
-from viewer.formats._neutral import neutral_positions
+from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats.obj.faces import (

@@ -32,7 +32,7 @@ from viewer.formats._mesh.polygons import (
     triangulate,
 )
 from viewer.formats._mesh.texture import load_image
-from viewer.formats._neutral import neutral_positions
+from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.ply.header import CORNERS, Header, read_header

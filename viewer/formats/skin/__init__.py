@@ -27,7 +27,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._mesh.texture import load_image
-from viewer.formats._neutral import neutral_positions
+from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.skin.checks import (

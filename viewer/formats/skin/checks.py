@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.formats._neutral import neutral_corners
+from viewer.formats._placeholders import neutral_corners
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.skin.sections import Sections, check_declared

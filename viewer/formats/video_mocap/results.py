@@ -12,7 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_frames
-from viewer.formats._neutral import held_rows
+from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace

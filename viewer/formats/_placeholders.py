@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["held_rows", "neutral_corners", "neutral_positions"]
-
 
 def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
     """Return positions with each NaN vertex moved to the mean of its valid neighbours.

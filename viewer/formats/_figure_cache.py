@@ -12,8 +12,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.formats._source import Source
 from viewer.rig.figure import Figure
 
-__all__ = ["keeping_figures", "kept_or_read"]
-
 _Content = TypeVar("_Content")
 
 

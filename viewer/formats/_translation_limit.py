@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Phrase
 from viewer.rig.arrays import Bools
 
-__all__ = ["FARTHEST", "is_beyond", "within_text"]
-
 FARTHEST = 1e9
 """Largest translation along an axis, in units of the file."""
 
