@@ -14,8 +14,6 @@ from viewer.phrases import counted, printable
 from viewer.rig.scene import Scene
 from viewer.rig.skeleton import joint_labels
 
-__all__ = ["describe", "finding_text", "summary", "worst_first"]
-
 _LISTED = 100  # maximum number of locations of a finding in JSON; the total is always included
 
 

@@ -10,14 +10,12 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.lint._counting import counting_of
-from viewer.lint._finding import Finding, LintOptions, Subject
+from viewer.lint._finding import Finding, LintOptions
+from viewer.lint._subject import Subject, counting_of
 from viewer.rig.arrays import Ints
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.scene import Actor, Scene
-
-__all__ = ["CHECKS", "Check", "Progress", "lint_scene"]
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of completed steps, the total, and the next step; may raise to cancel."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.lint._finding import Finding, Subject
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Subject
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import joint_labels
-
-__all__ = ["are_singular", "check"]
 
 # Maximum determinant of a singular matrix, relative to the product of its column lengths.
 _SINGULAR = 1e-12

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
-from viewer.lint._finding import Finding, Subject
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Indices, Subject
 from viewer.lint.clips import missing_frames
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
-
-__all__ = ["LOW_FRACTION", "LOW_FRAMES", "check"]
-
-Indices = NDArray[np.int64]
 
 LOW_FRACTION = 0.05
 """Fraction of a keypoint's visible frames: this much low confidence is normal."""

@@ -8,9 +8,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, frame_range
-from viewer.lint._finding import Finding, Subject
-from viewer.lint._track import Indices, Track
-from viewer.lint._tracks import frame_numbers, key_times, track_of
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Indices, Subject, Track, frame_numbers, key_times, track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip, evaluate_all
@@ -18,8 +17,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, joint_labels
-
-__all__ = ["check", "missing_frames"]
 
 _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s

@@ -5,17 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.lint._finding import Finding, Subject
-from viewer.lint._track import Track
-from viewer.lint._tracks import track_of
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Subject, Track, track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.ground_height import Ground, ground_of, resting_frames
 from viewer.rig.inspection.soles import extent
 from viewer.rig.skeleton import joint_labels
-
-__all__ = ["check"]
 
 # Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm if it is a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03

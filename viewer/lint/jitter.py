@@ -6,16 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from viewer.lint._finding import Finding, Subject
-from viewer.lint._tracks import track_of
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Subject, track_of
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.skeleton import joint_labels
-
-__all__ = ["check", "noise_of"]
 
 _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms
 _POINT_LIMIT = 0.02  # noise relative to the median size: triangulated points are noisier

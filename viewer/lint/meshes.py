@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewer.lint._finding import Finding, Subject
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Indices, Subject
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import Edges, edges_of, orientations, welded
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, flat_triangles, typical_place
-
-__all__ = ["check"]
-
-Indices = NDArray[np.int64]
 
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # maximum length of a zero normal

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.lint._finding import Finding, Subject
-from viewer.lint._track import Indices
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Indices, Subject
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
@@ -16,8 +16,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
-
-__all__ = ["check"]
 
 # Lengths are relative to the size of the body.
 _JUMPS = 0.15  # minimum jump of both people between two frames: 0.3 m for an adult

@@ -7,12 +7,11 @@ from collections import Counter
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.lint._finding import Finding, Subject
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Subject
 from viewer.rig.pose import Pose
 from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels, shown_joints
-
-__all__ = ["check"]
 
 _UNIT = 1e-3  # deviation of a quaternion's length from 1, for files with three digits
 _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths

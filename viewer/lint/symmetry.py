@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.lint._finding import Finding, Subject
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Subject
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.retargeting.mirror import asymmetry, joint_partners
 from viewer.rig.skin import Skin, normalized, owners, row_norms
-
-__all__ = ["check"]
 
 _MOVED = 1e-3  # minimum displacement that is reported as a note, as a fraction of the figure's size
 _ASKEW = 1e-2  # minimum visible displacement, as a fraction of the figure's size

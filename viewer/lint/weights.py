@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.lint._finding import Finding, Subject
+from viewer.lint._finding import Finding
+from viewer.lint._subject import Subject
 from viewer.lint.bindings import are_singular
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip

@@ -120,7 +120,7 @@ def hold_checks(monkeypatch):
         seen.append(scene)
         return lint_scene(scene, options)
 
-    monkeypatch.setattr("viewer.lint._again.lint_scene", held)
+    monkeypatch.setattr("viewer.lint._rechecks.lint_scene", held)
     return go, seen, is_held
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
-from lint.test_again import TEXTS
+from lint.test_rechecks import TEXTS
 
 from viewer.app.linting.state import Linting
 from viewer.cli import run

@@ -7,7 +7,7 @@ from formats.gltf.files import File, animated, skinned
 from formats.gltf.planted_gltf import PLANTED
 from formats.gltf.validator_faults import FAULTS
 
-from viewer.lint import lint_again, lint_files
+from viewer.lint import recheck, lint_files
 from viewer.loading import MotionSettings, load
 from viewer.rig import skeleton
 from viewer.rig.motion.animation_choice import play_animation
@@ -164,10 +164,10 @@ def test_findings_in_animations_of_an_open_scene_have_the_pointers_of_the_file(
 ) -> None:
     path = with_two_animations(tmp_path)
     scene = load(path)
-    (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
+    (found,) = [one for one in recheck(scene, [path]).findings if one.code == "C003"]
     assert found.place() == f"{path}#/animations/1"
     play_animation(scene.actors[0], 1)
-    (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
+    (found,) = [one for one in recheck(scene, [path]).findings if one.code == "C003"]
     assert found.place() == f"{path}#/animations/1"
 
 

@@ -19,7 +19,7 @@ from viewer.lint import (
     LintOptions,
     describe,
     finding_text,
-    lint_again,
+    recheck,
     summary,
     worst_first,
 )
@@ -63,9 +63,9 @@ def start_check(state: AppState) -> None:
     def check(report: Report) -> list[str]:
         # The bundled figure is also read from files.
         files, is_likely = paths or bundled_files(), not paths
-        again = lint_again(copy, files, options, settings, since, report, is_likely)
-        findings = tuple(worst_first(again.findings))
-        running.result = Checked(source, copy, options, findings, again.n_files, again.notes)
+        found = recheck(copy, files, options, settings, since, report, is_likely)
+        findings = tuple(worst_first(found.findings))
+        running.result = Checked(source, copy, options, findings, found.n_files, found.notes)
         return [f"Checked: {summary(findings)}"]
 
     running.job = state.job = CountedJob(_TITLE, check)

@@ -1,4 +1,8 @@
-"""Repeated checks of an open scene, together with its source files."""
+"""Checks of an open scene, which may have been edited, together with the files it came from.
+
+The files are read again, because the scene has no messages of readers. A message belongs to a part
+of the scene, its mesh, skeleton or clip, as long as this part still equals that of the file.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.lint._files import Opened, Owners, open_files, with_files
 from viewer.lint._finding import Finding, LintOptions
-from viewer.lint._opening import Opened, Owners, open_files, with_files
 from viewer.lint._running import Progress, lint_scene
 from viewer.phrases import listed, printable
 from viewer.rig.figure import Figure
@@ -22,15 +26,13 @@ from viewer.rig.scene import Actor, Motion, Scene
 if TYPE_CHECKING:
     from viewer.loading import MotionSettings
 
-__all__ = ["Again", "lint_again"]
-
 _MESH = ("positions", "normals", "triangles")
 _SKIN = ("starts", "joints", "weights", "inverse_bind")
-_NAMED = 3  # maximum number of files that a note lists
+_LISTED = 3  # maximum number of files that a note lists
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Again:
+class Recheck:
     """Findings about an open scene and its files.
 
     Attributes
@@ -48,7 +50,7 @@ class Again:
     notes: tuple[str, ...]
 
 
-def lint_again(
+def recheck(
     scene: Scene,
     paths: Sequence[Path],
     options: LintOptions | None = None,
@@ -56,7 +58,7 @@ def lint_again(
     since: float | None = None,
     progress: Progress | None = None,
     is_likely: bool = False,
-) -> Again:
+) -> Recheck:
     """Check an open scene, and report messages of the readers of its files.
 
     Parts unchanged since opening are reported with file and line, edited parts without them.
@@ -83,7 +85,7 @@ def lint_again(
     findings = lint_scene(scene, options, progress)
     owners = [_owners(actor, index, opened) for index, actor in enumerate(scene.actors)]
     if is_likely and not any(owners):
-        return Again(findings, 0, ())
+        return Recheck(findings, 0, ())
     notes = []
     gone = [path for path in paths if not _is_there(path)]
     if gone:
@@ -94,11 +96,11 @@ def lint_again(
     if changed:
         which = _names(changed, "was", "were")
         notes.append(f"{which} changed after opening: readers' messages are about the new contents")
-    return Again(with_files(opened, findings, (scene, owners)), len(paths), tuple(notes))
+    return Recheck(with_files(opened, findings, (scene, owners)), len(paths), tuple(notes))
 
 
 def _names(paths: list[Path], one: str, many: str) -> str:
-    names = listed([printable(path.name, 60) for path in paths], _NAMED)
+    names = listed([printable(path.name, 60) for path in paths], _LISTED)
     return f"{names} {one if len(paths) == 1 else many}"
 
 

@@ -1,4 +1,10 @@
-"""Opening of files for checks: failures become findings, and the other files are assembled."""
+"""Checks of files: failures to open them become findings, and findings get a file and a line.
+
+Each file is read to its end, with all its errors. Files that match are assembled as in ``load``; a
+file that does not match is reported and taken out, and its figures are checked alone. Findings
+about the scene then get the file from which the part of the actor came, and messages of readers
+get their actor. What a reader and a check both found is reported once.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +21,8 @@ from viewer.diagnostics.diagnostic import merged
 from viewer.diagnostics.wording import PLACES
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source
-from viewer.lint._finding import Finding
-from viewer.lint._running import Progress
+from viewer.lint._finding import Finding, LintOptions
+from viewer.lint._running import Progress, lint_scene
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.phrases import printable
 from viewer.rig.arrays import Ints
@@ -29,6 +35,8 @@ if TYPE_CHECKING:
 
 Owners = dict[str, int]
 """For each ``Finding.part``, the index of the opened actor that has the same part."""
+
+# Lists of contents that can be assembled, or taken out of the scene
 _LISTS = (
     "figures",
     "clips",
@@ -39,7 +47,51 @@ _LISTS = (
     "captures",
     "morphs",
 )
+_INVALID = {"mesh": ("positions", "weights", "triangles", "bindings"),
+            "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
+"""Diagnostic parts for each part of an actor."""
+_CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
+"""Codes of warnings that the checks of the scene report too, with all locations."""
 _INSTEAD = {"normals": "positions"}
+"""Items whose line is given if a file does not have those of the finding."""
+
+
+def lint_files(
+    paths: Sequence[str | Path],
+    options: LintOptions | None = None,
+    settings: MotionSettings | None = None,
+    max_size: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Scene, list[Finding]]:
+    """Open files together and run all checks; files that cannot be opened become findings too.
+
+    All errors for which the viewer would reject a file are recorded, and everything else in the
+    file is checked if possible.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        As for ``viewer.loading.load``.
+    options : LintOptions, optional
+        Thresholds of the checks.
+    settings : MotionSettings, optional
+        Settings that determine how motions are interpreted.
+    max_size : int, optional
+        Larger files, in bytes, are not read.
+    progress : callable, optional
+        As for ``lint_scene``; also called while files are read.
+
+    Returns
+    -------
+    scene : Scene
+        Contents of all files that could be opened; findings refer to its actors.
+    findings : list of Finding
+        Messages of readers, then results of checks, each with its file if known.
+    """
+    size = MAX_SIZE if max_size is None else max_size
+    opened = open_files(paths, settings, size, progress)
+    findings = lint_scene(opened.scene, options, progress, invalid_parts(opened))
+    return opened.scene, with_files(opened, findings)
 
 
 @dataclass(slots=True)
@@ -123,6 +175,29 @@ def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -
     for name in _LISTS:
         getattr(opened.contents, name).extend(getattr(contents, name))
     return named
+
+
+def _of_refusal(problem: ViewerError, path: Path) -> Finding:
+    """Return the error that stopped parsing a file as a finding."""
+    finding = _of_error(problem, path)
+    return replace(finding, diagnostic=replace(finding.diagnostic, is_final=True))
+
+
+def _of_error(problem: ViewerError, path: Path | None = None) -> Finding:
+    """Return an error as a finding; ``path`` is the file that failed, if the error has none."""
+    found = problem.diagnostic
+    if found is None:  # the figure's classes reported parts that do not match
+        found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
+    return of_diagnostic(found)
+
+
+def of_diagnostic(found: Diagnostic) -> Finding:
+    """Return a reader's diagnostic as a finding."""
+    field = PLACES.get(found.part)
+    if field is None or found.places is None:
+        return Finding(found)
+    places: dict[str, Any] = {field: found.places}
+    return Finding(found, **places)
 
 
 def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
@@ -237,10 +312,26 @@ def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
     return figures
 
 
+def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
+    """Return the data of each actor that its readers replaced; see ``Subject``."""
+    return [_invalid(actor, opened) for actor in opened.scene.actors]
+
+
+def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
+    lost: dict[str, Ints] = {}
+    for part, keys in _INVALID.items():
+        for path in _files_of(actor, part, opened.contents):
+            for fault in opened.sources[path].diagnostics.errors:
+                if fault.part in keys and fault.places is not None:
+                    known = lost.get(fault.part, fault.places)
+                    lost[fault.part] = np.union1d(known, fault.places)
+    return lost
+
+
 def with_files(
     opened: Opened,
     findings: list[Finding],
-    looked_at: tuple[Scene, Sequence[Owners]] | None = None,
+    checked: tuple[Scene, Sequence[Owners]] | None = None,
 ) -> list[Finding]:
     """Return all findings without duplicate messages, and with files for those about the scene.
 
@@ -250,17 +341,17 @@ def with_files(
         Provides the messages of readers, and the origin of the data.
     findings : list of Finding
         Findings about its scene, or about the scene that was checked instead.
-    looked_at : (Scene, sequence of Owners), optional
+    checked : (Scene, sequence of Owners), optional
         The scene that was checked instead, and for each of its actors the parts equal to opened
         parts.
     """
-    if looked_at is None:
+    if checked is None:
         actors = opened.scene.actors
         everything = [dict.fromkeys(_INVALID, index) for index in range(len(actors))]
-        looked_at = opened.scene, everything
-    placed = [_placed(finding, opened, *looked_at) for finding in findings]
+        checked = opened.scene, everything
+    placed = [_placed(finding, opened, *checked) for finding in findings]
     remarks: list[Finding] = []
-    for remark in _aimed(opened, *looked_at):
+    for remark in _with_actors(opened, *checked):
         twin = next((index for index, other in enumerate(placed) if _is_same(remark, other)), None)
         if twin is None:
             remarks.append(remark)
@@ -320,7 +411,7 @@ def _pointer(finding: Finding, actor: Actor, source: Source) -> str | None:
     return source.pointer_of(actor.figure.skeleton, *finding.at)
 
 
-def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
+def _with_actors(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
     """Return readers' messages with their actors, if they refer to a location in one."""
     known: dict[tuple[Path, str], int] = {}
     for number, parts in enumerate(owners):
@@ -333,90 +424,13 @@ def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Findi
         for part in _INVALID:
             index = known.get((remark.file or Path(), part))
             if found is None and index is not None:
-                found = aimed_at(remark, scene.actors[index], part)
+                found = located_in(remark, scene.actors[index], part)
                 found = None if found is None else replace(found, actor=index)
         aimed.append(found or remark)
     return aimed
 
 
-def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
-    """Return the files that a part of an actor may come from, the most likely first."""
-    mesh, skeleton = actor.figure.mesh, actor.figure.skeleton
-    if part == "clip":
-        # Motions become separate clips, except for keyed ones, which are kept as read.
-        paths = [path for path, clip in contents.clips if clip is actor.clip]
-        paths += [
-            path
-            for path, figure in contents.figures
-            if any(animation.plays(actor.clip) for animation in figure.animations)
-        ]
-        moving = [*contents.body_motions, *contents.skeleton_motions, *contents.captures]
-        return paths + ([moving[0][0]] if len(moving) == 1 and not paths else [])
-    if part == "skeleton" and skeleton is not None:
-        moved = [(path, motion.figure) for path, motion in contents.skeleton_motions]
-        own = [path for path, figure in contents.figures if figure.skeleton is skeleton]
-        return own or [
-            path
-            for path, figure in moved
-            if figure.skeleton is not None and figure.skeleton.names == skeleton.names
-        ]
-    return [
-        path
-        for path, figure in contents.figures
-        # Applying a texture creates another mesh with the same positions.
-        if mesh is not None and figure.mesh is not None and figure.mesh.positions is mesh.positions
-    ]
-
-
-_INVALID = {"mesh": ("positions", "weights", "triangles", "bindings"),
-            "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
-"""Diagnostic parts for each part of an actor."""
-
-
-def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
-    """Return the data of each actor that its readers replaced; see ``Subject``."""
-    return [_invalid(actor, opened) for actor in opened.scene.actors]
-
-
-def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
-    lost: dict[str, Ints] = {}
-    for part, keys in _INVALID.items():
-        for path in _files_of(actor, part, opened.contents):
-            for fault in opened.sources[path].diagnostics.errors:
-                if fault.part in keys and fault.places is not None:
-                    known = lost.get(fault.part, fault.places)
-                    lost[fault.part] = np.union1d(known, fault.places)
-    return lost
-
-
-_CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
-"""Codes of warnings that the checks of the scene report too, with all locations."""
-
-
-def _of_error(problem: ViewerError, path: Path | None = None) -> Finding:
-    """Return an error as a finding; ``path`` is the file that failed, if the error has none."""
-    found = problem.diagnostic
-    if found is None:  # the figure's classes reported parts that do not match
-        found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
-    return of_diagnostic(found)
-
-
-def _of_refusal(problem: ViewerError, path: Path) -> Finding:
-    """Return the error that stopped parsing a file as a finding."""
-    finding = _of_error(problem, path)
-    return replace(finding, diagnostic=replace(finding.diagnostic, is_final=True))
-
-
-def of_diagnostic(found: Diagnostic) -> Finding:
-    """Return a reader's diagnostic as a finding."""
-    field = PLACES.get(found.part)
-    if field is None or found.places is None:
-        return Finding(found)
-    places: dict[str, Any] = {field: found.places}
-    return Finding(found, **places)
-
-
-def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
+def located_in(remark: Finding, actor: Actor, part: str) -> Finding | None:
     """Return a reader's finding with its locations in an actor, or None if there are none.
 
     Parameters
@@ -456,3 +470,32 @@ def _in_clip(remark: Finding, actor: Actor) -> Finding | None:
     if len(channels) == 0:
         return None
     return replace(remark, joints=np.unique(skeleton.dof_joints[channels]))
+
+
+def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
+    """Return the files that a part of an actor may come from, the most likely first."""
+    mesh, skeleton = actor.figure.mesh, actor.figure.skeleton
+    if part == "clip":
+        # Motions become separate clips, except for keyed ones, which are kept as read.
+        paths = [path for path, clip in contents.clips if clip is actor.clip]
+        paths += [
+            path
+            for path, figure in contents.figures
+            if any(animation.plays(actor.clip) for animation in figure.animations)
+        ]
+        moving = [*contents.body_motions, *contents.skeleton_motions, *contents.captures]
+        return paths + ([moving[0][0]] if len(moving) == 1 and not paths else [])
+    if part == "skeleton" and skeleton is not None:
+        moved = [(path, motion.figure) for path, motion in contents.skeleton_motions]
+        own = [path for path, figure in contents.figures if figure.skeleton is skeleton]
+        return own or [
+            path
+            for path, figure in moved
+            if figure.skeleton is not None and figure.skeleton.names == skeleton.names
+        ]
+    return [
+        path
+        for path, figure in contents.figures
+        # Applying a texture creates another mesh with the same positions.
+        if mesh is not None and figure.mesh is not None and figure.mesh.positions is mesh.positions
+    ]

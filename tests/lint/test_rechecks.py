@@ -15,8 +15,8 @@ from lint.test_planted_files import LATE_KEYS
 
 import viewer
 from viewer.diagnostics import Diagnostic
-from viewer.lint import Finding, finding_text, lint_again, lint_files
-from viewer.lint._opening import aimed_at, of_diagnostic
+from viewer.lint import Finding, finding_text, lint_files, recheck
+from viewer.lint._files import located_in, of_diagnostic
 from viewer.loading import bundled_files
 from viewer.rig.scene import Scene
 
@@ -37,11 +37,11 @@ def files(tmp_path: Path) -> list[Path]:
 
 
 def checked(files: list[Path], scene: Scene | None = None) -> list[Finding]:
-    return lint_again(scene or viewer.load(*files), files).findings
+    return recheck(scene or viewer.load(*files), files).findings
 
 
 def test_errors_repaired_by_readers_are_found_as_by_the_command(files: list[Path]) -> None:
-    again = lint_again(viewer.load(*files), files)
+    again = recheck(viewer.load(*files), files)
     assert again.n_files == 3 and again.notes == ()
     texts = [*map(finding_text, again.findings)]
     assert texts == [*map(finding_text, lint_files(files)[1])]
@@ -84,7 +84,7 @@ def test_edited_data_has_no_line(files: list[Path]) -> None:
 def test_missing_files_are_reported(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].unlink()
-    again = lint_again(scene, files)
+    again = recheck(scene, files)
     assert again.notes == ("a.skin is missing: only the open scene was checked",)
     (gone,) = [f for f in again.findings if f.severity == "error" and f.code[0] == "F"]
     assert (gone.code, gone.file) == ("F001", files[1])
@@ -94,15 +94,15 @@ def test_missing_files_are_reported(files: list[Path]) -> None:
 
 def test_changed_files_are_reported(files: list[Path]) -> None:
     scene, opened_at = viewer.load(*files), time.time()
-    assert lint_again(scene, files, since=opened_at + 60.0).notes == ()
+    assert recheck(scene, files, since=opened_at + 60.0).notes == ()
     os.utime(files[0], (opened_at + 100.0,) * 2)
-    again = lint_again(scene, files, since=opened_at + 60.0)
+    again = recheck(scene, files, since=opened_at + 60.0)
     assert again.notes == (
         "a.skel was changed after opening: readers' messages are about the new contents",
     )
     for path in files:
         os.utime(path, (opened_at + 100.0,) * 2)
-    again = lint_again(scene, files, since=opened_at + 60.0)
+    again = recheck(scene, files, since=opened_at + 60.0)
     assert again.notes[0].startswith("a.skel, a.skin, a.anim were changed")
 
 
@@ -112,7 +112,7 @@ def test_changed_file_in_a_folder_is_detected(tmp_path: Path) -> None:
     folder = pig_text.write(tmp_path / "pig")
     scene, opened_at = viewer.load(folder), time.time()
     os.utime(folder / "vertices.txt", (opened_at + 100.0,) * 2)
-    assert lint_again(scene, [folder], since=opened_at + 60.0).notes[0].startswith("pig was")
+    assert recheck(scene, [folder], since=opened_at + 60.0).notes[0].startswith("pig was")
 
 
 def test_new_error_in_a_changed_file_is_reported(files: list[Path]) -> None:
@@ -124,9 +124,9 @@ def test_new_error_in_a_changed_file_is_reported(files: list[Path]) -> None:
 
 def test_guessed_files_are_used_only_if_the_scene_matches_them() -> None:
     bundled = list(bundled_files())
-    again = lint_again(viewer.load(), bundled, is_likely=True)
+    again = recheck(viewer.load(), bundled, is_likely=True)
     assert again.n_files == 2 and all(f.file in bundled for f in again.findings)
-    assert lint_again(scene_of(column()), bundled, is_likely=True).n_files == 0
+    assert recheck(scene_of(column()), bundled, is_likely=True).n_files == 0
 
 
 def test_findings_about_captured_people_refer_to_the_folder(shared_data: Path) -> None:
@@ -149,7 +149,7 @@ def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
             raise StopError
 
     with pytest.raises(StopError):
-        lint_again(scene, [folder], progress=stop)
+        recheck(scene, [folder], progress=stop)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
 def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> None:
     key, data, places = found
     remark = Diagnostic(key, Path("a.skin"), 8, data, None if places is None else np.array(places))
-    aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], part)
+    aimed = located_in(of_diagnostic(remark), scene_of(column()).actors[0], part)
     if vertices is None:
         assert aimed is None
     else:
@@ -177,5 +177,5 @@ def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> 
 
 def test_vertex_stated_only_in_a_value_is_found() -> None:
     remark = Diagnostic("W002.vertex", Path("a.npz"), values={"vertex": 3})
-    aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
+    aimed = located_in(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
     assert aimed.vertices.tolist() == [3]

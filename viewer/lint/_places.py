@@ -1,4 +1,4 @@
-"""Positions of a finding in the scene, for the camera and for highlighting."""
+"""Positions that a finding refers to in the scene, for the camera and for highlighting."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skinning import Skinning, deform, joint_matrices
-
-__all__ = ["Places", "places_of", "points_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

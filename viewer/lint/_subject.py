@@ -1,0 +1,396 @@
+"""The subject of checks: an actor, its frame numbers, and its track.
+
+A check gets one ``Subject`` and returns findings about it. Checks of motion look at its ``Track``,
+the clip evaluated frame by frame in the scene, which is computed once for all of them. Keyed clips
+have no frames of their own: they are sampled at ``key_times``, and ``Counting`` gives these times
+the frame numbers that the timeline shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
+from viewer.lint._finding import NO_INDICES, NO_TIMES, Finding, LintOptions
+from viewer.phrases import rounded
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.soles import soles_of
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion.animation_choice import animation_labels
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import (
+    JointMotion,
+    frame_rate,
+    frames_between,
+    frames_of,
+    time_span,
+    world_frames,
+)
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.scalars import length_text
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.shape import rest_joints, shaped
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.units import METRES
+
+Indices = NDArray[np.int64]
+_IndicesLike = NDArray[np.int64] | Ints | list[int]
+
+# Size of a figure
+_STRAYS = 0.02  # maximum fraction of stray vertices at each end of an axis
+_FAR = 10.0  # strays are ignored if they enlarge the bounding box by more than this factor
+_PROP = 0.1  # relative size of a skeleton below which its mesh determines the size
+# Frames
+_TOGETHER = 1000  # frames per batch, which limits the memory for their matrices
+_MOST = 200_000  # maximum number of sampling times of a keyed clip
+_ON_STEP = 1e-6  # tolerance, as a fraction of a step
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, within which a time counts as that frame's
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """One actor to check.
+
+    Attributes
+    ----------
+    actor : Actor
+        The actor, which is not modified.
+    index : int
+        Index of the actor in its scene.
+    up : "y" or "z"
+        The scene's up axis.
+    options : LintOptions
+        Thresholds of the checks.
+    counting : Counting or None
+        Frame numbering of keyed clips; None to number each clip separately.
+    invalid : mapping of str to (N,)
+        Data that a reader replaced because the data in the file is invalid: vertices by
+        ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
+        ``"joints"``, rows by ``"frames"``.
+    people : tuple of Actor
+        All captured people of the scene, in its order.
+    tracks : list of Track
+        Cached track of the actor's clip; may be empty.
+    """
+
+    actor: Actor
+    index: int = 0
+    up: Literal["y", "z"] = "y"
+    options: LintOptions = field(default_factory=LintOptions)
+    counting: Counting | None = None
+    invalid: Mapping[str, Ints] = field(default_factory=dict)
+    people: tuple[Actor, ...] = ()
+    # Results that several checks need are computed once: ``track_of`` caches them here.
+    tracks: list[Track] = field(default_factory=list)
+
+    def valid(self, part: str, count: int) -> Bools:
+        """Return which items are valid data of the file.
+
+        Parameters
+        ----------
+        part : str
+            A key of ``invalid``.
+        count : int
+            Number of items.
+
+        Returns
+        -------
+        (count,)
+            False for items whose data was replaced.
+        """
+        result = np.ones(count, dtype=np.bool_)
+        lost = self.invalid.get(part, NO_INDICES)
+        result[lost[lost < count]] = False
+        return result
+
+    def length(self, length: float) -> str:
+        """Return a length as text: in millimetres if the unit is known, else relative to size."""
+        figure = self.actor.figure
+        if figure.unit in METRES:
+            return length_text(figure, length)
+        return f"{rounded(length)} units" + self._relative(length)
+
+    def speed(self, speed: float, is_limit: bool = False) -> str:
+        """Return a speed as text: in metres per second if the unit is known.
+
+        Otherwise, a speed that is not a limit is also given as a multiple of the size.
+        """
+        unit = self.actor.figure.unit
+        if unit in METRES:
+            return f"{rounded(speed * METRES[unit])} m/s"
+        size = 0.0 if is_limit else self.size()
+        relative = f" ({rounded(speed / size)} times its size)" if size > 0.0 else ""
+        return f"{rounded(speed)} units per second{relative}"
+
+    def size(self) -> float:
+        """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.
+
+        Figure units; 0 without either. Distant stray vertices are ignored.
+        """
+        figure = self.actor.figure
+        if figure.mesh is None:
+            return 0.0 if figure.skeleton is None else box_size(bounding_box(rest_joints(figure)))
+        positions = figure.mesh.positions
+        size = box_size(bounding_box(positions))
+        if len(positions) == 0:
+            return size
+        # Partitioning finds both quantiles of an axis without sorting.
+        inner = np.quantile(positions, [_STRAYS, 1.0 - _STRAYS], axis=0, method="nearest")
+        usual = box_size(inner)
+        if not size > _FAR * usual > 0.0:
+            return size
+        near = np.linalg.norm(positions - inner.mean(axis=0), axis=1) < _FAR / 2 * usual
+        return box_size(bounding_box(positions[near]))
+
+    def _relative(self, length: float) -> str:
+        size = self.size()
+        return f" ({rounded(100.0 * length / size)} % of its size)" if size > 0.0 else ""
+
+    def found(
+        self,
+        key: str,
+        *,
+        part: Literal["mesh", "skeleton", "clip"] = "mesh",
+        severity: str = "",
+        vertices: _IndicesLike = NO_INDICES,
+        triangles: _IndicesLike = NO_INDICES,
+        joints: _IndicesLike = NO_INDICES,
+        frames: _IndicesLike = NO_INDICES,
+        times: Floats = NO_TIMES,
+        seek: float | None = None,
+        at: tuple[str, int] | None = None,
+        **values: Any,
+    ) -> Finding:
+        """Return a finding about this actor, with the values of the message ``key``."""
+        return Finding(
+            Diagnostic(key, level=severity, values=values),
+            actor=self.index,
+            name=self.actor.name,
+            part=part,
+            vertices=np.asarray(vertices, dtype=np.int32),
+            triangles=np.asarray(triangles, dtype=np.int32),
+            joints=np.asarray(joints, dtype=np.int32),
+            frames=np.asarray(frames, dtype=np.int32),
+            times=times,
+            seek=seek,
+            motion=self._motion() if part == "clip" else "",
+            animation=self.actor.animation if part == "clip" else -1,
+            at=at,
+        )
+
+    def _motion(self) -> str:
+        """Return the label of the animation that the actor plays, if its figure has several."""
+        figure, index = self.actor.figure, self.actor.animation
+        if index < 0 or len(figure.animations) < 2:
+            return ""
+        return animation_labels(figure)[index]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """A motion evaluated frame by frame.
+
+    Attributes
+    ----------
+    times : (F,)
+        Times on the scene's clock, in seconds.
+    numbers : (F,) int32
+        Number of each frame in the file; for keyed clips, the frame of the timeline. Several rows
+        may have the same frame.
+    present : (F,) bool
+        Whether the row is defined: the actor is present, and the data of the file is valid.
+    positions : (F, J, 3)
+        Joints in scene space.
+    rotations : (F, J, 4)
+        Local rotations: unit quaternions.
+    stepped : (F, J) bool
+        Whether a key without interpolation, of the joint or of an ancestor, is between the previous
+        row and this one: such jumps are intended.
+    size : float
+        Size of the skeleton at rest, in scene units.
+    scale : float
+        Scene units per figure unit.
+    feet : (N,) int32
+        The joint of each foot nearest to the ground; empty unless joint names identify two feet.
+    soles : (F, N)
+        Height of each foot's lowest point in the scene.
+    """
+
+    times: Floats
+    numbers: Ints
+    present: Bools
+    positions: Floats
+    rotations: Floats
+    stepped: Bools
+    size: float
+    scale: float
+    feet: Ints
+    soles: Floats
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames from the first to the last in which the actor is present."""
+        there = self.numbers[self.present]
+        return int(there[-1]) - int(there[0]) + 1 if len(there) else 0
+
+    def of_each(self, rows: Indices) -> Indices:
+        """Return rows, keeping only the first of each frame: (N,)."""
+        _, first = np.unique(self.numbers[rows], return_index=True)
+        return rows[np.sort(first)]
+
+
+def track_of(subject: Subject) -> Track | None:
+    """Return the cached track of an actor's skeleton; None if it has none."""
+    if not subject.tracks:
+        track = _track(subject)
+        if track is None:
+            return None
+        subject.tracks.append(track)
+    return subject.tracks[0]
+
+
+def _track(subject: Subject) -> Track | None:
+    actor = subject.actor
+    figure, clip, skeleton = actor.figure, actor.clip, actor.figure.skeleton
+    if clip is None or skeleton is None or isinstance(clip, PointClip):
+        return None
+    if isinstance(clip, SampledClip):
+        timing = clip.timing
+        count = timing.n_frames
+        times = timing.start + np.arange(count) / timing.frame_rate
+        numbers = timing.first_frame + np.arange(count, dtype=np.int32)
+    else:
+        times = key_times(subject, clip)
+        count = len(times)
+        numbers = frame_numbers(subject, times)
+    frames = frames_of(figure, clip, times, actor.pose)
+    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
+    is_bound = figure.is_attached and not len(subject.invalid.get("bindings", ()))
+    soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
+    feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
+    joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
+    axis = actor.placement[2 if subject.up == "z" else 1]
+    for start in range(0, count, _TOGETHER):
+        part = slice(start, start + _TOGETHER)
+        world = world_frames(figure, frames_between(frames, part))
+        joints[part] = world[..., :3, 3]
+        if soles is not None:
+            lowest[part] = soles.heights(world, axis, scale)
+    placed = joints @ actor.placement[:3, :3].T + actor.placement[:3, 3]
+    return Track(
+        times=times + actor.offset,
+        numbers=numbers,
+        present=frames.present & _known(subject, clip, count),
+        positions=placed,
+        rotations=frames.rotations,
+        stepped=_stepped(clip, skeleton, times),
+        size=scale * _size(subject, figure),
+        scale=scale,
+        feet=feet,
+        soles=lowest,
+    )
+
+
+def _stepped(clip: JointMotion, skeleton: Skeleton, times: Floats) -> Bools:
+    """Return where keys without interpolation move a joint or its ancestors: (F, J)."""
+    result = np.zeros((len(times), skeleton.n_joints), dtype=np.bool_)
+    if not isinstance(clip, TransformClip):
+        return result
+    for channel in clip.channels:
+        if channel.joint >= 0 and channel.interpolation == "step":
+            rows = np.searchsorted(times, channel.times)
+            result[rows[rows < len(times)], channel.joint] = True
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0:
+            result[:, joint] |= result[:, parent]
+    return result
+
+
+def _size(subject: Subject, figure: Figure) -> float:
+    """Return the size of the skeleton, or of the mesh if that is much larger: a prop on a joint."""
+    joints, mesh = box_size(bounding_box(rest_joints(figure))), subject.size()
+    return joints if joints > _PROP * mesh else mesh
+
+
+def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:
+    """Return the sampling times of a keyed clip: its frames, and steps between them. (F,).
+
+    Times are seconds on the clip's own clock.
+    """
+    options = subject.options
+    rate = options.frame_rate or frame_rate(clip)
+    rate *= max(1, math.ceil(options.rate / rate))
+    count = min(math.floor((clip.end - clip.start) * rate + _ON_STEP) + 1, _MOST)
+    return clip.start + np.arange(count) / rate
+
+
+def frame_numbers(subject: Subject, times: Floats) -> Ints:
+    """Return the frames of the timeline at times of a keyed clip: (F,) int32."""
+    actor = subject.actor
+    assert actor.clip is not None  # checked by the callers
+    rate = subject.options.frame_rate or frame_rate(actor.clip)
+    counting = subject.counting or Counting(rate, actor.clip.start + actor.offset)
+    return counting.numbers(times + actor.offset)
+
+
+def _known(subject: Subject, clip: JointMotion, count: int) -> Bools:
+    """Return which frames have valid data from the file: (F,)."""
+    if not isinstance(clip, SampledClip):
+        return np.ones(count, dtype=np.bool_)
+    rows = clip.timing.rows
+    return subject.valid("frames", clip.n_rows)[rows] | (rows < 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Counting:
+    """Frame numbering of a timeline.
+
+    Attributes
+    ----------
+    rate : float
+        Frames per second.
+    origin : float
+        Time of the first frame on the scene's clock, in seconds.
+    first : int
+        Number of the first frame.
+    """
+
+    rate: float
+    origin: float
+    first: int = 0
+
+    def numbers(self, times: Floats) -> Ints:
+        """Return the frame shown at each time of the scene's clock: (N,) int32."""
+        places = np.floor((times - self.origin) * self.rate + _ON_FRAME)
+        return places.astype(np.int32) + np.int32(self.first)
+
+
+def counting_of(scene: Scene, keyed_rate: float) -> Counting:
+    """Return a scene's frame numbering: its longest capture's, or from the earliest start.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with or without motions.
+    keyed_rate : float
+        Frames per second if no motion consists of frames.
+    """
+    moving = [actor for actor in scene.actors if actor.clip is not None]
+    captured = [actor for actor in moving if isinstance(actor.clip, SampledClip | PointClip)]
+    if not captured:
+        return Counting(keyed_rate, time_span(moving)[0])
+    longest = max(captured, key=lambda actor: np.subtract(*time_span([actor])[::-1]))
+    clip = longest.clip
+    assert isinstance(clip, SampledClip | PointClip)  # only sampled motions were collected
+    timing = clip.timing
+    return Counting(frame_rate(clip), timing.start + longest.offset, timing.first_frame)
