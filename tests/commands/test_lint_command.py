@@ -76,6 +76,7 @@ def test_json_contains_every_location(rig, capsys) -> None:
     assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 13, 0)
     assert weights["vertices"] == [1] and weights["n_vertices"] == 1
     assert weights["title"] == CODES["W001"].title and weights["hint"] == CODES["W001"].hint
+    assert weights["hint"].startswith("normalise them (--normalize ")
     assert found["counts"]["warning"] == sum(f["severity"] == "warning" for f in found["findings"])
 
 

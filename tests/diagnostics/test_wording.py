@@ -10,9 +10,14 @@ from typing import Any
 import pytest
 
 import viewer
-from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase, wording
+from viewer.batching.execution import attempt
+from viewer.batching.items import Item
+from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase, described, wording
+from viewer.diagnostics.record import note_found
 from viewer.diagnostics.template import fields, in_window, rendered
 from viewer.diagnostics.wording import PHRASES
+from viewer.lint import Finding, describe
+from viewer.rig.scene import Scene
 
 ROOT = Path(viewer.__file__).parent
 CALLS = {
@@ -59,7 +64,7 @@ def test_every_phrase_renders(key: str) -> None:
 
 
 def test_messages_name_controls_in_the_window_and_options_elsewhere() -> None:
-    texts = {**MESSAGES, **PHRASES, **{f"{key}.hint": code.hint for key, code in CODES.items()}}
+    texts = {**MESSAGES, **PHRASES, **{f"{key}.hint": code.remedy for key, code in CODES.items()}}
     differ = 0
     for key, text in texts.items():
         values = {name: sample(spec) for name, spec in fields(text).items()}
@@ -73,6 +78,23 @@ def test_messages_name_controls_in_the_window_and_options_elsewhere() -> None:
     with in_window():
         assert str(note) == rate.format("Frames per second in the Timeline")
     assert str(note) == rate.format("--fps")
+
+
+def test_data_names_options_even_while_a_window_is_open() -> None:
+    note = Diagnostic("F007.no-rate", values={"rate": 30})
+    outer = Diagnostic("F004.capture", values={"problem": note})
+    found = Finding(Diagnostic("W001.sums", values={"n": 1, "vertex": 0, "sum": 0.5, "error": 0.5}))
+    item = Item(0, ("a.npz",), "", "a")
+    with in_window():
+        assert "Timeline" in str(note) and "Skinning panel" in found.hint
+        data = described(outer)
+        (finding,) = describe([found], Scene([]))["findings"]
+        ran = attempt(item, lambda item: {"is_noted": note_found(note)})
+        assert "Timeline" in str(note)
+    assert ran.values == {"is_noted": True} and ran.diagnostics == [described(note)]
+    assert "--fps" in ran.diagnostics[0]["message"]
+    assert "--fps" in data["values"]["problem"]["message"] and "--model" in data["message"]
+    assert finding["hint"] == found.hint == CODES["W001"].hint and "--normalize" in found.hint
 
 
 def is_about_options(key: str, text: str) -> bool:

@@ -50,7 +50,9 @@ def mouse() -> str:
 
 
 def codes() -> str:
-    rows = [(name, code.severity, code.title, template(code.hint)) for name, code in CODES.items()]
+    rows = [
+        (name, code.severity, code.title, template(code.remedy)) for name, code in CODES.items()
+    ]
     return table(("code", "severity", "finding", "remedy"), rows)
 
 

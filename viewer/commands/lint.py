@@ -22,7 +22,6 @@ from viewer.commands._scene import (
 from viewer.commands._sequence.frame_numbers import rate
 from viewer.commands._usage import require_files
 from viewer.diagnostics.record import note_values
-from viewer.diagnostics.template import rendered
 from viewer.errors import ViewerError
 from viewer.lint import (
     CODES,
@@ -171,8 +170,5 @@ def _ignored(text: str) -> set[str]:
 
 def _code_lines() -> list[str]:
     return table_lines(
-        [
-            [name, code.severity, f"{code.title}: {rendered(code.hint, {})}"]
-            for name, code in CODES.items()
-        ]
+        [[name, code.severity, f"{code.title}: {code.hint}"] for name, code in CODES.items()]
     )

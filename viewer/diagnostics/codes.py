@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics.template import rendered
 
 __all__ = ["SEVERITIES", "Code"]
 
@@ -20,13 +21,23 @@ class Code:
         One of ``SEVERITIES``; a diagnostic may override it.
     title : str
         Short description, for lists of codes.
-    hint : str
+    remedy : str
         Suggested remedy, a template without values.
-    other_hint : str
+    other_remedy : str
         Suggested remedy if no line is known; empty if it is the same.
     """
 
     severity: str
     title: str
-    hint: str
-    other_hint: str = ""
+    remedy: str
+    other_remedy: str = ""
+
+    @property
+    def hint(self) -> str:
+        """Suggested remedy."""
+        return rendered(self.remedy, {})
+
+    @property
+    def other_hint(self) -> str:
+        """Suggested remedy if no line is known; empty if it is the same."""
+        return rendered(self.other_remedy, {})

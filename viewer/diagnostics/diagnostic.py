@@ -263,7 +263,7 @@ _LISTED = 100
 
 
 def described(found: Diagnostic) -> dict[str, Any]:
-    """Return all data of a diagnostic.
+    """Return all data of a diagnostic, worded as for the command line.
 
     Parameters
     ----------
@@ -276,21 +276,24 @@ def described(found: Diagnostic) -> dict[str, Any]:
         Code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
         returned by ``plain``, the first 100 indices, and the number of indices.
     """
+    from viewer.diagnostics.template import as_data  # most runs have no message
+
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
-    return {
-        "code": found.code,
-        "key": found.key,
-        "severity": found.severity,
-        "message": printable(found.full_message, 2000),
-        "file": None if found.path is None else printable(found.path, 1000),
-        "line": found.line,
-        "pointer": found.pointer,
-        "part": found.part or None,
-        "places": places[:_LISTED].tolist(),
-        "n_places": len(places),
-        "count": found.count,
-        "values": plain(found.values),
-    }
+    with as_data():
+        return {
+            "code": found.code,
+            "key": found.key,
+            "severity": found.severity,
+            "message": printable(found.full_message, 2000),
+            "file": None if found.path is None else printable(found.path, 1000),
+            "line": found.line,
+            "pointer": found.pointer,
+            "part": found.part or None,
+            "places": places[:_LISTED].tolist(),
+            "n_places": len(places),
+            "count": found.count,
+            "values": plain(found.values),
+        }
 
 
 def plain(value: Any) -> Any:

@@ -27,6 +27,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from string import Formatter
 from typing import Any
 
@@ -43,6 +44,7 @@ _NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrog
 
 _WINDOW = "window"
 _open_windows: list[None] = []
+_is_data = ContextVar("is_data", default=False)
 
 
 @contextmanager
@@ -55,9 +57,24 @@ def in_window() -> Iterator[None]:
         _open_windows.pop()
 
 
+@contextmanager
+def as_data() -> Iterator[None]:
+    """Word the messages of this thread for the command line, even while a window is open.
+
+    For JSON and records of runs, which are read elsewhere: programs that compare them find one
+    wording, and ``render --panels`` opens a window's interface without a user in front of it.
+    """
+    before = _is_data.set(True)
+    try:
+        yield
+    finally:
+        _is_data.reset(before)
+
+
 def rendered(template: str, values: Mapping[str, Any]) -> str:
     """Return a template with its values filled in."""
-    return _FORMATTER.vformat(template, (), {_WINDOW: min(len(_open_windows), 1), **values})
+    is_shown = bool(_open_windows) and not _is_data.get()
+    return _FORMATTER.vformat(template, (), {_WINDOW: int(is_shown), **values})
 
 
 def fields(template: str) -> dict[str, str]:

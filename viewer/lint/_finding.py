@@ -10,7 +10,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import CODES, Diagnostic
-from viewer.diagnostics.template import rendered
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 
@@ -136,8 +135,7 @@ class Finding:
     def hint(self) -> str:
         """Suggested remedy."""
         code = CODES[self.code]
-        has_other = code.other_hint and self.line is None
-        return rendered(code.other_hint if has_other else code.hint, {})
+        return (code.other_hint if self.line is None else "") or code.hint
 
     def located(
         self,

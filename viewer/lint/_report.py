@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.diagnostics import SEVERITIES, Diagnostic, described
+from viewer.diagnostics.template import as_data
 from viewer.formats import folder_name
 from viewer.lint._finding import Finding
 from viewer.phrases import counted, printable
@@ -58,8 +59,9 @@ def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
     return ", ".join(parts) + (f" in {counted(n_files, 'file')}" if n_files else "")
 
 
+@as_data()
 def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
-    """Return findings as data for JSON.
+    """Return findings as data for JSON, worded as for the command line.
 
     Parameters
     ----------
