@@ -12,7 +12,7 @@ import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source
 from viewer.formats.gltf import read_nodes
-from viewer.formats.gltf.container import parsed
+from viewer.formats.gltf.document import parsed_json
 
 TEXT = b'{"asset": {"version": "2.0"}, "nodes": [{"name": "a"}]}'
 
@@ -149,7 +149,7 @@ def test_syntax_errors_have_a_line_number() -> None:
 
 
 def test_json_above_half_a_gigabyte_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr("viewer.formats.gltf.container._MOST_BYTES", 50)
+    monkeypatch.setattr("viewer.formats.gltf.document._MOST_BYTES", 50)
     assert refused(TEXT) == ("F001.gltf-text", "")
     assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
 
@@ -180,7 +180,7 @@ def test_garbage_collection_is_suspended_while_json_is_parsed() -> None:
     try:
         json.loads(text)
         usual = phases.count("start")
-        parsed(source_of(text), text, has_lines=True)
+        parsed_json(source_of(text), text, has_lines=True)
     finally:
         gc.callbacks.remove(note)
     # The first new object after parsing may start a collection.

@@ -1,6 +1,17 @@
 """Reader of glTF 2.0: ``.gltf``, ``.glb``, characters (``.vrm``) and their motions (``.vrma``).
 
-The grammar is in ``_gltf/node_file.py``; ``_nodes`` describes the conversion to figures.
+::
+
+    asset         {"version": "2.0", …}
+    scenes        root nodes; scene is the default one
+    nodes         children; matrix, or translation, rotation, scale; mesh, skin, camera, weights
+    meshes        primitives of vertex attributes, indices, material and morph targets
+    skins         joints (nodes) and inverseBindMatrices
+    animations    channels (node and path) with samplers: LINEAR, STEP or CUBICSPLINE
+    accessors     typed arrays in bufferViews of buffers: the binary chunk, data URIs or files
+
+Errors name the element by its JSON pointer. Figures are made by ``formats/_scene_graph``.
+Specification: Khronos Group, glTF 2.0, ISO/IEC 12113.
 """
 
 from __future__ import annotations
@@ -16,7 +27,7 @@ from viewer.formats._scene_graph.figures import figure_group
 from viewer.formats._source import Source
 from viewer.formats._vrm.reading import with_vrm
 from viewer.formats.gltf.animations import Targets, read_animations
-from viewer.formats.gltf.checks import check_conformance
+from viewer.formats.gltf.checks import check_document
 from viewer.formats.gltf.document import Document, open_document
 from viewer.formats.gltf.extensions import (
     check_extensions,
@@ -40,6 +51,7 @@ from viewer.rig.figure import FigureGroup
 if TYPE_CHECKING:
     from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
+_VRM = {"VRM", "VRMC_vrm"}
 _MOTION = "VRMC_vrm_animation"
 
 
@@ -70,25 +82,6 @@ def read(source: Source) -> FigureGroup | SkeletonMotion:
     return figure_group(with_vrm(file, source), source)
 
 
-# Contents of glTF 2.0 files: ``.gltf`` with accompanying files, ``.glb``, and ``.vrm``
-# characters.
-#
-# ::
-#
-#     asset         {"version": "2.0", …}
-#     scenes        root nodes; scene is the default one
-#     nodes         children; matrix, or translation, rotation, scale; mesh, skin, camera, weights
-#     meshes        primitives of vertex attributes, indices, material and morph targets
-#     skins         joints (nodes) and inverseBindMatrices
-#     animations    channels (node and path) with samplers: LINEAR, STEP or CUBICSPLINE
-#     accessors     typed arrays in bufferViews of buffers: the binary chunk, data URIs or files
-#
-# Errors name the element by its JSON pointer. Specification: Khronos Group, glTF 2.0, ISO/IEC
-# 12113.
-
-_VRM = {"VRM", "VRMC_vrm"}
-
-
 def read_nodes(source: Source) -> NodeFile:
     """Return the contents of a glTF file; the keys of animations are read when they are played.
 
@@ -110,10 +103,7 @@ def read_nodes(source: Source) -> NodeFile:
         meshes = checked_bindings(document, tree, read_meshes(document), skins)
         tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
         if source.diagnostics.keeps_errors:
-            check_conformance(document, tree, meshes, skins)
-            from viewer.formats.gltf.checks import check_document
-
-            check_document(document, tree, skins)
+            check_document(document, tree, meshes, skins)
         animations = read_animations(document, Targets(tree, meshes))
         materials = finish_materials()
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):

@@ -1,4 +1,8 @@
-"""Violations of the specification without visible effect, reported only by lint."""
+"""Violations of the specification without visible effect, reported only by lint.
+
+Those that Khronos' validator finds in the data of accessors, in skins, nodes and animations have
+codes of their own; the others, of single members of the JSON, state what the specification expects.
+"""
 
 from __future__ import annotations
 
@@ -17,25 +21,47 @@ from viewer.rig.arrays import Floats, Ints
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
 _UNIT = 1e-3  # tolerance of the deviation of a quaternion's length from 1
+_NORMAL_ROUNDING = 5e-4  # tolerance of lengths and of the sign of tangents
+_SHEAR = 1e-4  # tolerance of the cosines of the angles between the axes of a matrix
+_LARGEST = 3.4028235e38  # largest number in single precision
+_BYTE, _UBYTE, _SHORT, _USHORT, _UINT, _FLOAT = 5120, 5121, 5122, 5123, 5125, 5126
 
 # Normalised integers that represent 1, by component type.
-_ONES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
+_ONES = {_BYTE: 127.0, _UBYTE: 255.0, _SHORT: 32767.0, _USHORT: 65535.0}
+_FRACTIONS = ((_FLOAT, False), (_UBYTE, True), (_USHORT, True))
+
+# Component types of each attribute, and whether they are normalised (glTF 2.0, 3.7.2.1).
+_TYPES = {
+    **dict.fromkeys(("POSITION", "NORMAL", "TANGENT"), ((_FLOAT, False),)),
+    **dict.fromkeys(("TEXCOORD", "COLOR", "WEIGHTS"), _FRACTIONS),
+    "JOINTS": ((_UBYTE, False), (_USHORT, False)),
+}
+_INDICES = (_UBYTE, _USHORT, _UINT)
+_UNNORMALIZED = (_UINT, _FLOAT)  # component types that cannot be normalised
+
+_KNOWN = re.compile(r"POSITION|NORMAL|TANGENT|(TEXCOORD|COLOR|JOINTS|WEIGHTS)_(0|[1-9]\d*)|_.*")
+_MORPHED = re.compile(r"POSITION|NORMAL|TANGENT|(TEXCOORD|COLOR)_(0|[1-9]\d*)|_.*")
+
+_VERTICES, _INDEX_TYPES = 34962, 34963
+_TARGETS = {"vertex attributes": _VERTICES, "indices": _INDEX_TYPES}
+_STRIDES = range(4, 253, 4)
+
+_LISTS = (
+    *("accessors", "animations", "buffers", "bufferViews", "cameras", "extensionsRequired"),
+    *("extensionsUsed", "images", "materials", "meshes", "nodes", "samplers", "scenes", "skins"),
+    "textures",
+)
+
+_Report: TypeAlias = Callable[[str, str, object, Sequence[str | int]], None]
+"""Reports a key, what is expected, what is found, and the path to the member."""
 
 
-def check_conformance(
+def check_document(
     document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...], skins: tuple[NodeSkin, ...]
 ) -> None:
-    """Report the errors that Khronos' validator finds in accessors, skins, nodes and animations.
-
-    Parameters
-    ----------
-    document : Document
-        The file, whose elements have been read; errors that were reported then are not repeated.
-    tree, meshes, skins : NodeTree, tuple of NodeMesh, tuple of NodeSkin
-        Its contents.
-    """
+    """Record a warning for each violation; errors that reading reported are not repeated."""
     _check_bounds(document)
-    _check_primitives(document)
+    _check_vertices(document)
     roots = roots_of(tree.parents)
     for index, skin in enumerate(skins):
         if len(skin.joints):
@@ -47,6 +73,10 @@ def check_conformance(
             _check_animation(document, animations[index])
         except FormatError:  # the error was reported when the item was read
             continue
+    report = _reporter(document)
+    _check_storage(document.root.values, report)
+    _check_primitives(document, report)
+    _check_structure(document.root.values, tree, skins, report)
 
 
 def _check_bounds(document: Document) -> None:
@@ -79,7 +109,7 @@ def _compare_bounds(accessor: Element, components: Floats | None) -> None:
             accessor.warn("G002.bounds", name, component=worst, **values)
 
 
-def _check_primitives(document: Document) -> None:
+def _check_vertices(document: Document) -> None:
     """Check that positions have bounds, and that unused influences refer to joint 0."""
     table = document.table("meshes")
     for mesh in range(len(table)):
@@ -204,19 +234,7 @@ def _check_rotations(document: Document, sampler: Element) -> None:
         sampler.warn("G005.unit", "output", n=int(odd.sum()), **found)
 
 
-def check_document(document: Document, tree: NodeTree, skins: tuple[NodeSkin, ...]) -> None:
-    """Record a warning for each violation of the specification that has no effect on reading."""
-    report = _reporter(document)
-    _check_storage(document.root.values, report)
-    check_primitives(document, report)
-    _check_structure(document.root.values, tree, skins, report)
-
-
-Report: TypeAlias = Callable[[str, str, object, Sequence[str | int]], None]
-"""Reports a key, what is expected, what is found, and the path to the member."""
-
-
-def _reporter(document: Document) -> Report:
+def _reporter(document: Document) -> _Report:
     """Return a function that records a warning in the source of a document."""
     root = Element(document.source, {})
 
@@ -234,299 +252,8 @@ def _items_of(told: Any, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
             yield index, item
 
 
-_LISTS = (
-    *("accessors", "animations", "buffers", "bufferViews", "cameras", "extensionsRequired"),
-    *("extensionsUsed", "images", "materials", "meshes", "nodes", "samplers", "scenes", "skins"),
-    "textures",
-)
-_SHEAR = 1e-4  # tolerance of the cosines of the angles between the axes of a matrix
-
-
-def _check_structure(
-    root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: Report
-) -> None:
-    """Check members that depend on each other.
-
-    Parameters
-    ----------
-    root : dict
-        The document, as parsed from JSON.
-    tree, skins : NodeTree, tuple of NodeSkin
-        Its nodes and skins.
-    report : callable
-        Records a warning.
-    """
-    for name in _LISTS:
-        if root.get(name) == []:
-            report("G001.structure", "at least one item", "none", (name,))
-    for index, node in _items_of(root, "nodes"):
-        _check_node(node, index, report)
-    _check_skinned(root, tree, skins, report)
-    for index, scene in _items_of(root, "scenes"):
-        seen: set[int] = set()
-        for place, root_node in enumerate(listed(scene, "nodes")):
-            if isinstance(root_node, int) and root_node in seen:
-                at = ("scenes", index, "nodes", place)
-                report("G003.structure", "each node once", f"node {root_node} again", at)
-            elif isinstance(root_node, int):
-                seen.add(root_node)
-    nodes = dict(_items_of(root, "nodes"))
-    for index, animation in _items_of(root, "animations"):
-        _check_channels(nodes, animation, index, report)
-    _check_extensions(root, report)
-
-
-def _check_node(node: dict[str, Any], index: int, report: Report) -> None:
-    path = ("nodes", index)
-    if node.get("children") == []:
-        report("G003.structure", "at least one child", "none", (*path, "children"))
-    for name in ("skin", "weights"):
-        if name in node and "mesh" not in node:
-            report("G003.structure", "a node with a mesh", "one without", (*path, name))
-    matrix = node.get("matrix")
-    if isinstance(matrix, list) and len(matrix) == 16 and _is_sheared(matrix):
-        wanted = "a matrix of a translation, rotation and scale"
-        report("G003.structure", wanted, "a sheared one", (*path, "matrix"))
-
-
-def _is_sheared(matrix: list[Any]) -> bool:
-    """Return whether the axes of a matrix are not perpendicular."""
-    if not all(isinstance(each, int | float) and abs(each) < 1e30 for each in matrix):
-        return False
-    axes = np.array(matrix, dtype=np.float64).reshape(4, 4)[:3, :3]
-    lengths = np.linalg.norm(axes, axis=1, keepdims=True)
-    cosines = axes @ axes.T / np.maximum(lengths @ lengths.T, 1e-30)
-    return bool((np.abs(cosines - np.diag(np.diag(cosines))) > _SHEAR).any())
-
-
-def _check_skinned(
-    root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: Report
-) -> None:
-    """Check that skinned meshes are roots, in a scene with their joints."""
-    parents, tops = tree.parents.tolist(), roots_of(tree.parents)
-    scenes = [
-        {node for node in listed(scene, "nodes") if isinstance(node, int)}
-        for _, scene in _items_of(root, "scenes")
-    ]
-    for node in np.flatnonzero(tree.skins >= 0).tolist():
-        if parents[node] >= 0:
-            found = f"a child of node {parents[node]}, whose transform has no effect"
-            report("G007.skinned-child", "a root", found, ("nodes", node))
-        joints = skins[int(tree.skins[node])].joints.tolist()
-        top, roots = int(tops[node]), set(tops[joints].tolist())
-        shown = [scene for scene in scenes if top in scene]
-        if shown and not any(scene >= roots for scene in shown):
-            wanted = "joints in the scene of the mesh"
-            report("G004.structure", wanted, "joints outside it", ("nodes", node))
-
-
-def _check_channels(
-    nodes: dict[int, dict[str, Any]], animation: dict[str, Any], index: int, report: Report
-) -> None:
-    path = ("animations", index)
-    for name in ("channels", "samplers"):
-        if animation.get(name) == []:
-            report("G005.structure", "at least one item", "none", (*path, name))
-    for place, channel in _items_of(animation, "channels"):
-        moved, node = part(channel, "target", "path"), part(channel, "target", "node")
-        owner = nodes.get(node, {}) if isinstance(node, int) else {}
-        if "skin" in owner and moved in ("translation", "rotation", "scale"):
-            found = f"a node with a skinned mesh, whose {moved} has no effect"
-            at = (*path, "channels", place, "target", "path")
-            report("G007.skinned-moved", "a node without a skinned mesh", found, at)
-
-
-def _check_extensions(root: dict[str, Any], report: Report) -> None:
-    """Check that all extensions are declared."""
-    used = [name for name in listed(root, "extensionsUsed") if isinstance(name, str)]
-    for place, name in enumerate(listed(root, "extensionsRequired")):
-        if isinstance(name, str) and name not in used:
-            at = ("extensionsRequired", place)
-            report("G001.structure", "a name that extensionsUsed contains", name, at)
-    told: set[str] = set()
-    stack: list[tuple[Any, tuple[str | int, ...]]] = [(root, ())]
-    while stack:
-        value, path = stack.pop()
-        if isinstance(value, list):
-            stack += [(each, (*path, place)) for place, each in enumerate(value)]
-        if not isinstance(value, dict):
-            continue
-        for name, each in value.items():
-            if name == "extensions" and isinstance(each, dict):
-                for extension in each:
-                    if extension not in used and extension not in told:
-                        told.add(extension)
-                        at = (*path, name, extension)
-                        report("G001.structure", "a name in extensionsUsed", extension, at)
-            elif name != "extras" and isinstance(each, dict | list):
-                stack.append((each, (*path, name)))
-
-
-_KNOWN = re.compile(r"POSITION|NORMAL|TANGENT|(TEXCOORD|COLOR|JOINTS|WEIGHTS)_(0|[1-9]\d*)|_.*")
-_MORPHED = re.compile(r"POSITION|NORMAL|TANGENT|(TEXCOORD|COLOR)_(0|[1-9]\d*)|_.*")
-_BYTE, _UBYTE, _SHORT, _USHORT, _UINT, _FLOAT = 5120, 5121, 5122, 5123, 5125, 5126
-_FRACTIONS = ((_FLOAT, False), (_UBYTE, True), (_USHORT, True))
-
-# Component types of each attribute, and whether they are normalised (glTF 2.0, 3.7.2.1).
-_TYPES = {
-    **dict.fromkeys(("POSITION", "NORMAL", "TANGENT"), ((_FLOAT, False),)),
-    **dict.fromkeys(("TEXCOORD", "COLOR", "WEIGHTS"), _FRACTIONS),
-    "JOINTS": ((_UBYTE, False), (_USHORT, False)),
-}
-_INDICES = (_UBYTE, _USHORT, _UINT)
-_NORMAL_ROUNDING = 5e-4  # tolerance of lengths and of the sign of tangents
-
-
-def check_primitives(document: Document, report: Report) -> None:
-    """Check the attributes of all primitives; errors that reading reported are not repeated."""
-    root = document.root.values
-    accessors, materials = dict(_items_of(root, "accessors")), dict(_items_of(root, "materials"))
-    used = root.get("extensionsUsed")
-    quantized = isinstance(used, list) and "KHR_mesh_quantization" in used
-    for m, mesh in _items_of(root, "meshes"):
-        for p, primitive in _items_of(mesh, "primitives"):
-            path: tuple[str | int, ...] = ("meshes", m, "primitives", p)
-            attributes = primitive.get("attributes")
-            given = attributes if isinstance(attributes, dict) else {}
-            _check_names(given, (*path, "attributes"), report)
-            if not quantized:
-                _check_types(accessors, given, (*path, "attributes"), report)
-            _check_indices(accessors, primitive, path, report)
-            _check_targets(accessors, primitive, given, path, report)
-            _check_tangents(document, given, (*path, "attributes"), report)
-            _check_texture_sets(materials, primitive, given, path, report)
-
-
-def _check_names(given: dict[str, Any], path: tuple[str | int, ...], report: Report) -> None:
-    for name in given:
-        if not _KNOWN.fullmatch(name):
-            wanted = "an attribute of the specification, or a name that begins with _"
-            report("G002.storage", wanted, name, (*path, name))
-    for kind in ("TEXCOORD", "COLOR", "JOINTS", "WEIGHTS"):
-        sets = sorted(int(n.split("_")[1]) for n in given if re.fullmatch(rf"{kind}_\d{{1,4}}", n))
-        if sets != list(range(len(sets))):
-            missing = next(n for n, found in enumerate([*sets, -1]) if n != found)
-            report("G002.storage", f"{kind}_{missing}", f"{kind}_{sets[-1]}", path)
-
-
-def _check_types(
-    accessors: dict[int, Any], given: dict[str, Any], path: tuple[str | int, ...], report: Report
-) -> None:
-    for name, index in given.items():
-        accessor = accessors.get(index, {}) if isinstance(index, int) else {}
-        allowed = _TYPES.get(name.split("_")[0])
-        kind, normalized = accessor.get("componentType"), accessor.get("normalized") is True
-        if allowed and isinstance(kind, int) and (kind, normalized) not in allowed:
-            how = "normalised" if normalized else "not normalised"
-            wanted = " or ".join(f"{one}{' normalised' * flag}" for one, flag in allowed)
-            report("G002.storage", f"component type {wanted}", f"{kind}, {how}", (*path, name))
-
-
-def _check_indices(
-    accessors: dict[int, Any],
-    primitive: dict[str, Any],
-    path: tuple[str | int, ...],
-    report: Report,
-) -> None:
-    index = primitive.get("indices")
-    kind = accessors.get(index, {}).get("componentType") if isinstance(index, int) else None
-    if isinstance(kind, int) and kind not in _INDICES and kind != _FLOAT:
-        report("G002.storage", "unsigned integers", f"component type {kind}", (*path, "indices"))
-
-
-def _check_targets(
-    accessors: dict[int, Any],
-    primitive: dict[str, Any],
-    given: dict[str, Any],
-    path: tuple[str | int, ...],
-    report: Report,
-) -> None:
-    if primitive.get("targets") == []:
-        report("G002.storage", "at least one morph target", "none", (*path, "targets"))
-    for t, target in _items_of(primitive, "targets"):
-        for name, index in target.items():
-            at = (*path, "targets", t, name)
-            if not _MORPHED.fullmatch(name):
-                report("G002.storage", "an attribute that can be morphed", name, at)
-            elif name not in given:
-                report("G002.storage", f"{name} in the attributes of the primitive", "none", at)
-            accessor = accessors.get(index, {}) if isinstance(index, int) else {}
-            if name == "POSITION" and accessor and not {"min", "max"} <= accessor.keys():
-                report("G002.storage", "an accessor with min and max", "one without", at)
-
-
-def _check_tangents(
-    document: Document, given: dict[str, Any], path: tuple[str | int, ...], report: Report
-) -> None:
-    index = given.get("TANGENT")
-    if not isinstance(index, int) or not 0 <= index < len(document.accessors):
-        return
-    try:
-        rows = document.accessors.components(index)
-    except FormatError as problem:
-        found = problem.diagnostic.message
-        report("G002.storage", "readable tangents", found, (*path, "TANGENT"))
-        return
-    if rows is None or rows.shape[1] != 4 or not np.isfinite(rows).all():
-        return
-    lengths = np.linalg.norm(rows[:, :3], axis=1)
-    odd = np.abs(lengths - 1.0) > _NORMAL_ROUNDING
-    if odd.any():
-        at = int(odd.argmax())
-        found = f"{int(odd.sum())} of another length (first: {lengths[at]:.6g} at vertex {at})"
-        report("G002.storage", "tangents of unit length", found, (*path, "TANGENT"))
-    signs = np.abs(np.abs(rows[:, 3]) - 1.0) > _NORMAL_ROUNDING
-    if signs.any():
-        at = int(signs.argmax())
-        found = f"{rows[at, 3]:.6g} at vertex {at}"
-        report("G002.storage", "1 or -1 as the sign of a tangent", found, (*path, "TANGENT"))
-
-
-def _check_texture_sets(
-    materials: dict[int, dict[str, Any]],
-    primitive: dict[str, Any],
-    given: dict[str, Any],
-    path: tuple[str | int, ...],
-    report: Report,
-) -> None:
-    """Check that the primitive has the sets of texture coordinates that its material uses."""
-    index = primitive.get("material")
-    material = materials.get(index, {}) if isinstance(index, int) else {}
-    surface = material.get("pbrMetallicRoughness")
-    owners = [material, surface if isinstance(surface, dict) else {}]
-    references = [
-        value
-        for each in owners
-        for name, value in each.items()
-        if name.endswith("Texture") and isinstance(value, dict)
-    ]
-    sets: set[int] = set()
-    for each in references:
-        moved = part(each, "extensions", "KHR_texture_transform", "texCoord")
-        number = each.get("texCoord", 0) if moved is None else moved
-        sets |= {number} if isinstance(number, int) else set()
-    missing = sorted(number for number in sets if f"TEXCOORD_{number}" not in given)
-    if missing:
-        report("G002.storage", f"TEXCOORD_{missing[0]}, which the material uses", "none", path)
-
-
-_VERTICES, _INDEX_TYPES = 34962, 34963
-_TARGETS = {"vertex attributes": _VERTICES, "indices": _INDEX_TYPES}
-_UNNORMALIZED = (5125, 5126)  # component types that cannot be normalised: uint32 and float
-_STRIDES = range(4, 253, 4)
-_LARGEST = 3.4028235e38  # in single precision
-
-
-def _check_storage(root: dict[str, Any], report: Report) -> None:
-    """Check all accessors and buffer views.
-
-    Parameters
-    ----------
-    root : dict
-        The document, as parsed from JSON.
-    report : callable
-        Records a warning.
-    """
+def _check_storage(root: dict[str, Any], report: _Report) -> None:
+    """Check all accessors and buffer views."""
     for index, accessor in _items_of(root, "accessors"):
         _check_accessor(accessor, index, report)
     for index, view in _items_of(root, "bufferViews"):
@@ -534,7 +261,7 @@ def _check_storage(root: dict[str, Any], report: Report) -> None:
     _check_uses(root, report)
 
 
-def _check_accessor(accessor: dict[str, Any], index: int, report: Report) -> None:
+def _check_accessor(accessor: dict[str, Any], index: int, report: _Report) -> None:
     path, kind = ("accessors", index), accessor.get("componentType")
     if accessor.get("normalized") is True and kind in _UNNORMALIZED:
         wanted = "integers of 8 or 16 bits"
@@ -554,7 +281,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: Report) -> None:
+def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: _Report) -> None:
     path, target, stride = ("bufferViews", index), view.get("target"), view.get("byteStride")
     if target is not None and target not in _TARGETS.values():
         report("G002.storage", "34962 or 34963", target, (*path, "target"))
@@ -575,7 +302,7 @@ def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: 
             report("G002.storage", wanted, f"byte {start + length}", (*path, "byteLength"))
 
 
-def _check_uses(root: dict[str, Any], report: Report) -> None:
+def _check_uses(root: dict[str, Any], report: _Report) -> None:
     """Check that each view has one kind of content, and the target and stride of that kind."""
     accessors, views = dict(_items_of(root, "accessors")), dict(_items_of(root, "bufferViews"))
     first: dict[int, str] = {}
@@ -620,3 +347,246 @@ def _uses(root: dict[str, Any]) -> Iterator[tuple[int, str, tuple[str | int, ...
     for used, kind, path in given:
         if isinstance(used, int):
             yield used, kind, path
+
+
+def _check_primitives(document: Document, report: _Report) -> None:
+    """Check the attributes of all primitives."""
+    root = document.root.values
+    accessors, materials = dict(_items_of(root, "accessors")), dict(_items_of(root, "materials"))
+    used = root.get("extensionsUsed")
+    quantized = isinstance(used, list) and "KHR_mesh_quantization" in used
+    for m, mesh in _items_of(root, "meshes"):
+        for p, primitive in _items_of(mesh, "primitives"):
+            path: tuple[str | int, ...] = ("meshes", m, "primitives", p)
+            attributes = primitive.get("attributes")
+            given = attributes if isinstance(attributes, dict) else {}
+            _check_names(given, (*path, "attributes"), report)
+            if not quantized:
+                _check_types(accessors, given, (*path, "attributes"), report)
+            _check_indices(accessors, primitive, path, report)
+            _check_targets(accessors, primitive, given, path, report)
+            _check_tangents(document, given, (*path, "attributes"), report)
+            _check_texture_sets(materials, primitive, given, path, report)
+
+
+def _check_names(given: dict[str, Any], path: tuple[str | int, ...], report: _Report) -> None:
+    for name in given:
+        if not _KNOWN.fullmatch(name):
+            wanted = "an attribute of the specification, or a name that begins with _"
+            report("G002.storage", wanted, name, (*path, name))
+    for kind in ("TEXCOORD", "COLOR", "JOINTS", "WEIGHTS"):
+        sets = sorted(int(n.split("_")[1]) for n in given if re.fullmatch(rf"{kind}_\d{{1,4}}", n))
+        if sets != list(range(len(sets))):
+            missing = next(n for n, found in enumerate([*sets, -1]) if n != found)
+            report("G002.storage", f"{kind}_{missing}", f"{kind}_{sets[-1]}", path)
+
+
+def _check_types(
+    accessors: dict[int, Any], given: dict[str, Any], path: tuple[str | int, ...], report: _Report
+) -> None:
+    for name, index in given.items():
+        accessor = accessors.get(index, {}) if isinstance(index, int) else {}
+        allowed = _TYPES.get(name.split("_")[0])
+        kind, normalized = accessor.get("componentType"), accessor.get("normalized") is True
+        if allowed and isinstance(kind, int) and (kind, normalized) not in allowed:
+            how = "normalised" if normalized else "not normalised"
+            wanted = " or ".join(f"{one}{' normalised' * flag}" for one, flag in allowed)
+            report("G002.storage", f"component type {wanted}", f"{kind}, {how}", (*path, name))
+
+
+def _check_indices(
+    accessors: dict[int, Any],
+    primitive: dict[str, Any],
+    path: tuple[str | int, ...],
+    report: _Report,
+) -> None:
+    index = primitive.get("indices")
+    kind = accessors.get(index, {}).get("componentType") if isinstance(index, int) else None
+    if isinstance(kind, int) and kind not in _INDICES and kind != _FLOAT:
+        report("G002.storage", "unsigned integers", f"component type {kind}", (*path, "indices"))
+
+
+def _check_targets(
+    accessors: dict[int, Any],
+    primitive: dict[str, Any],
+    given: dict[str, Any],
+    path: tuple[str | int, ...],
+    report: _Report,
+) -> None:
+    if primitive.get("targets") == []:
+        report("G002.storage", "at least one morph target", "none", (*path, "targets"))
+    for t, target in _items_of(primitive, "targets"):
+        for name, index in target.items():
+            at = (*path, "targets", t, name)
+            if not _MORPHED.fullmatch(name):
+                report("G002.storage", "an attribute that can be morphed", name, at)
+            elif name not in given:
+                report("G002.storage", f"{name} in the attributes of the primitive", "none", at)
+            accessor = accessors.get(index, {}) if isinstance(index, int) else {}
+            if name == "POSITION" and accessor and not {"min", "max"} <= accessor.keys():
+                report("G002.storage", "an accessor with min and max", "one without", at)
+
+
+def _check_tangents(
+    document: Document, given: dict[str, Any], path: tuple[str | int, ...], report: _Report
+) -> None:
+    index = given.get("TANGENT")
+    if not isinstance(index, int) or not 0 <= index < len(document.accessors):
+        return
+    try:
+        rows = document.accessors.components(index)
+    except FormatError as problem:
+        found = problem.diagnostic.message
+        report("G002.storage", "readable tangents", found, (*path, "TANGENT"))
+        return
+    if rows is None or rows.shape[1] != 4 or not np.isfinite(rows).all():
+        return
+    lengths = np.linalg.norm(rows[:, :3], axis=1)
+    odd = np.abs(lengths - 1.0) > _NORMAL_ROUNDING
+    if odd.any():
+        at = int(odd.argmax())
+        found = f"{int(odd.sum())} of another length (first: {lengths[at]:.6g} at vertex {at})"
+        report("G002.storage", "tangents of unit length", found, (*path, "TANGENT"))
+    signs = np.abs(np.abs(rows[:, 3]) - 1.0) > _NORMAL_ROUNDING
+    if signs.any():
+        at = int(signs.argmax())
+        found = f"{rows[at, 3]:.6g} at vertex {at}"
+        report("G002.storage", "1 or -1 as the sign of a tangent", found, (*path, "TANGENT"))
+
+
+def _check_texture_sets(
+    materials: dict[int, dict[str, Any]],
+    primitive: dict[str, Any],
+    given: dict[str, Any],
+    path: tuple[str | int, ...],
+    report: _Report,
+) -> None:
+    """Check that the primitive has the sets of texture coordinates that its material uses."""
+    index = primitive.get("material")
+    material = materials.get(index, {}) if isinstance(index, int) else {}
+    surface = material.get("pbrMetallicRoughness")
+    owners = [material, surface if isinstance(surface, dict) else {}]
+    references = [
+        value
+        for each in owners
+        for name, value in each.items()
+        if name.endswith("Texture") and isinstance(value, dict)
+    ]
+    sets: set[int] = set()
+    for each in references:
+        moved = part(each, "extensions", "KHR_texture_transform", "texCoord")
+        number = each.get("texCoord", 0) if moved is None else moved
+        sets |= {number} if isinstance(number, int) else set()
+    missing = sorted(number for number in sets if f"TEXCOORD_{number}" not in given)
+    if missing:
+        report("G002.storage", f"TEXCOORD_{missing[0]}, which the material uses", "none", path)
+
+
+def _check_structure(
+    root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
+) -> None:
+    """Check members that depend on each other."""
+    for name in _LISTS:
+        if root.get(name) == []:
+            report("G001.structure", "at least one item", "none", (name,))
+    for index, node in _items_of(root, "nodes"):
+        _check_node(node, index, report)
+    _check_skinned(root, tree, skins, report)
+    for index, scene in _items_of(root, "scenes"):
+        seen: set[int] = set()
+        for place, root_node in enumerate(listed(scene, "nodes")):
+            if isinstance(root_node, int) and root_node in seen:
+                at = ("scenes", index, "nodes", place)
+                report("G003.structure", "each node once", f"node {root_node} again", at)
+            elif isinstance(root_node, int):
+                seen.add(root_node)
+    nodes = dict(_items_of(root, "nodes"))
+    for index, animation in _items_of(root, "animations"):
+        _check_channels(nodes, animation, index, report)
+    _check_extensions(root, report)
+
+
+def _check_node(node: dict[str, Any], index: int, report: _Report) -> None:
+    path = ("nodes", index)
+    if node.get("children") == []:
+        report("G003.structure", "at least one child", "none", (*path, "children"))
+    for name in ("skin", "weights"):
+        if name in node and "mesh" not in node:
+            report("G003.structure", "a node with a mesh", "one without", (*path, name))
+    matrix = node.get("matrix")
+    if isinstance(matrix, list) and len(matrix) == 16 and _is_sheared(matrix):
+        wanted = "a matrix of a translation, rotation and scale"
+        report("G003.structure", wanted, "a sheared one", (*path, "matrix"))
+
+
+def _is_sheared(matrix: list[Any]) -> bool:
+    """Return whether the axes of a matrix are not perpendicular."""
+    if not all(isinstance(each, int | float) and abs(each) < 1e30 for each in matrix):
+        return False
+    axes = np.array(matrix, dtype=np.float64).reshape(4, 4)[:3, :3]
+    lengths = np.linalg.norm(axes, axis=1, keepdims=True)
+    cosines = axes @ axes.T / np.maximum(lengths @ lengths.T, 1e-30)
+    return bool((np.abs(cosines - np.diag(np.diag(cosines))) > _SHEAR).any())
+
+
+def _check_skinned(
+    root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
+) -> None:
+    """Check that skinned meshes are roots, in a scene with their joints."""
+    parents, tops = tree.parents.tolist(), roots_of(tree.parents)
+    scenes = [
+        {node for node in listed(scene, "nodes") if isinstance(node, int)}
+        for _, scene in _items_of(root, "scenes")
+    ]
+    for node in np.flatnonzero(tree.skins >= 0).tolist():
+        if parents[node] >= 0:
+            found = f"a child of node {parents[node]}, whose transform has no effect"
+            report("G007.skinned-child", "a root", found, ("nodes", node))
+        joints = skins[int(tree.skins[node])].joints.tolist()
+        top, roots = int(tops[node]), set(tops[joints].tolist())
+        shown = [scene for scene in scenes if top in scene]
+        if shown and not any(scene >= roots for scene in shown):
+            wanted = "joints in the scene of the mesh"
+            report("G004.structure", wanted, "joints outside it", ("nodes", node))
+
+
+def _check_channels(
+    nodes: dict[int, dict[str, Any]], animation: dict[str, Any], index: int, report: _Report
+) -> None:
+    path = ("animations", index)
+    for name in ("channels", "samplers"):
+        if animation.get(name) == []:
+            report("G005.structure", "at least one item", "none", (*path, name))
+    for place, channel in _items_of(animation, "channels"):
+        moved, node = part(channel, "target", "path"), part(channel, "target", "node")
+        owner = nodes.get(node, {}) if isinstance(node, int) else {}
+        if "skin" in owner and moved in ("translation", "rotation", "scale"):
+            found = f"a node with a skinned mesh, whose {moved} has no effect"
+            at = (*path, "channels", place, "target", "path")
+            report("G007.skinned-moved", "a node without a skinned mesh", found, at)
+
+
+def _check_extensions(root: dict[str, Any], report: _Report) -> None:
+    """Check that all extensions are declared."""
+    used = [name for name in listed(root, "extensionsUsed") if isinstance(name, str)]
+    for place, name in enumerate(listed(root, "extensionsRequired")):
+        if isinstance(name, str) and name not in used:
+            at = ("extensionsRequired", place)
+            report("G001.structure", "a name that extensionsUsed contains", name, at)
+    told: set[str] = set()
+    stack: list[tuple[Any, tuple[str | int, ...]]] = [(root, ())]
+    while stack:
+        value, path = stack.pop()
+        if isinstance(value, list):
+            stack += [(each, (*path, place)) for place, each in enumerate(value)]
+        if not isinstance(value, dict):
+            continue
+        for name, each in value.items():
+            if name == "extensions" and isinstance(each, dict):
+                for extension in each:
+                    if extension not in used and extension not in told:
+                        told.add(extension)
+                        at = (*path, name, extension)
+                        report("G001.structure", "a name in extensionsUsed", extension, at)
+            elif name != "extras" and isinstance(each, dict | list):
+                stack.append((each, (*path, name)))

@@ -1,20 +1,50 @@
-"""A glTF document: its JSON, buffers and accessors, and a limit on decoded data."""
+r"""Opened glTF documents: container, JSON, buffers and accessors, and a limit on decoded data.
+
+::
+
+    .gltf  JSON text
+    .glb   "glTF" version:uint32 = 2 length:uint32 chunk…
+    chunk  length:uint32 type:uint32 bytes, padded to 4 bytes
+    types  "JSON" first, then "BIN\0" if there is a binary buffer; others are skipped
+
+Lengths that contradict the size of the file are corrected with a warning if no data are lost.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
+import gc
+import json
+import math
+import re
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 from viewer.errors import FormatError
+from viewer.formats._archive.values import describe
 from viewer.formats._source import Source
+from viewer.formats._text.json_places import MOST_DIGITS
 from viewer.formats.gltf.accessors import Accessors
 from viewer.formats.gltf.buffers import Buffers
-from viewer.formats.gltf.container import Container, open_container
 from viewer.formats.gltf.elements import Element, Table
+from viewer.phrases import printable
 
-Content = TypeVar("Content")
+_MAGIC = b"glTF"  # first bytes of a GLB
+_HEADER = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<I4s")
+_JSON, _BINARY = b"JSON", b"BIN\0"
+
+_PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_HUGE = re.compile(r"\d[eE]\+?\d{3}|\d{309}")  # parts of numbers that may exceed float64
+_THOROUGH = 1 << 20  # size in bytes up to which a text is always searched for repeated keys
+_MOST_BYTES = 512 << 20  # maximum size of the text; parsing takes three times as much memory
 _FREE_BYTES = 256 << 20  # number of decoded bytes that every file may have
 _MOST_GROWTH = 64  # maximum decoded bytes per byte of the file; 20 is usual for compressed data
+_Content = TypeVar("_Content")
 
 
 class Document:
@@ -24,8 +54,10 @@ class Document:
     ----------
     source : Source
         The file, which records diagnostics.
-    container : Container
-        Its JSON and binary chunk.
+    root : dict
+        Its parsed JSON.
+    binary : memoryview or None
+        Contents of the binary chunk, with its padding; None if there is none.
 
     Attributes
     ----------
@@ -39,12 +71,12 @@ class Document:
         Arrays.
     """
 
-    def __init__(self, source: Source, container: Container) -> None:
+    def __init__(self, source: Source, root: dict[str, Any], binary: memoryview | None) -> None:
         self.source = source
-        self.root = Element(source, container.root)
+        self.root = Element(source, root)
         self._tables: dict[str, Table] = {}
         self._decoded = 0
-        self.buffers = Buffers(self.root, container.binary, self.spend)
+        self.buffers = Buffers(self.root, binary, self.spend)
         self.accessors = Accessors(self.root.table("accessors"), self.buffers, self.spend)
 
     def table(self, name: str) -> Table:
@@ -67,7 +99,7 @@ class Document:
             raise self.source.fault("F002.gltf-decoded", pointer, most=most, size=size)
         self._decoded = size
 
-    def kept(self, read: Callable[[], Content], neutral: Content) -> Content:
+    def kept(self, read: Callable[[], _Content], neutral: _Content) -> _Content:
         """Return the result of a function, or a neutral value if its error is only recorded.
 
         Raises
@@ -92,10 +124,10 @@ def open_document(source: Source) -> Document:
     FormatError
         If its container or its JSON is invalid, or it has another version.
     """
-    container = open_container(source)
+    root, binary = _contents(source)
     # In glTF 1.0, the tables are objects instead of lists, so the version is checked first.
-    _check_version(Element(source, container.root))
-    return Document(source, container)
+    _check_version(Element(source, root))
+    return Document(source, root, binary)
 
 
 def _check_version(root: Element) -> None:
@@ -113,3 +145,196 @@ def _check_version(root: Element) -> None:
         raise asset.fault("F002.gltf-version", "version", found=version)
     if asset.text("minVersion", "2.0") != "2.0":
         raise asset.fault("F002.gltf-version", "minVersion", found=asset.text("minVersion"))
+
+
+def _contents(source: Source) -> tuple[dict[str, Any], memoryview | None]:
+    """Return the JSON and the binary chunk of a file; None if it has none."""
+    data = source.data
+    if not data.startswith(_MAGIC):
+        return parsed_json(source, data, has_lines=True), None
+    chunks: dict[bytes, memoryview] = {}
+    for kind, content in _chunks(source):
+        if kind in (_JSON, _BINARY) and kind in chunks:
+            source.warn("G001.chunk-again", kind=_title(kind))
+        chunks.setdefault(kind, content)
+    if _JSON not in chunks:
+        raise source.fault("F002.glb-json")
+    kinds = [*chunks]
+    for place, kind in (("first", _JSON), ("second", _BINARY)):
+        found = kinds[0 if place == "first" else min(1, len(kinds) - 1)]
+        if kind in chunks and found != kind:
+            titles = _title(kind), _title(found)
+            source.warn("G001.chunk-order", first=titles[0], place=place, found=titles[1])
+            break
+    text = bytes(chunks[_JSON])
+    if text.endswith(b"\0"):
+        source.warn("G001.padding")
+    return parsed_json(source, text, has_lines=False), chunks.get(_BINARY)
+
+
+def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:
+    """Yield the type and the content of each chunk."""
+    data = memoryview(source.data)
+    end = _end(source)
+    place = _HEADER.size
+    while place + _CHUNK.size <= end:
+        length, kind = _CHUNK.unpack_from(data, place)
+        place += _CHUNK.size
+        if place + length > end:
+            found = len(data) - place
+            if kind == _JSON and length > found:
+                raise source.fault("F002.glb-chunk", kind="JSON", expected=length, found=found)
+            source.warn("G001.chunk-length", kind=_title(kind), expected=length, found=end - place)
+        # A file whose length is too small may still contain the whole chunk.
+        stop = min(place + length, len(data))
+        yield kind, data[place:stop]
+        place = _next(data, place + length)
+    if place < end and bytes(data[place:end]).strip(b"\0 "):
+        source.warn("G001.trailing", n=end - place)
+
+
+def _end(source: Source) -> int:
+    """Return the end of the last chunk, according to the header or the size of the file."""
+    size = len(source.data)
+    if size < _HEADER.size:
+        raise source.fault("F002.glb-header", found=size)
+    _, version, length = _HEADER.unpack_from(source.data)
+    if version != 2:
+        raise source.fault("F002.gltf-version", found=version)
+    if length != size:
+        source.warn("G001.length", expected=length, found=size)
+    # A file that is too long has other data after its chunks; a truncated one ends early.
+    return length if _HEADER.size + _CHUNK.size <= length < size else size
+
+
+def _next(data: memoryview, place: int) -> int:
+    """Return the start of the next chunk; some writers pad chunks without counting the padding."""
+    padded = place + -place % 4
+    if padded != place and bytes(data[padded + 4 : padded + 8]) in (_JSON, _BINARY):
+        return padded
+    return place
+
+
+def _title(kind: bytes) -> str:
+    return kind.rstrip(b"\0 ").decode("ascii", "backslashreplace")
+
+
+def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
+    """Return the parsed root object.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records diagnostics.
+    data : bytes
+        UTF-8 text, possibly padded.
+    has_lines : bool
+        Whether the text is the whole file, so that errors have a line number.
+
+    Raises
+    ------
+    FormatError
+        If the text is not a valid JSON object.
+    """
+    if len(data) > _MOST_BYTES:
+        raise source.fault("F001.gltf-text", most=_MOST_BYTES, size=len(data))
+    text = _decoded_text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
+    constants: list[str] = []
+    repeated: list[str] = []
+    overflows: list[str] = []
+
+    def constant(word: str) -> float:
+        constants.append(word)
+        return float(word)
+
+    def number(word: str) -> float:
+        value = float(word)
+        if math.isinf(value):
+            overflows.append(word)
+        return value
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        values = dict(pairs)
+        if len(values) != len(pairs):
+            counts = Counter(key for key, _ in pairs)
+            repeated.extend(key for key, count in counts.items() if count > 1)
+        return values
+
+    # The search for repeated keys takes half as long as parsing.
+    looks = len(text) < _THOROUGH or source.diagnostics.keeps_errors
+    hook = unique if looks else None
+    # Python calls a function for each number only if this is needed, because it is slow.
+    of_numbers = number if _HUGE.search(text) else None
+    decoder = json.JSONDecoder(
+        object_pairs_hook=hook, parse_constant=constant, parse_float=of_numbers
+    )
+    try:
+        with _collection_suspended():
+            root = decoder.decode(text)
+    except json.JSONDecodeError as problem:
+        place = len(text[: problem.pos].encode(errors="replace")) if has_lines else None
+        reason = printable(problem.msg, 100)
+        raise source.fault("F002.gltf-json", place, reason=reason, at=problem.pos) from None
+    except RecursionError:
+        raise source.fault("F002.json-nesting") from None
+    except ValueError:  # the error is raised only for numbers with too many digits
+        raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
+    if type(root) is not dict:
+        raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))
+    if constants:
+        source.warn("G001.constants", n=len(constants), found=constants[0])
+    if overflows:
+        source.warn("G001.overflow", n=len(overflows), found=overflows[0])
+    if repeated:
+        source.warn("G001.repeated", n=len(repeated), found=repeated[0], names=repeated)
+    if "null" in text and (n_nulls := _remove_nulls(root)):
+        source.warn("G001.nulls", n=n_nulls)
+    return root
+
+
+def _decoded_text(source: Source, data: bytes) -> str:
+    if not data:
+        raise source.fault("F002.gltf-no-json")
+    if data.startswith(_UTF_16):
+        raise source.fault("F002.gltf-utf-16")
+    try:
+        return data.decode()
+    except UnicodeDecodeError as problem:
+        # Only names can be in another encoding, and they are only displayed; keys are ASCII.
+        source.warn("G001.text", at=problem.start)
+        return data.decode(errors="replace")
+
+
+@contextmanager
+def _collection_suspended() -> Iterator[None]:
+    """Suspend garbage collection, which takes a quarter of the time and cannot find anything.
+
+    Hundreds of thousands of new objects start it again and again, although JSON has no cycles.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _remove_nulls(root: dict[str, Any]) -> int:
+    """Remove null members, which some exporters write instead of omitting them.
+
+    Returns their number. Application data are left unchanged.
+    """
+    count = 0
+    left: list[Any] = [root]
+    while left:
+        value = left.pop()
+        if type(value) is list:
+            left.extend(item for item in value if type(item) in (dict, list))
+            continue
+        for name in [name for name, member in value.items() if member is None]:
+            del value[name]
+            count += 1
+        members = (member for name, member in value.items() if name != "extras")
+        left.extend(member for member in members if type(member) in (dict, list))
+    return count
