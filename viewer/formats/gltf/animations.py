@@ -1,4 +1,8 @@
-"""Animations of a glTF document: names, ranges and nodes. Keys are read on first playback."""
+"""Animations of a glTF document: names, ranges and nodes; keys are read on first playback.
+
+A channel moves a node by its index, or by a JSON pointer (``KHR_animation_pointer``): translation,
+rotation, scale or weights of morph targets. Pointers to anything else are counted and reported.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,115 @@ from viewer.rig.arrays import Floats
 from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, Interpolation, TransformPath
 
 _SAME_TIME = 1e-4  # rounding error of times in JSON, seconds
+_TINY = 1e-12  # minimum length of a quaternion with a direction
+
+_INTERPOLATIONS: dict[str, Interpolation] = {
+    "LINEAR": "linear",
+    "STEP": "step",
+    "CUBICSPLINE": "cubic",
+}
+_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+_WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
+
+_NODE_POINTER = re.compile(r"/nodes/([0-9]{1,9})/(translation|rotation|scale|weights)")
+_MESH_POINTER = re.compile(r"/meshes/([0-9]{1,9})/weights")
+_INDEX = re.compile(r"/[0-9]+")
+_OF_NODES = frozenset(TRANSFORM_PATHS) - {"weights"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Moved:
+    """Target of a channel.
+
+    Attributes
+    ----------
+    path : str
+        Entry of ``TRANSFORM_PATHS``; for other targets, a name for messages.
+    nodes : tuple of int
+        Nodes that the channel animates; empty if it has no visible effect.
+    """
+
+    path: str
+    nodes: tuple[int, ...]
+
+    @property
+    def transform_path(self) -> TransformPath:
+        """Path of a channel that animates nodes."""
+        return cast("TransformPath", self.path)
+
+
+class Targets:
+    """Nodes that channels can animate.
+
+    Parameters
+    ----------
+    tree : NodeTree
+        All nodes.
+    meshes : tuple of NodeMesh
+        All meshes, whose morph targets have weights.
+    """
+
+    def __init__(self, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
+        self._tree, self._meshes = tree, meshes
+        self._with_shapes = {
+            node
+            for node, mesh in enumerate(tree.meshes.tolist())
+            if mesh >= 0 and meshes[mesh].target_names
+        }
+
+    def n_shapes(self, node: int) -> int:
+        """Return the number of morph targets of a node's mesh."""
+        mesh = int(self._tree.meshes[node])
+        return len(self._meshes[mesh].target_names) if mesh >= 0 else 0
+
+    def moves(self, node: Any, path: Any) -> bool:
+        """Return whether a channel of this node and path, as in the file, has a visible effect."""
+        if type(node) is not int or not 0 <= node < self._tree.n_nodes:
+            return False
+        return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
+
+    def moves_all(self, ends: list[Any]) -> bool:
+        """Return whether all channels with these targets, as in the file, have a visible effect.
+
+        Files have tens of thousands of them, most of which are transforms. A target that is not an
+        object, or lacks a member, raises a ``TypeError`` or ``KeyError``.
+        """
+        nodes, paths = {end["node"] for end in ends}, {end["path"] for end in ends}
+        if set(map(type, nodes)) == {int} and paths.issubset(_OF_NODES):
+            return min(nodes) >= 0 and max(nodes) < self._tree.n_nodes
+        return all(self.moves(end["node"], end["path"]) for end in ends)
+
+    def of(self, channel: Element) -> _Moved:
+        """Return the target of a channel.
+
+        Raises
+        ------
+        FormatError
+            If the channel has no target, or refers to a missing node.
+        """
+        target = channel.part("target")
+        if target is None:
+            raise channel.wrong("target", "an object")
+        path = target.text("path")
+        if path == "pointer":
+            return self._pointed(target)
+        node = target.index("node", self._tree.n_nodes, "nodes")
+        return _Moved(path, (node,) if self.moves(node, path) else ())
+
+    def _pointed(self, target: Element) -> _Moved:
+        """Return the target of a JSON pointer (KHR_animation_pointer)."""
+        extension = target.extension("KHR_animation_pointer")
+        pointer = "" if extension is None else extension.text("pointer")
+        if match := _NODE_POINTER.fullmatch(pointer):
+            node, path = int(match[1]), match[2]
+            return _Moved(path, (node,) if self.moves(node, path) else ())
+        if match := _MESH_POINTER.fullmatch(pointer):
+            mesh = int(match[1])
+            # Weights of a node override the weights of its mesh.
+            users = (node for node in self._with_shapes if self._tree.meshes[node] == mesh)
+            nodes = (node for node in users if node not in self._tree.shape_weights)
+            return _Moved("weights", tuple(sorted(nodes)))
+        return _Moved(_INDEX.sub("", pointer).removeprefix("/")[:60] or "pointer", ())
 
 
 @dataclass(slots=True)
@@ -188,21 +301,25 @@ class _Reading:
     targets: Targets
     samplers: Table
     times: dict[int, Floats] = field(default_factory=dict)
-    keys: dict[tuple[int, str, int], Keys] = field(default_factory=dict)
+    keys: dict[tuple[int, str, int], _Keys] = field(default_factory=dict)
     n_equal: int = 0
     """Number of keys dropped because the next key has the same time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Keys:
+    """Keys as in ``NodeChannel``."""
+
+    times: Floats
+    values: Floats
+    interpolation: Interpolation
+    tangents: Floats | None
 
 
 def _read_channels(
     document: Document, targets: Targets, animation: Element
 ) -> tuple[NodeChannel, ...]:
-    """Return the channels of an animation that have a visible effect.
-
-    Raises
-    ------
-    FormatError
-        If a channel or its keys are invalid.
-    """
+    """Return the channels of an animation that have a visible effect."""
     channels = animation.table("channels")
     reading = _Reading(document, targets, animation.table("samplers"))
     found: dict[tuple[int, str], NodeChannel] = {}
@@ -220,13 +337,7 @@ def _read_channels(
 
 
 def _sampler_of(channel: Element, samplers: Table) -> int:
-    """Return the index of a channel's sampler.
-
-    Raises
-    ------
-    FormatError
-        If the channel has no sampler.
-    """
+    """Return the index of a channel's sampler, which it must have."""
     return channel.required_index("sampler", len(samplers), "samplers")
 
 
@@ -253,34 +364,8 @@ def _times(reading: _Reading, sampler: Element) -> Floats:
     return reading.times[accessor]
 
 
-_INTERPOLATIONS: dict[str, Interpolation] = {
-    "LINEAR": "linear",
-    "STEP": "step",
-    "CUBICSPLINE": "cubic",
-}
-_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
-_WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
-_TINY = 1e-12  # minimum length of a quaternion with a direction
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Keys:
-    """Keys as in ``NodeChannel``."""
-
-    times: Floats
-    values: Floats
-    interpolation: Interpolation
-    tangents: Floats | None
-
-
 def _read_times(document: Document, sampler: Element) -> Floats:
-    """Return the times of a sampler's keys: (N,) seconds, in ascending order, N > 0.
-
-    Raises
-    ------
-    FormatError
-        If the times are missing, malformed, not finite or not in ascending order.
-    """
+    """Return the times of a sampler's keys: (N,) seconds, finite, in ascending order, N > 0."""
     accessor = sampler.required_index("input", len(document.accessors), "accessors")
     times = document.accessors.floats(accessor, ("SCALAR",), sampler.at("input"))[:, 0]
     if not len(times):
@@ -298,26 +383,10 @@ def _read_times(document: Document, sampler: Element) -> Floats:
 
 def _read_keys(
     document: Document, sampler: Element, times: Floats, path: TransformPath, n_shapes: int
-) -> Keys:
-    """Return the keys of a sampler.
+) -> _Keys:
+    """Return the keys of a sampler at N times, with ``n_shapes`` weights per key.
 
-    Parameters
-    ----------
-    document : Document
-        The document.
-    sampler : Element
-        A sampler.
-    times : (N,)
-        Times of the keys; of several keys at one time, only the last is used.
-    path : str
-        Property that the sampler animates.
-    n_shapes : int
-        Number of weights per key.
-
-    Raises
-    ------
-    FormatError
-        If the values are malformed, not finite, of the wrong number, or not rotations.
+    Of several keys at one time, only the last is used.
     """
     names = tuple(_INTERPOLATIONS)
     interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
@@ -328,40 +397,30 @@ def _read_keys(
     expected = len(times) * per_key * width
     if rows.size != expected:
         # The count is in elements of the accessor: vectors, or single weights.
-        raise _wrong_count(sampler, expected // rows.shape[1], len(rows), len(times))
+        counts = {"expected": expected // rows.shape[1], "found": len(rows), "keys": len(times)}
+        raise sampler.fault("F002.gltf-outputs", "output", **counts)
     keys = rows.reshape(len(times), per_key, width)
-    _check_finite(sampler, keys)
+    bad = ~np.isfinite(keys)
+    if bad.any():
+        key, place, column = (int(axis[0]) for axis in np.nonzero(bad))
+        found = float(keys[key, place, column])
+        raise sampler.fault("F003.gltf-keys", "output", index=key, found=found)
     if path == "rotation":
-        keys = _rotations(sampler, keys, _is_whole(document, accessor))
+        is_whole = document.accessors[accessor].values.get("componentType") != 5126
+        keys = _rotations(sampler, keys, is_whole)
     # Each key has an in-tangent, value and out-tangent; tangents are slopes per second (3.11.3.3).
     tangents = keys[:, (0, 2)] if per_key == 3 else None
-    return _without_equal(Keys(times, keys[:, per_key // 2], interpolation, tangents))
+    return _without_equal(_Keys(times, keys[:, per_key // 2], interpolation, tangents))
 
 
-def _without_equal(keys: Keys) -> Keys:
+def _without_equal(keys: _Keys) -> _Keys:
     """Return the last of several keys at one time, because exporters repeat the final key."""
     is_last = keys.times[1:] > keys.times[:-1]
     if is_last.all():
         return keys
     is_kept = np.append(is_last, True)
     tangents = None if keys.tangents is None else keys.tangents[is_kept]
-    return Keys(keys.times[is_kept], keys.values[is_kept], keys.interpolation, tangents)
-
-
-def _wrong_count(sampler: Element, expected: int, found: int, keys: int) -> FormatError:
-    return sampler.fault("F002.gltf-outputs", "output", expected=expected, found=found, keys=keys)
-
-
-def _check_finite(sampler: Element, keys: Floats) -> None:
-    bad = ~np.isfinite(keys)
-    if bad.any():
-        key, place, column = (int(axis[0]) for axis in np.nonzero(bad))
-        found = float(keys[key, place, column])
-        raise sampler.fault("F003.gltf-keys", "output", index=key, found=found)
-
-
-def _is_whole(document: Document, accessor: int) -> bool:
-    return document.accessors[accessor].values.get("componentType") != 5126
+    return _Keys(keys.times[is_kept], keys.values[is_kept], keys.interpolation, tangents)
 
 
 def _rotations(sampler: Element, keys: Floats, is_whole: bool) -> Floats:
@@ -371,104 +430,3 @@ def _rotations(sampler: Element, keys: Floats, is_whole: bool) -> Floats:
     if (lengths < _TINY).any():
         raise sampler.fault("F002.gltf-rotation", "output", index=int((lengths < _TINY).argmax()))
     return keys if middle and not is_whole else keys / lengths[:, None, None]
-
-
-_NODE_POINTER = re.compile(r"/nodes/([0-9]{1,9})/(translation|rotation|scale|weights)")
-_MESH_POINTER = re.compile(r"/meshes/([0-9]{1,9})/weights")
-_INDEX = re.compile(r"/[0-9]+")
-_OF_NODES = frozenset(TRANSFORM_PATHS) - {"weights"}
-
-
-@dataclass(frozen=True, slots=True)
-class _Moved:
-    """Target of a channel.
-
-    Attributes
-    ----------
-    path : str
-        Entry of ``TRANSFORM_PATHS``; for other targets, a name for messages.
-    nodes : tuple of int
-        Nodes that the channel animates; empty if it has no visible effect.
-    """
-
-    path: str
-    nodes: tuple[int, ...]
-
-    @property
-    def transform_path(self) -> TransformPath:
-        """Path of a channel that animates nodes."""
-        return cast("TransformPath", self.path)
-
-
-class Targets:
-    """Nodes that channels can animate.
-
-    Parameters
-    ----------
-    tree : NodeTree
-        All nodes.
-    meshes : tuple of NodeMesh
-        All meshes, whose morph targets have weights.
-    """
-
-    def __init__(self, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
-        self._tree, self._meshes = tree, meshes
-        self._with_shapes = {
-            node
-            for node, mesh in enumerate(tree.meshes.tolist())
-            if mesh >= 0 and meshes[mesh].target_names
-        }
-
-    def n_shapes(self, node: int) -> int:
-        """Return the number of morph targets of a node's mesh."""
-        mesh = int(self._tree.meshes[node])
-        return len(self._meshes[mesh].target_names) if mesh >= 0 else 0
-
-    def moves(self, node: Any, path: Any) -> bool:
-        """Return whether a channel of this node and path, as in the file, has a visible effect."""
-        if type(node) is not int or not 0 <= node < self._tree.n_nodes:
-            return False
-        return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
-
-    def moves_all(self, ends: list[Any]) -> bool:
-        """Return whether all channels with these targets, as in the file, have a visible effect.
-
-        Files have tens of thousands of them, most of which are transforms. A target that is not an
-        object, or lacks a member, raises a ``TypeError`` or ``KeyError``.
-        """
-        nodes, paths = {end["node"] for end in ends}, {end["path"] for end in ends}
-        if set(map(type, nodes)) == {int} and paths.issubset(_OF_NODES):
-            return min(nodes) >= 0 and max(nodes) < self._tree.n_nodes
-        return all(self.moves(end["node"], end["path"]) for end in ends)
-
-    def of(self, channel: Element) -> _Moved:
-        """Return the target of a channel.
-
-        Raises
-        ------
-        FormatError
-            If the channel has no target, or refers to a missing node.
-        """
-        target = channel.part("target")
-        if target is None:
-            raise channel.wrong("target", "an object")
-        path = target.text("path")
-        if path == "pointer":
-            return self._pointed(target)
-        node = target.index("node", self._tree.n_nodes, "nodes")
-        return _Moved(path, (node,) if self.moves(node, path) else ())
-
-    def _pointed(self, target: Element) -> _Moved:
-        """Return the target of a JSON pointer (KHR_animation_pointer)."""
-        extension = target.extension("KHR_animation_pointer")
-        pointer = "" if extension is None else extension.text("pointer")
-        if match := _NODE_POINTER.fullmatch(pointer):
-            node, path = int(match[1]), match[2]
-            return _Moved(path, (node,) if self.moves(node, path) else ())
-        if match := _MESH_POINTER.fullmatch(pointer):
-            mesh = int(match[1])
-            # Weights of a node override the weights of its mesh.
-            users = (node for node in self._with_shapes if self._tree.meshes[node] == mesh)
-            nodes = (node for node in users if node not in self._tree.shape_weights)
-            return _Moved("weights", tuple(sorted(nodes)))
-        return _Moved(_INDEX.sub("", pointer).removeprefix("/")[:60] or "pointer", ())

@@ -1,4 +1,4 @@
-"""Supported extensions of glTF, and messages about others."""
+"""Extensions and contents of glTF that are read and written back, and messages about the others."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from viewer.formats._scene_graph.content import NodeTree, descendants
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
 
+# Extensions of geometry and animation, and of characters; materials and textures list their own.
 _GEOMETRY = (
     "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
@@ -21,7 +22,6 @@ _GEOMETRY = (
     "KHR_meshopt_compression",
     "EXT_meshopt_compression",
 )
-"""Extensions of geometry and animation."""
 _CHARACTERS = (
     "VRM",
     "VRMC_node_constraint",
@@ -30,14 +30,13 @@ _CHARACTERS = (
     "VRMC_vrm",
     "VRMC_vrm_animation",
 )
-
-# The readers of materials and textures list their own extensions.
-_ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
+_VISIBILITY = "KHR_node_visibility"
 
 # Lights are counted below, and hidden nodes by ``hidden_nodes``.
 _WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
-_VISIBILITY = "KHR_node_visibility"
-"""Extension of nodes that are not drawn."""
+
+# Extensions that the reader of materials reports.
+_ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
 
 # Without these, a file has the same surfaces and motions, although it may look or sound different.
 _LOOK = re.compile(r"[A-Z]+_(materials|texture|lights|image)_")
@@ -46,6 +45,14 @@ _KEPT_EXTENSIONS = frozenset((*_GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS))
 """Extensions whose effect is written back, although not always in the same form."""
 _KNOWN = _KEPT_EXTENSIONS | {*_WITHOUT_EFFECT, _VISIBILITY}
 """Extensions that are read, or have no visible effect."""
+
+# Lists whose items have application data that is written back.
+_KEPT = frozenset({"nodes", "meshes", "materials", "scenes", "animations"})
+
+# Lists whose items lose their names: the writer makes new ones, or names cameras after their nodes.
+_UNNAMED = frozenset({"textures", "samplers", "cameras"})
+_DRAWN = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
+_READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
 
 
 def check_extensions(document: Document) -> None:
@@ -77,6 +84,13 @@ def _changes_only_look(name: str) -> bool:
     return name in _LOOKS or _LOOK.match(name) is not None
 
 
+def _names(document: Document, member: str) -> list[str]:
+    items: Any = document.root.values.get(member, [])
+    if type(items) is not list or set(map(type, items)) - {str}:
+        raise document.root.wrong(member, "a list of names")
+    return list(dict.fromkeys(items))
+
+
 def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
     """Return the nodes that ``KHR_node_visibility`` hides with everything below them."""
     extensions = tree.extensions
@@ -99,24 +113,6 @@ def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
     return drawn
 
 
-def _names(document: Document, member: str) -> list[str]:
-    items: Any = document.root.values.get(member, [])
-    if type(items) is not list or set(map(type, items)) - {str}:
-        raise document.root.wrong(member, "a list of names")
-    return list(dict.fromkeys(items))
-
-
-_EXTRAS, _EXTENSIONS = "extras", "extensions"
-
-# Lists whose items have application data that is written back.
-_KEPT = frozenset({"nodes", "meshes", "materials", "scenes", "animations"})
-
-# Lists whose items lose their names: the writer makes new ones, or names cameras after their nodes.
-_UNNAMED = frozenset({"textures", "samplers", "cameras"})
-_DRAWN = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
-_READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
-
-
 def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
     """Return the members that are not written back, each once, such as ``images.extras``.
 
@@ -133,7 +129,7 @@ def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
     """
     found: dict[str, None] = {}
     for kind, listed in root.items():
-        if kind == _EXTENSIONS:
+        if kind == "extensions":
             found |= dict.fromkeys(_extensions(kind, listed))
         if kind == "asset":
             found |= dict.fromkeys(_members(kind, [listed], False))
@@ -143,34 +139,15 @@ def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
-    """Return what a document holds, with numbers, as parts of a message."""
-    counts: Counter[str] = Counter()
-    for mesh in _objects(root.get("meshes")):
-        for primitive in _objects(mesh.get("primitives")):
-            counts[_DRAWN.get(primitive.get("mode", 4), "triangles")] += 1
-    found = {f"gltf-{kind}": counts[kind] for kind in ("points", "lines", "triangles")}
-    for kind in ("cameras", "nodes", "skins", "animations", "materials", "images"):
-        found[f"gltf-{kind}"] = len(_objects(root.get(kind)))
-    extensions = root.get(_EXTENSIONS)
-    told = extensions.get("KHR_lights_punctual") if isinstance(extensions, dict) else None
-    found["gltf-lights"] = len(_objects(told.get("lights"))) if isinstance(told, dict) else 0
-    return tuple(Phrase(key, n=n) for key, n in found.items() if n)
-
-
-def _objects(listed: Any) -> list[dict[str, Any]]:
-    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
-
-
 def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:
     """Yield the members of the objects in a list, and of the objects within these."""
     for item in listed:
         if not isinstance(item, dict):
             continue
         for name, value in item.items():
-            if name == _EXTRAS:
+            if name == "extras":
                 yield from () if keeps_extras else (f"{kind}.{name}",)
-            elif name == _EXTENSIONS:
+            elif name == "extensions":
                 yield from _extensions(kind, value)
             elif name == "attributes" and isinstance(value, dict):
                 yield from (f"{name}.{each}" for each in value if not _READ.fullmatch(each))
@@ -197,3 +174,22 @@ def _extensions(kind: str, told: Any) -> Iterator[str]:
     for name in told if isinstance(told, dict) else ():
         if name not in _KEPT_EXTENSIONS:
             yield f"{kind}.{name}"
+
+
+def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
+    """Return what a document holds, with numbers, as parts of a message."""
+    counts: Counter[str] = Counter()
+    for mesh in _objects(root.get("meshes")):
+        for primitive in _objects(mesh.get("primitives")):
+            counts[_DRAWN.get(primitive.get("mode", 4), "triangles")] += 1
+    found = {f"gltf-{kind}": counts[kind] for kind in ("points", "lines", "triangles")}
+    for kind in ("cameras", "nodes", "skins", "animations", "materials", "images"):
+        found[f"gltf-{kind}"] = len(_objects(root.get(kind)))
+    extensions = root.get("extensions")
+    told = extensions.get("KHR_lights_punctual") if isinstance(extensions, dict) else None
+    found["gltf-lights"] = len(_objects(told.get("lights"))) if isinstance(told, dict) else 0
+    return tuple(Phrase(key, n=n) for key, n in found.items() if n)
+
+
+def _objects(listed: Any) -> list[dict[str, Any]]:
+    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []

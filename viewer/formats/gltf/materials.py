@@ -2,9 +2,9 @@
 
 Supported are all properties of the core specification, ``KHR_texture_transform``,
 ``KHR_materials_unlit``, ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived
-model ``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated; see
-``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored with
-a warning, because the shape can still be shown.
+model ``KHR_materials_pbrSpecularGlossiness`` is approximated, as derived below, and VRM's toon
+materials by ``toon.py``. Other extensions are not drawn. Invalid members are ignored with a
+warning, because the shape can still be shown.
 """
 
 from __future__ import annotations
@@ -45,6 +45,10 @@ DRAWN_EXTENSIONS = (
 """Extensions of materials and textures that have an effect."""
 _WHITE = (1.0, 1.0, 1.0, 1.0)
 _LARGEST = 1e6  # maximum factor; larger ones look the same, but their products could overflow
+
+_DIELECTRIC = 0.04  # reflectance of dielectrics, D
+_BRIGHTNESS = np.array([0.299, 0.587, 0.114], dtype=np.float32)
+_ROWS = 256  # number of rows of an image that are converted together
 _FACTORED = (("normalTexture", "normal_texture"), ("occlusionTexture", "occlusion_texture"))
 _MODES = {mode.upper(): mode for mode in ALPHA_MODES}
 _NEUTRAL: dict[str, dict[str, Any]] = {
@@ -69,6 +73,7 @@ DEFAULT_MATERIAL = Material(
     base_color=_WHITE, metallic=1.0, roughness=1.0, double_sided=False, is_physical=True
 )
 """Material of primitives without a material."""
+_Reals = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +83,17 @@ class _Stated:
     values: dict[str, Any]
     slots: dict[str, Slot]
     glossiness: Glossiness | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Glossiness:
+    """A specular-glossiness surface: factors, and textures that they multiply."""
+
+    diffuse: tuple[float, ...]
+    specular: tuple[float, ...]
+    glossiness: float
+    diffuse_slot: Slot | None
+    specular_slot: Slot | None
 
 
 @contextlib.contextmanager
@@ -222,36 +238,6 @@ def _is_neutral(name: str, values: Any) -> bool:
     return all(values.get(key, value) == value for key, value in _NEUTRAL[name].items())
 
 
-# Specular-glossiness materials of glTF, approximated by metallic and roughness.
-#
-# KHR_materials_pbrSpecularGlossiness describes a surface by its diffuse and its specular colour.
-# A metallic surface with the reflectance D = 0.04 of dielectrics has, for a base colour B and a
-# metallic value m, the diffuse colour (1 - m) B and the specular colour D + m (B - D). With the
-# brightness d of the diffuse colour and s of the specular colour, where the diffuse colour is
-# scaled by 1 - max(specular) as the extension does, m is the solution of
-#
-#     D m² + (d (1 - max) / (1 - D) + s - 2 D) m + D - s = 0
-#
-# and 0 for s below D. The base colour follows from the diffuse colour for dielectrics, and from
-# the specular colour for metals.
-
-_DIELECTRIC = 0.04
-_BRIGHTNESS = np.array([0.299, 0.587, 0.114], dtype=np.float32)
-_ROWS = 256  # number of rows of an image that are converted together
-_Reals = NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Glossiness:
-    """A specular-glossiness surface: factors, and textures that they multiply."""
-
-    diffuse: tuple[float, ...]
-    specular: tuple[float, ...]
-    glossiness: float
-    diffuse_slot: Slot | None
-    specular_slot: Slot | None
-
-
 def _read_glossiness(document: Document, element: Element) -> Glossiness:
     """Return the factors and textures of the extension."""
     return Glossiness(
@@ -264,15 +250,7 @@ def _read_glossiness(document: Document, element: Element) -> Glossiness:
 
 
 def from_glossiness(stated: Glossiness, images: dict[int, DecodedImage]) -> dict[str, Any]:
-    """Return the fields of ``Material`` that describe the surface.
-
-    Parameters
-    ----------
-    stated : Glossiness
-        Factors and textures.
-    images : dict
-        Images by index.
-    """
+    """Return the fields of ``Material`` that describe the surface, with images by index."""
     specular = None if stated.specular_slot is None else stated.specular_slot.texture(images)
     diffuse = None if stated.diffuse_slot is None else stated.diffuse_slot.texture(images)
     if specular is None or specular.image is None:
@@ -328,7 +306,18 @@ def _converted(stated: Glossiness, diffuse: Bytes | None, specular: Bytes) -> tu
 
 
 def _metallic(diffuse: _Reals, specular: _Reals) -> tuple[_Reals, _Reals]:
-    """Return base colours, (..., 3), and metallic values, (...), of linear colours."""
+    """Return base colours, (..., 3), and metallic values, (...), of linear colours.
+
+    A metallic surface with the reflectance D = 0.04 of dielectrics has, for a base colour B and a
+    metallic value m, the diffuse colour (1 - m) B and the specular colour D + m (B - D). With the
+    brightness d of the diffuse colour and s of the specular colour, where the diffuse colour is
+    scaled by 1 - max(specular) as the extension does, m is the solution of
+
+        D m² + (d (1 - max) / (1 - D) + s - 2 D) m + D - s = 0
+
+    and 0 for s below D. The base colour follows from the diffuse colour for dielectrics, and from
+    the specular colour for metals.
+    """
     strongest = specular.max(axis=-1)
     kept = (1.0 - strongest) / (1.0 - _DIELECTRIC)
     d, s = np.sqrt(diffuse**2 @ _BRIGHTNESS), np.sqrt(specular**2 @ _BRIGHTNESS)

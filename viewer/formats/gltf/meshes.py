@@ -1,4 +1,8 @@
-"""Meshes of a glTF document: their triangles, vertex attributes and morph targets."""
+"""Meshes of a glTF document: their triangles, vertex attributes and morph targets.
+
+Strips and fans become lists of triangles; points and lines are counted and reported. Primitives
+that share their vertices get only those that their own triangles use.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,12 @@ from viewer.formats.gltf.draco import decoded_primitive
 from viewer.formats.gltf.elements import Element, Table
 from viewer.rig.arrays import Bools, Floats, Ints
 
+_LIST, _STRIP, _FAN = 4, 5, 6
+_TRIANGLES = (_LIST, _STRIP, _FAN)  # all other modes draw points or lines
 _MODES = range(7)
+
+_MOST_UVS = 8  # maximum number of texture coordinate sets
+_NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")
 
 
 @dataclass(slots=True)
@@ -76,19 +85,19 @@ def _mesh(reading: _Reading, mesh: Element) -> NodeMesh:
     return NodeMesh(
         mesh.text("name"),
         tuple(primitive for primitive in read if primitive is not None),
-        target_names(mesh, primitives, count),
-        shape_weights(mesh, count),
+        _target_names(mesh, primitives, count),
+        _default_weights(mesh, count),
         mesh.values.get("extras"),
     )
 
 
 def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
     """Return a primitive; None if it draws no triangles."""
-    mode = primitive.choice("mode", _MODES, 4)
+    mode = primitive.choice("mode", _MODES, _LIST)
     element = primitive.part("attributes")
     if element is None:
         raise primitive.wrong("attributes", "an object")
-    if mode not in TRIANGLES:
+    if mode not in _TRIANGLES:
         reading.n_undrawn += 1
         reading.undrawn = reading.undrawn or primitive.pointer
         return None
@@ -103,29 +112,13 @@ def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
     if compressed is not None:
         count = len(compressed.attributes.get("POSITION", range(count)))
         triangles = _read_triangles(document, primitive, count, compressed.triangles)
-        decoded = _Attributes(document, element, count, None, compressed.attributes)
-        return _read(decoded, primitive, triangles)
-    triangles = _read_triangles(document, primitive, count)
-    rows = None
-    if reading.users[position] > 1:
-        document.spend(count, primitive.pointer)
-        rows, triangles = _used(triangles, count)
-    return _read(_Attributes(document, element, count, rows), primitive, triangles)
-
-
-def _used(triangles: Ints, count: int) -> tuple[Ints | None, Ints]:
-    """Return the vertices that triangles use, and the triangles with indices into them."""
-    used = np.zeros(count, dtype=np.bool_)
-    used[triangles] = True
-    if used.all():
-        return None, triangles
-    numbers = np.cumsum(used, dtype=np.int32) - 1
-    return np.nonzero(used)[0].astype(np.int32), numbers[triangles]
-
-
-def _read(attributes: _Attributes, primitive: Element, triangles: Ints) -> Primitive:
-    """Return a primitive of triangles."""
-    document = attributes.document
+        attributes = _Attributes(document, element, count, None, compressed.attributes)
+    else:
+        triangles, rows = _read_triangles(document, primitive, count), None
+        if reading.users[position] > 1:
+            document.spend(count, primitive.pointer)
+            rows, triangles = _used(triangles, count)
+        attributes = _Attributes(document, element, count, rows)
     positions = _read_positions(attributes)
     joints, weights = _read_influences(attributes)
     targets, normal_targets = _read_targets(attributes, primitive.table("targets"))
@@ -146,8 +139,14 @@ def _read(attributes: _Attributes, primitive: Element, triangles: Ints) -> Primi
     )
 
 
-_MOST_UVS = 8  # maximum number of texture coordinate sets
-_NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")
+def _used(triangles: Ints, count: int) -> tuple[Ints | None, Ints]:
+    """Return the vertices that triangles use, and the triangles with indices into them."""
+    used = np.zeros(count, dtype=np.bool_)
+    used[triangles] = True
+    if used.all():
+        return None, triangles
+    numbers = np.cumsum(used, dtype=np.int32) - 1
+    return np.nonzero(used)[0].astype(np.int32), numbers[triangles]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -253,14 +252,85 @@ class _Attributes:
         return np.where(bad[:, None], 0.0, values)
 
 
-def _read_positions(attributes: _Attributes) -> Floats:
-    """Return the positions: (V, 3).
+def _read_triangles(
+    document: Document,
+    primitive: Element,
+    n_vertices: int,
+    decoded: NDArray[np.int64] | None = None,
+) -> Ints:
+    """Return the triangles of a primitive, (T, 3) int32; ``decoded``: those of Draco, if any."""
+    if decoded is not None:
+        return _existing(document, primitive, decoded.reshape(-1), n_vertices).reshape(-1, 3)
+    corners = _corners(document, primitive, n_vertices)
+    mode = primitive.whole("mode", _LIST)
+    if mode == _STRIP:
+        return _strip(corners)
+    if mode == _FAN:
+        return _fan(corners)
+    if len(corners) % 3:
+        primitive.warn("G002.corners", "indices", n=len(corners), left=len(corners) % 3)
+    return corners[: len(corners) // 3 * 3].reshape(-1, 3)
 
-    Raises
-    ------
-    FormatError
-        If the positions are missing, malformed or not finite.
+
+def _corners(document: Document, primitive: Element, n_vertices: int) -> Ints:
+    """Return vertex indices in drawing order: (N,) int32."""
+    accessors = document.accessors
+    index = primitive.index("indices", len(accessors), "accessors")
+    if index < 0:
+        document.spend(n_vertices * 4, primitive.pointer)
+        return np.arange(n_vertices, dtype=np.int32)
+    corners = accessors.integers(index, ("SCALAR",), primitive.at("indices"))[:, 0]
+    return _existing(document, primitive, corners, n_vertices)
+
+
+def _existing(
+    document: Document, primitive: Element, corners: NDArray[np.int64], n_vertices: int
+) -> Ints:
+    """Return vertex indices after checking that all exist: (N,) int32."""
+    if len(corners) and int(corners.max()) >= n_vertices:
+        bad = corners >= n_vertices
+        entry = int(bad.argmax())
+        document.source.refuse(
+            "F002.gltf-corner",
+            primitive.at("indices"),
+            entry=entry,
+            vertices=n_vertices,
+            found=int(corners[entry]),
+        )
+        corners = np.where(bad, 0, corners)
+    return corners.astype(np.int32)
+
+
+def _strip(corners: Ints) -> Ints:
+    """Return the triangles of a strip, every other one reversed (glTF 2.0, 3.7.2.1).
+
+    Degenerate triangles, which connect parts of a strip, are omitted.
+
+    >>> _strip(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
+    [[0, 1, 2], [1, 3, 2]]
     """
+    if len(corners) < 3:
+        return np.zeros((0, 3), dtype=np.int32)
+    triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
+    triangles[1::2] = triangles[1::2][:, [0, 2, 1]]
+    a, b, c = triangles.T
+    return triangles[(a != b) & (b != c) & (c != a)]
+
+
+def _fan(corners: Ints) -> Ints:
+    """Return the triangles of a fan around its first corner (glTF 2.0, 3.7.2.1).
+
+    >>> _fan(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
+    [[1, 2, 0], [2, 3, 0]]
+    """
+    if len(corners) < 3:
+        return np.zeros((0, 3), dtype=np.int32)
+    center = np.full(len(corners) - 2, corners[0])
+    return np.column_stack([corners[1:-1], corners[2:], center])
+
+
+def _read_positions(attributes: _Attributes) -> Floats:
+    """Return the positions, (V, 3); they must exist and be finite."""
     positions = attributes.floats("POSITION", "VEC3")
     if positions is None:
         raise attributes.element.wrong("POSITION", "the index of an accessor")
@@ -343,11 +413,6 @@ def _read_influences(attributes: _Attributes) -> tuple[Ints, Floats] | tuple[Non
     """Return joints (V, K) int32 and weights (V, K), as stored; None if there are none.
 
     Joint indices of weight 0 are set to 0, because files may contain any number in these slots.
-
-    Raises
-    ------
-    FormatError
-        If an attribute is malformed, or a weight is not finite.
     """
     numbers = attributes.sets("JOINTS")
     without = sorted(set(numbers) ^ set(attributes.sets("WEIGHTS")))
@@ -361,7 +426,7 @@ def _read_influences(attributes: _Attributes) -> tuple[Ints, Floats] | tuple[Non
         weight_set = attributes.fractions(f"WEIGHTS_{number}", "VEC4")
         if joint_set is not None and weight_set is not None:
             joints.append(joint_set)
-            weights.append(_finite(attributes, number, weight_set))
+            weights.append(_finite_weights(attributes, number, weight_set))
     if not joints:
         return None, None
     all_weights = np.concatenate(weights, axis=1)
@@ -370,7 +435,7 @@ def _read_influences(attributes: _Attributes) -> tuple[Ints, Floats] | tuple[Non
     return np.minimum(all_joints, np.iinfo(np.int32).max).astype(np.int32), all_weights
 
 
-def _finite(attributes: _Attributes, number: int, weights: Floats) -> Floats:
+def _finite_weights(attributes: _Attributes, number: int, weights: Floats) -> Floats:
     """Return weights; non-finite ones are errors, and become 0 if errors are only recorded."""
     bad = ~np.isfinite(weights)
     if bad.any():
@@ -384,13 +449,7 @@ def _finite(attributes: _Attributes, number: int, weights: Floats) -> Floats:
 
 
 def _n_targets(mesh: Element, primitives: Table) -> int:
-    """Return the number of morph targets of a mesh.
-
-    Raises
-    ------
-    FormatError
-        If its primitives have different numbers of targets.
-    """
+    """Return the number of morph targets of a mesh, which all its primitives must have."""
     counts = [len(primitives[place].table("targets")) for place in range(len(primitives))]
     for place, found in enumerate(counts):
         if found != counts[0]:
@@ -403,13 +462,7 @@ def _n_targets(mesh: Element, primitives: Table) -> int:
 def _read_targets(
     attributes: _Attributes, targets: Table
 ) -> tuple[MorphTargets | None, MorphTargets | None]:
-    """Return the offsets of positions and normals of a primitive, or None.
-
-    Raises
-    ------
-    FormatError
-        If the targets are malformed.
-    """
+    """Return the offsets of positions and normals of a primitive; None if there are none."""
     if not len(targets):
         return None, None
     offsets = _offsets(attributes, targets, "POSITION")
@@ -437,14 +490,37 @@ def _offsets(attributes: _Attributes, targets: Table, name: str) -> MorphTargets
     return MorphTargets(attributes.n_rows, found, rows)
 
 
-def shape_weights(mesh: Element, count: int) -> Floats:
-    """Return the default weights of the morph targets: (S,).
+def _target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
+    """Return the names of the morph targets; empty strings if there are none.
 
-    Raises
-    ------
-    FormatError
-        If the weights are not numbers.
+    Names are application data of the mesh, of a primitive, or of the targets themselves.
     """
+    candidates = [_named(mesh)]
+    for place in range(len(primitives)):
+        targets = primitives[place].table("targets")
+        candidates += [
+            _named(primitives[place]),
+            [_extra(item, "name") for item in targets.items],
+        ]
+    for names in candidates:
+        if len(names) == count and any(type(name) is str and name for name in names):
+            return tuple(name if type(name) is str else "" for name in names)
+    return ("",) * count
+
+
+def _named(element: Element) -> list[Any]:
+    names = _extra(element.values, "targetNames")
+    return names if type(names) is list else []
+
+
+def _extra(values: Any, name: str) -> Any:
+    """Return a member of an object's application data; None if it is missing."""
+    extras = values.get("extras") if type(values) is dict else None
+    return extras.get(name) if type(extras) is dict else None
+
+
+def _default_weights(mesh: Element, count: int) -> Floats:
+    """Return the default weights of the morph targets: (S,)."""
     weights = mesh.numbers("weights")
     return np.zeros(count) if weights is None else _fitted(mesh, weights, count)
 
@@ -466,128 +542,3 @@ def _fitted(element: Element, weights: Floats, count: int) -> Floats:
     if len(weights) != count:
         element.warn("G002.weights", "weights", expected=count, found=len(weights))
     return np.concatenate([weights[:count], np.zeros(max(0, count - len(weights)))])
-
-
-def target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
-    """Return the names of the morph targets; empty strings if there are none.
-
-    Names are application data of the mesh, of a primitive, or of the targets themselves.
-    """
-    candidates = [_listed(mesh)]
-    for place in range(len(primitives)):
-        targets = primitives[place].table("targets")
-        candidates += [_listed(primitives[place]), [_extra(item, "name") for item in targets.items]]
-    for names in candidates:
-        if len(names) == count and any(type(name) is str and name for name in names):
-            return tuple(name if type(name) is str else "" for name in names)
-    return ("",) * count
-
-
-def _listed(element: Element) -> list[Any]:
-    names = _extra(element.values, "targetNames")
-    return names if type(names) is list else []
-
-
-def _extra(values: Any, name: str) -> Any:
-    """Return a member of an object's application data; None if it is missing."""
-    extras = values.get("extras") if type(values) is dict else None
-    return extras.get(name) if type(extras) is dict else None
-
-
-_LIST, _STRIP, _FAN = 4, 5, 6
-TRIANGLES = (_LIST, _STRIP, _FAN)
-"""Modes that draw triangles; all others draw points or lines."""
-
-
-def _read_triangles(
-    document: Document,
-    primitive: Element,
-    n_vertices: int,
-    decoded: NDArray[np.int64] | None = None,
-) -> Ints:
-    """Return the triangles of a primitive: (T, 3) int32.
-
-    Parameters
-    ----------
-    document : Document
-        The document.
-    primitive : Element
-        A primitive whose mode is in ``TRIANGLES``.
-    n_vertices : int
-        Number of its vertices.
-    decoded : (T, 3), optional
-        Triangles that are already decoded.
-
-    Raises
-    ------
-    FormatError
-        If the indices are malformed, or refer to missing vertices.
-    """
-    if decoded is not None:
-        return _checked(document, primitive, decoded.reshape(-1), n_vertices).reshape(-1, 3)
-    corners = _corners(document, primitive, n_vertices)
-    mode = primitive.whole("mode", _LIST)
-    if mode == _STRIP:
-        return _strip(corners)
-    if mode == _FAN:
-        return _fan(corners)
-    if len(corners) % 3:
-        primitive.warn("G002.corners", "indices", n=len(corners), left=len(corners) % 3)
-    return corners[: len(corners) // 3 * 3].reshape(-1, 3)
-
-
-def _corners(document: Document, primitive: Element, n_vertices: int) -> Ints:
-    """Return vertex indices in drawing order: (N,) int32."""
-    accessors = document.accessors
-    index = primitive.index("indices", len(accessors), "accessors")
-    if index < 0:
-        document.spend(n_vertices * 4, primitive.pointer)
-        return np.arange(n_vertices, dtype=np.int32)
-    corners = accessors.integers(index, ("SCALAR",), primitive.at("indices"))[:, 0]
-    return _checked(document, primitive, corners, n_vertices)
-
-
-def _checked(
-    document: Document, primitive: Element, corners: NDArray[np.int64], n_vertices: int
-) -> Ints:
-    """Return vertex indices after checking that all exist: (N,) int32."""
-    if len(corners) and int(corners.max()) >= n_vertices:
-        bad = corners >= n_vertices
-        entry = int(bad.argmax())
-        document.source.refuse(
-            "F002.gltf-corner",
-            primitive.at("indices"),
-            entry=entry,
-            vertices=n_vertices,
-            found=int(corners[entry]),
-        )
-        corners = np.where(bad, 0, corners)
-    return corners.astype(np.int32)
-
-
-def _strip(corners: Ints) -> Ints:
-    """Return the triangles of a strip, every other one reversed (glTF 2.0, 3.7.2.1).
-
-    Degenerate triangles, which connect parts of a strip, are omitted.
-
-    >>> _strip(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
-    [[0, 1, 2], [1, 3, 2]]
-    """
-    if len(corners) < 3:
-        return np.zeros((0, 3), dtype=np.int32)
-    triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
-    triangles[1::2] = triangles[1::2][:, [0, 2, 1]]
-    a, b, c = triangles.T
-    return triangles[(a != b) & (b != c) & (c != a)]
-
-
-def _fan(corners: Ints) -> Ints:
-    """Return the triangles of a fan around its first corner (glTF 2.0, 3.7.2.1).
-
-    >>> _fan(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
-    [[1, 2, 0], [2, 3, 0]]
-    """
-    if len(corners) < 3:
-        return np.zeros((0, 3), dtype=np.int32)
-    center = np.full(len(corners) - 2, corners[0])
-    return np.column_stack([corners[1:-1], corners[2:], center])

@@ -1,4 +1,22 @@
-"""Compressed buffer views (EXT_meshopt_compression and KHR_meshopt_compression)."""
+"""Compressed buffer views (EXT_meshopt_compression and KHR_meshopt_compression).
+
+A view holds vertex attributes, the indices of triangles, or any sequence of indices. Each has its
+own decoder; attributes may also be filtered. Specification: Khronos Group, KHR_meshopt_compression,
+appendix A (decoders) and B (filters).
+
+Attributes are compressed by meshoptimizer, versions 0 and 1::
+
+    stream  header byte, block…, padding, tail
+    block   up to 256 elements; version 1: 2 control bits per byte of an element; data per byte
+    data    2 header bits per group of 16 elements, group…
+    group   16 deltas of 0, 1, 2, 4 or 8 bits; if all bits of a delta are set, its byte follows
+    tail    first element, version 1: a mode for every 4 bytes of an element
+
+The position of a group depends on the contents of the groups before it. Group sizes are therefore
+computed for all positions in advance, so that finding each group takes one look-up; then all groups
+with the same number of bits are decoded together. Triangles are decoded one by one, because each
+depends on those before it.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +35,29 @@ _NAMES = ("KHR_meshopt_compression", "EXT_meshopt_compression")
 _MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 _STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "COLOR": (4, 8)}
 _LARGEST_STRIDE = 256
+
+_FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
+
+# Attributes.
+_GROUP = 16  # number of elements per group
+_LARGEST_BLOCK = 256  # maximum number of elements per block
+_BLOCK_BYTES = 8192
+_ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
+
+# Bits per delta of the four group modes: in version 0, and for control modes 0 and 1.
+_BITS = ((0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8))
+
+# The four group modes in a byte of header bits.
+_PREDICTIONS = tuple(tuple(byte >> shift & 3 for shift in (0, 2, 4, 6)) for byte in range(256))
+_PADDING = (32, 24)  # minimum size of the tail in bytes, by version
+
+# Triangles and indices.
+_TRIANGLES, _INDICES = 0xE1, 0xD1  # first bytes of the streams
+_TABLE = 16  # size of the table at the end of the triangles, bytes
+_TAIL = 4  # size of the tail at the end of the indices, bytes
+_WRAP = 0xFFFFFFFF
+_MOST_BYTES = 5  # maximum length of a number with 7 bits per byte, bytes
+_KEPT = 1 << 16  # maximum length of a queue; then its oldest entries are dropped, as 16 are in use
 
 
 def meshopt_of(view: Element) -> Element | None:
@@ -73,34 +114,6 @@ def _check(compressed: Element, mode: str, kind: str, stride: int) -> None:
         raise compressed.wrong("byteStride", f"a multiple of 4 up to {_LARGEST_STRIDE}")
     elif kind in _STRIDES and stride not in _STRIDES[kind]:
         raise compressed.wrong("byteStride", " or ".join(map(str, _STRIDES[kind])))
-
-
-# Decoder of vertex attributes compressed by meshoptimizer, versions 0 and 1.
-#
-# ::
-#
-#     stream  header byte, block…, padding, tail
-#     block   up to 256 elements; version 1: 2 control bits per byte of an element; data per byte
-#     data    2 header bits per group of 16 elements, group…
-#     group   16 deltas of 0, 1, 2, 4 or 8 bits; if all bits of a delta are set, its byte follows
-#     tail    first element, version 1: a mode for every 4 bytes of an element
-#
-# The position of a group depends on the contents of the groups before it. Group sizes are
-# therefore computed for all positions in advance, so that finding each group takes one look-up;
-# then all groups with the same number of bits are decoded together. Specification: Khronos Group,
-# KHR_meshopt_compression, appendix A.
-
-_GROUP = 16  # number of elements per group
-_LARGEST_BLOCK = 256  # maximum number of elements per block
-_BLOCK_BYTES = 8192
-_ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
-
-# Bits per delta of the four group modes: in version 0, and for control modes 0 and 1.
-_BITS = ((0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8))
-
-# The four group modes in a byte of header bits.
-_PREDICTIONS = tuple(tuple(byte >> shift & 3 for shift in (0, 2, 4, 6)) for byte in range(256))
-_PADDING = (32, 24)  # minimum size of the tail in bytes, by version
 
 
 @dataclass(slots=True)
@@ -281,19 +294,6 @@ def _summed(deltas: Bytes, first: Bytes, mode: int) -> NDArray[Any] | None:
     return np.cumsum(steps, axis=0, dtype=dtype).view("u1")
 
 
-# Decoders of vertex indices compressed by meshoptimizer: triangles, and any sequence.
-#
-# Each triangle depends on those before it, so triangles are decoded one by one. Specification:
-# Khronos Group, KHR_meshopt_compression, appendix A, modes 1 and 2.
-
-_TRIANGLES, _INDICES = 0xE1, 0xD1  # first bytes of the streams
-_TABLE = 16  # size of the table at the end of the triangles, bytes
-_TAIL = 4  # size of the tail at the end of the indices, bytes
-_WRAP = 0xFFFFFFFF
-_MOST_BYTES = 5  # maximum length of a number with 7 bits per byte, bytes
-_KEPT = 1 << 16  # maximum length of a queue; then its oldest entries are dropped, as 16 are in use
-
-
 class _Numbers:
     """Data of triangles whose code does not fit into one byte."""
 
@@ -450,26 +450,8 @@ def _varints(data: Bytes, count: int) -> NDArray[np.int64] | None:
     return np.add.reduceat(parts, starts) & _WRAP if count else parts
 
 
-# Filters of compressed attributes: unit vectors, quaternions, floats and colours.
-#
-# Specification: Khronos Group, KHR_meshopt_compression, appendix B.
-
-_FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
-"""Names of the filters."""
-
-
 def filtered(data: Bytes, name: str, stride: int) -> Bytes:
-    """Return elements with a filter applied.
-
-    Parameters
-    ----------
-    data : (N,) uint8
-        Decoded elements.
-    name : str
-        Entry of ``_FILTERS``.
-    stride : int
-        Bytes of an element; 4 or 8 for unit vectors and colours, 8 for quaternions.
-    """
+    """Return decoded elements of ``stride`` bytes with a filter, an entry of ``_FILTERS``: (N,)."""
     if name == "OCTAHEDRAL":
         return _octahedral(data.view(f"<i{stride // 4}").reshape(-1, 4))
     if name == "QUATERNION":

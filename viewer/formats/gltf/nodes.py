@@ -1,4 +1,9 @@
-"""Nodes of a glTF document: their tree, transforms and contents."""
+"""Nodes of a glTF document: their tree, transforms, scenes, cameras and skins.
+
+A matrix is decomposed into translation, rotation and scale if their product equals it up to
+rounding; otherwise, the node keeps the matrix. Invalid cameras are replaced with a warning, because
+a figure can be shown without them.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +21,6 @@ from viewer.formats._scene_graph.content import (
     NodeMesh,
     NodeSkin,
     NodeTree,
-    Primitive,
     roots_of,
 )
 from viewer.formats.gltf.document import Document
@@ -28,6 +32,21 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
 )
 from viewer.rig.hierarchy import cycle_members
+
+_UNIT = 1e-3  # maximum deviation of a quaternion's length from 1 that is not reported
+_TINY = 1e-12  # minimum length of a quaternion with a direction
+
+# Relative error of T R S compared with the matrix: the rounding of a few products in float32.
+_EXACT = 1e-6
+
+# Maximum deviation of the last row of a matrix from 0 0 0 1 that is due to rounding: of nodes, and
+# of inverse bind matrices.
+_LAST_ROW = 1e-5
+_BINDING_LAST_ROW = 1e-4
+
+_ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
+
+_EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
 
 
 def read_tree(document: Document) -> NodeTree:
@@ -42,8 +61,7 @@ def read_tree(document: Document) -> NodeTree:
     for place in range(len(table)):
         if type(table.items[place]) is not dict:
             table[place]  # raises the error for an item that is not an object
-    parents = _parents(table)
-    transforms: _Transforms = _node_transforms(table)
+    parents, transforms = _parents(table), _transforms(table)
     return NodeTree(
         names=tuple(_names(table)),
         parents=parents,
@@ -120,14 +138,6 @@ def _check_cycles(table: Table, parents: Ints) -> None:
         parents[first] = -1
 
 
-_UNIT = 1e-3  # maximum deviation of a quaternion's length from 1 that is not reported
-_TINY = 1e-12  # minimum length of a quaternion with a direction
-
-# Relative error of T R S compared with the matrix: the rounding of a few products in float32.
-_EXACT = 1e-6
-_LAST_ROW = 1e-5  # maximum deviation of the last row from 0 0 0 1 that is due to rounding
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Transforms:
     """Local transforms as in ``NodeTree``."""
@@ -138,14 +148,8 @@ class _Transforms:
     matrices: dict[int, Floats]
 
 
-def _node_transforms(table: Table) -> _Transforms:
-    """Return the local transforms of all nodes.
-
-    Raises
-    ------
-    FormatError
-        If a member is malformed, or a matrix is not affine.
-    """
+def _transforms(table: Table) -> _Transforms:
+    """Return the local transforms of all nodes; their matrices must be affine."""
     count = len(table)
     translations, scales = np.zeros((count, 3)), np.ones((count, 3))
     rotations = np.zeros((count, 4))
@@ -267,9 +271,6 @@ def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
     return tuple(dict.fromkeys(roots_of(tree.parents)[nodes].tolist()))
 
 
-_ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
-
-
 def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
     """Return all cameras; an invalid camera gets a default field of view, with a warning."""
     table = document.table("cameras")
@@ -307,10 +308,6 @@ def _positive(lens: Element, name: str) -> float | None:
     """Return a number above 0; None if it is missing or not above 0."""
     found = lens.number(name) if lens.has(name) else 0.0
     return found if found > 0.0 else None
-
-
-_EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
-_BINDING_LAST_ROW = 1e-4  # maximum deviation of the last row from 0 0 0 1 that is due to rounding
 
 
 def read_skins(document: Document) -> tuple[NodeSkin, ...]:
@@ -389,11 +386,12 @@ def checked_bindings(
         limits[mesh] = min(limits.get(mesh, (count, skin)), (count, skin))
     result = list(meshes)
     for mesh, (count, skin) in limits.items():
-        result[mesh] = _checked(document, meshes[mesh], count, skin)
+        result[mesh] = _with_joints(document, meshes[mesh], count, skin)
     return tuple(result)
 
 
-def _checked(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -> NodeMesh:
+def _with_joints(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -> NodeMesh:
+    """Return a mesh whose influences refer to joints of its skin."""
     primitives = []
     for primitive in mesh.primitives:
         joints, weights = primitive.joints, primitive.weights
@@ -410,11 +408,6 @@ def _checked(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -> No
             joints=n_joints,
             skin=skin,
         )
-        primitives.append(_without(primitive, bad))
+        joints, weights = np.where(bad, 0, joints), np.where(bad, 0.0, weights)
+        primitives.append(replace(primitive, joints=joints, weights=weights))
     return replace(mesh, primitives=tuple(primitives))
-
-
-def _without(primitive: Primitive, bad: np.ndarray) -> Primitive:
-    assert primitive.joints is not None and primitive.weights is not None
-    joints = np.where(bad, 0, primitive.joints)
-    return replace(primitive, joints=joints, weights=np.where(bad, 0.0, primitive.weights))

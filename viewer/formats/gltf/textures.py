@@ -1,4 +1,9 @@
-"""References to textures in glTF materials: image, sampler, texture coordinates and transform."""
+"""Textures of glTF materials: their images, samplers, coordinates and transforms.
+
+Images are PNG, JPEG or WebP, embedded or in files below the folder of the document. Only those that
+textures use are read; they are decoded in parallel, each only once. Invalid references and members
+are ignored with a warning, because the shape can still be shown.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +31,12 @@ _NEAREST, _LINEAR = 9728, 9729
 _MINIFIED = dict(zip((9728, 9729, 9984, 9985, 9986, 9987), MINIFICATIONS, strict=True))
 _READABLE = "EXT_texture_webp"
 _UNREADABLE = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
+
+_KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # first bytes of the formats that every file may contain
+_UNSUPPORTED = {b"\xabKTX": "KTX2", b"DDS ": "DDS"}
 _LARGEST = 1e6  # maximum offset and scale; with larger ones, single precision cannot resolve texels
+
+_Content = TypeVar("_Content")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,11 +77,9 @@ def read_slot(document: Document, parent: Element, name: str) -> Slot | None:
     info = lenient(source, lambda: parent.part(name), None)
     if info is None:
         return None
-    count = len(document.table("textures"))
-    index = lenient(source, lambda: info.index("index", count, "textures"), -1)
-    if index < 0:
-        return None
-    texture = lenient(source, lambda: document.table("textures")[index], None)
+    textures = document.table("textures")
+    index = lenient(source, lambda: info.index("index", len(textures), "textures"), -1)
+    texture = lenient(source, lambda: textures[index], None) if index >= 0 else None
     if texture is None:
         return None
     placing = _placed(info) | _sampled(document, texture)
@@ -173,14 +181,6 @@ def _extension(element: Element, name: str) -> Element | None:
     return lenient(element.source, lambda: element.extension(name), None)
 
 
-# Images of a glTF document: PNG, JPEG and WebP, embedded or in files below its folder.
-#
-# Only images that textures use are read. They are decoded in parallel, each only once.
-
-_KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # formats that every glTF file may contain
-_UNSUPPORTED = {b"\xabKTX": "KTX2", b"DDS ": "DDS"}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class DecodedImage:
     """An image of a document.
@@ -276,9 +276,6 @@ def _named(document: Document, problem: FormatError) -> str:
     path = found.path or Path()
     name = path.relative_to(folder) if path.is_relative_to(folder) else path
     return f"{name.as_posix()}: {found.message}"
-
-
-_Content = TypeVar("_Content")
 
 
 def lenient(source: Source, read: Callable[[], _Content], default: _Content) -> _Content:

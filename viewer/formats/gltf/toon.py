@@ -9,7 +9,7 @@
              floatProperties._ShadeToony, ._ShadeShift, …, which are translated to version 1.0
 
 Exporters also write the lit side's base colour, texture and opacity to the core material; those of
-version 0.x are replaced by ``old_core.py``. With the cosine c of the angle of incidence, the
+version 0.x are replaced by ``_vrm/old.py``. With the cosine c of the angle of incidence, the
 fraction of the lit colour rises linearly from 0 to 1 between c = toony - 1 - shift and
 c = 1 - toony - shift.
 """
@@ -33,6 +33,8 @@ from viewer.rig.material import Outline, Rim
 MTOON = "VRMC_materials_mtoon"
 _SHADER = "VRM/MToon"
 _UNLIT = "VRM/Unlit"
+
+_KEPT = (MTOON, "KHR_materials_unlit")
 _TOONY = 0.9
 _LARGEST = 1e4
 _MODES = {"worldCoordinates": "world", "screenCoordinates": "screen"}
@@ -167,9 +169,6 @@ def _outline(told: Mapping[str, Any]) -> Outline | None:
     mix = value_of(told.get("outlineLightingMixFactor"), 1.0)
     r, g, b = (0.0, 0.0, 0.0) if color is None else color.clip(0.0, 1.0).tolist()
     return Outline(width, mode, (r, g, b), 1.0 if mix is None else min(max(mix, 0.0), 1.0))
-
-
-_KEPT = (MTOON, "KHR_materials_unlit")
 
 
 def stored_toon(document: Document) -> dict[int, Any]:
