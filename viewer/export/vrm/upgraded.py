@@ -16,8 +16,7 @@ import numpy as np
 from viewer.export.vrm.meta import LICENCE
 from viewer.export.vrm.standing import facing_front
 from viewer.formats._vrm.bones import modern_bone
-from viewer.formats._vrm.materials import old_binds
-from viewer.formats._vrm.old import modern_toon
+from viewer.formats._vrm.materials import modern_toon, old_binds
 from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.expressions import OLD_PRESETS, TRANSFORM

@@ -22,7 +22,7 @@ from typing import Any
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._vrm.old import modern_toon, overridden
+from viewer.formats._vrm.materials import modern_toon, overridden
 from viewer.formats._vrm.parts import part, rows_of, value_of
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
