@@ -15,8 +15,15 @@ from viewer.errors import ViewerError
 from viewer.phrases import listed, printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
-from viewer.rendering.options import BACKGROUNDS, BONES, MATCAPS, QUALITIES, SHOWN, DisplayOptions
-from viewer.rendering.passes.background_pass import parse_color
+from viewer.rendering.options import (
+    BACKGROUNDS,
+    BONES,
+    MATCAPS,
+    QUALITIES,
+    SHOWN,
+    DisplayOptions,
+    parse_color,
+)
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import platform
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +18,6 @@ import viewer
 from viewer.commands._printing import print_line
 from viewer.data_classes import dataclass
 from viewer.errors import RenderError
-from viewer.loading import bundled_body, bundled_files, load
 from viewer.phrases import counted, printable
 
 if TYPE_CHECKING:
@@ -280,12 +278,15 @@ def measured() -> Iterator[Measured]:
 
 def _starts() -> Iterator[Measured]:
     """Measure whole programs, from start to exit."""
+    from viewer.loading import bundled_body, bundled_files
+
+    skeleton = next(str(file) for file in bundled_files() if Path(file).suffix == ".skel")
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as folder:
         picture = str(Path(folder) / "picture.png")
         draw = ["-m", "viewer", "render", "-o", picture, "--force", "--quality", "draft"]
         runs = (
             ("import numpy", "", ["-c", "import numpy"]),
-            ("viewer info, a skeleton", "import numpy", ["-m", "viewer", "info", _skeleton()]),
+            ("viewer info, a skeleton", "import numpy", ["-m", "viewer", "info", skeleton]),
             ("OpenGL context", "", ["-c", _LEAST]),
             ("viewer render, bundled figure to PNG", "OpenGL context", draw),
             ("the same without the cache", "OpenGL context", [*draw, "--no-cache"]),
@@ -295,16 +296,18 @@ def _starts() -> Iterator[Measured]:
         times = _interleaved({name: _process(words, own) for name, _, words in runs}, _STARTS)
     for name, base, _ in runs:
         ratio = _ratio(times[name], times[base]) if base else 0.0
-        yield Measured(f"start to end: {name}", statistics.median(times[name]), ratio, base)
-
-
-def _skeleton() -> str:
-    return next(str(file) for file in bundled_files() if Path(file).suffix == ".skel")
+        yield Measured(f"start to end: {name}", _median(times[name]), ratio, base)
 
 
 def _ratio(times: Sequence[float], others: Sequence[float]) -> float:
     """Return the median ratio of times that were measured alternately."""
-    return statistics.median(one / other for one, other in zip(times, others, strict=True))
+    return _median(one / other for one, other in zip(times, others, strict=True))
+
+
+def _median(times: Iterable[float]) -> float:
+    import statistics  # imports fractions and decimal, which no report without --bench needs
+
+    return statistics.median(times)
 
 
 def _process(arguments: Sequence[str], environment: dict[str, str]) -> Callable[[], object]:
@@ -326,6 +329,7 @@ def _process(arguments: Sequence[str], environment: dict[str, str]) -> Callable[
 
 def _frames() -> Iterator[Measured]:
     """Measure frames of the bundled body, rendered and read into memory."""
+    from viewer.loading import bundled_body, load
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.options import DisplayOptions
 
@@ -351,7 +355,7 @@ def _frames() -> Iterator[Measured]:
             }
             times = _interleaved(work, rounds)
             ratio = _ratio(times["moved"], times["still"])
-            yield Measured(f"frame of {subject}", statistics.median(times["moved"]), ratio, base)
+            yield Measured(f"frame of {subject}", _median(times["moved"]), ratio, base)
 
 
 def _drawn(
@@ -395,6 +399,7 @@ def _parts() -> Iterator[Measured]:
     """Measure the parts of a frame other than drawing."""
     import numpy as np
 
+    from viewer.loading import bundled_body, load
     from viewer.media.png import encode_png
     from viewer.rig.kinematics import world_matrices
 
@@ -412,8 +417,8 @@ def _parts() -> Iterator[Measured]:
     pixels = (ramp + noise + np.array([0, 40, 80, 0])).astype(np.uint8)
     pixels[..., 3] = 255
     times = _interleaved({"place": place, "encode": lambda: encode_png(pixels)}, 5 * _FRAMES)
-    yield Measured(f"pose of {skeleton.n_joints} joints", statistics.median(times["place"]))
-    yield Measured("PNG of 1280 x 720 pixels", statistics.median(times["encode"]))
+    yield Measured(f"pose of {skeleton.n_joints} joints", _median(times["place"]))
+    yield Measured("PNG of 1280 x 720 pixels", _median(times["encode"]))
 
 
 def _interleaved(work: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:

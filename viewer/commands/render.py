@@ -40,7 +40,6 @@ from viewer.interrupts import deferred, hold, poll
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
-from viewer.rendering.camera_views import with_cameras
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
@@ -168,6 +167,7 @@ def _draw_still(
     arguments: argparse.Namespace, scene: Scene, options: DisplayOptions, size: tuple[int, int]
 ) -> None:
     from viewer.formats import save_image
+    from viewer.rendering.camera_views import with_cameras
 
     output = Path(arguments.output)
     check_targets([output], inputs_of(arguments, scene), arguments.force)
@@ -200,6 +200,7 @@ def _draw_onion(
     """Draw several poses of a motion in one image."""
     from viewer.commands._sequence.shots import shots_of
     from viewer.formats import save_image
+    from viewer.rendering.camera_views import with_cameras
     from viewer.rig.motion.onion import onion
 
     shots = shots_of(request, arguments, scene)

@@ -28,8 +28,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export import MotionOptions, animation_for, check_figure, export_animation, exporter_for
-from viewer.export._rigged_files import files_of, write_rigged
-from viewer.export.vrm.meta import checked_meta
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
@@ -175,6 +173,8 @@ def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Rig the mesh, print a report, write it, and show it if requested."""
+    from viewer.export._rigged_files import files_of, write_rigged
+
     output = None if arguments.output is None else Path(arguments.output)
     meta = vrm_meta(arguments, output)
     inputs = _inputs(arguments)
@@ -183,6 +183,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets(files_of(output), inputs, arguments.force)
     target = _target(arguments, inputs)
     if output is not None and output.suffix.lower() == ".vrm":
+        from viewer.export.vrm.meta import checked_meta
+
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
     template = _template(arguments, inputs)
     if output is not None and output.suffix.lower() != ".npz":

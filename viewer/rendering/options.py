@@ -6,6 +6,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass
+from viewer.errors import ViewerError
 from viewer.rig.skinning import Skinning
 
 if TYPE_CHECKING:
@@ -254,3 +255,22 @@ def skeleton_opacity(skeleton: Skeleton, options: DisplayOptions) -> float:
     if options.skeleton_opacity is not None:
         return options.skeleton_opacity
     return OPACITIES[bone_style(skeleton, options)]
+
+
+def parse_color(text: str) -> tuple[float, float, float]:
+    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
+
+    Raises
+    ------
+    ViewerError
+        If the text does not have this form.
+
+    >>> parse_color("#ff0000")
+    (1.0, 0.0, 0.0)
+    """
+    digits = text.removeprefix("#")
+    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
+        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
+        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
+    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
+    return red, green, blue

@@ -22,8 +22,15 @@ from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.phrases import printable
 from viewer.rendering.colors import part_colors
 from viewer.rendering.gpu.program import SHADING_CHOICES
-from viewer.rendering.options import BONES, MATCAPS, OPACITIES, QUALITIES, SHOWN, skeleton_opacity
-from viewer.rendering.passes.background_pass import parse_color
+from viewer.rendering.options import (
+    BONES,
+    MATCAPS,
+    OPACITIES,
+    QUALITIES,
+    SHOWN,
+    parse_color,
+    skeleton_opacity,
+)
 from viewer.rendering.passes.ground_pass import grid_step
 from viewer.rig.annotations import BodyParts
 from viewer.rig.scene import scene_unit

@@ -9,14 +9,13 @@ import math
 
 import moderngl
 
-from viewer.errors import ViewerError
 from viewer.rendering.gpu.draw_state import without_colors, without_depth_test
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS, Studio
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.gpu.upload import checked
-from viewer.rendering.options import BACKGROUNDS, Lights
+from viewer.rendering.options import BACKGROUNDS, Lights, parse_color
 from viewer.rendering.view import View, set_lights
 
 _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
@@ -166,25 +165,6 @@ class BackdropPass:
     def release(self) -> None:
         """Free the vertex array."""
         self._array.release()
-
-
-def parse_color(text: str) -> tuple[float, float, float]:
-    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
-
-    Raises
-    ------
-    ViewerError
-        If the text does not have this form.
-
-    >>> parse_color("#ff0000")
-    (1.0, 0.0, 0.0)
-    """
-    digits = text.removeprefix("#")
-    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
-        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
-        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
-    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
-    return red, green, blue
 
 
 def is_light(background: str) -> bool:

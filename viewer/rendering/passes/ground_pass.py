@@ -10,7 +10,7 @@ import numpy as np
 from viewer.rendering.gpu.draw_state import behind, without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import buffer
-from viewer.rendering.passes.background_pass import parse_color
+from viewer.rendering.options import parse_color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import box_size
