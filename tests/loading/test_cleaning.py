@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import RigError
 from viewer.loading.cleaning import clean_up
-from viewer.loading.cleaning_settings import CleanUp
+from viewer.loading.settings import CleanUp
 from viewer.rig.cleanup.smoothing import SavitzkyGolay
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.clip import Clip

@@ -14,8 +14,8 @@ from rig.animated import leg
 from viewer.export.rig import scaled
 from viewer.formats.rigged import save
 from viewer.loading import Contents, begin, bundled_body, load
-from viewer.loading.cast import Cast
 from viewer.loading.placing import placed_views, stand_up
+from viewer.loading.scene_draft import SceneDraft
 from viewer.rig.captures.cameras import CameraView
 from viewer.rig.scene import scene_unit
 
@@ -79,10 +79,10 @@ def test_later_people_and_cameras_of_a_capture_are_scaled(tmp_path):
 
 
 def test_later_people_and_cameras_are_upright():
-    late, cast = SimpleNamespace(placement=np.eye(4), up="y", views=(), unit=""), Cast([])
+    late, draft = SimpleNamespace(placement=np.eye(4), up="y", views=(), unit=""), SceneDraft([])
     late.views = (CameraView("1", np.eye(3), np.eye(3), np.array([0.0, 1.0, 0.0])),)
-    cast.builders = [late]
-    stand_up(cast, "z")
+    draft.builders = [late]
+    stand_up(draft, "z")
     assert_allclose(late.placement[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], atol=1e-12)
-    view = placed_views(cast)[0]
+    view = placed_views(draft)[0]
     assert_allclose(-view.rotation.T @ view.translation, [0.0, 0.0, -1.0], atol=1e-12)

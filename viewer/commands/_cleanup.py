@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from viewer.commands._sequence.frame_numbers import parse_range, rate
-from viewer.loading.cleaning_settings import CleanUp
+from viewer.loading.settings import CleanUp
 from viewer.phrases import printable
 
 if TYPE_CHECKING:

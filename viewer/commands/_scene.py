@@ -18,7 +18,7 @@ from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
-from viewer.loading.cleaning_settings import CleanUp
+from viewer.loading.settings import CleanUp
 from viewer.models import named_files, resolve
 from viewer.phrases import printable
 from viewer.progress import report

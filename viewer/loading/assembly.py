@@ -1,8 +1,13 @@
-"""Assembly of a scene: skeletons with skins, then clips, poses and images for the actors."""
+"""Assembly of a scene from the contents of files: ``begin`` lists the steps in order.
+
+Skeletons get their skins and figures their blend shapes, motions and animations are assigned, then
+poses and images. At last all actors stand upright, in one unit and side by side. Contents that
+match nothing are refused, except motions, which are shown on a skeleton of their own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +17,6 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
-from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.pairing import joined_figures
 from viewer.loading.placing import (
@@ -21,6 +25,7 @@ from viewer.loading.placing import (
     scale_to_one_unit,
     stand_up,
 )
+from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
@@ -40,6 +45,15 @@ from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+
+# Single poses of bodies, which become motions of one frame
+_RATE = 30.0  # of a motion with one frame, where it has no effect
+_ANGLES = 45  # rotation vectors of the fingers of a hand; fewer numbers are coefficients
+_HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
+_SINGLE = ("global_orient", "jaw_pose", "leye_pose", "reye_pose")  # rotations of one joint each
+_READ = {*_SINGLE, *_HANDS, "body_pose"}
+_MOST = len(FAMILY[24].names)  # maximum number of joints of body_pose and global_orient
+_FINGERS = {"left": FAMILY[55].names[25:40], "right": FAMILY[55].names[40:]}
 
 
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
@@ -81,135 +95,133 @@ def begin(
     FormatError, RigError
         See ``load``.
     """
-    contents = _with_bodies(contents)
+    contents = _lone_poses_as_motions(contents)
     figures = contents.figures
-    cast = Cast([])
+    draft = SceneDraft([])
     group_of = {figure: group for group in contents.groups for figure in group.figures}
     for pair, figure in joined_figures(figures):
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
         origin = figures[pair[-1]][0]
         actor = Actor(
             figure,
-            called=cast.free_title(called),
+            called=draft.free_title(called),
             origin=origin,
             hidden_parts=hidden_parts(figure.mesh),
         )
-        cast.add(actor, figure.up, placed=False, group=group_of.get(figure))
-    _give_morphs(contents, cast)
-    _move(contents, cast, settings or MotionSettings())
+        draft.add(actor, figure.up, placed=False, group=group_of.get(figure))
+    _give_morphs(contents, draft)
+    _move(contents, draft, settings or MotionSettings())
     for path, record in contents.poses:
-        cast.diagnostics += _assign_pose(path, record, cast.actors)
+        draft.diagnostics += _assign_pose(path, record, draft.actors)
     for path, pixels in contents.pictures:
-        _assign_picture(path, pixels, cast.actors)
-    world_up = next((up for up, placed in zip(cast.ups, cast.placed, strict=True) if placed), None)
-    world_up = world_up or next(iter(cast.ups), "y")
-    stand_up(cast, world_up)
-    scale_to_one_unit(cast)
+        _assign_picture(path, pixels, draft.actors)
+    world_up = next(
+        (up for up, placed in zip(draft.ups, draft.placed, strict=True) if placed), None
+    )
+    world_up = world_up or next(iter(draft.ups), "y")
+    stand_up(draft, world_up)
+    scale_to_one_unit(draft)
     if settings is not None and settings.springs:
-        _switch_on_springs(cast, world_up)
-    place_side_by_side(cast)
-    cast.views += placed_views(cast)
-    _note_unused_options(contents, cast, settings or MotionSettings())
-    found = (*contents.diagnostics, *cast.diagnostics)
+        _switch_on_springs(draft, world_up)
+    place_side_by_side(draft)
+    draft.views += placed_views(draft)
+    _note_unused_options(contents, draft, settings or MotionSettings())
+    found = (*contents.diagnostics, *draft.diagnostics)
     facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
-    scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
-    cast.files[:0] = contents.files
+    scene = Scene(draft.actors, found, "z" if world_up == "z" else "y", tuple(draft.views), facts)
+    draft.files[:0] = contents.files
     if settings is not None and settings.video is not None:
-        cast.files.append(settings.video)
+        draft.files.append(settings.video)
     # The list itself, because people who appear later add the files of their models to it.
-    scene.files, scene.images = cast.files, cast.images
+    scene.files, scene.images = draft.files, draft.images
     switched = [capture for _, capture in contents.captures if capture.in_space is not None]
     if switched:
         scene.space = switched[0].space
-        scene.in_space = partial(_assembled_in, contents, settings, cast.builders)
-    return scene, cast.builders
+        scene.in_space = partial(_assembled_in, contents, settings, draft.builders)
+    return scene, draft.builders
 
 
-def _with_bodies(contents: Contents) -> Contents:
-    """Return contents in which poses of bodies without a figure are motions of one frame."""
-    if not contents.poses:
-        return contents
+def _lone_poses_as_motions(contents: Contents) -> Contents:
+    """Return contents in which poses of bodies of the SMPL family are motions of one frame.
 
-    return with_bodies(contents)
-
-
-def _assembled_in(
-    contents: Contents, settings: MotionSettings | None, builders: Sequence[Builder], space: str
-) -> Scene:
-    """Return the scene with captured people in another space, where their files contain it.
-
-    ``builders``: captures of the scene that is replaced; their reading ends.
+    They are then shown like all captured bodies, with the user's model or the bundled body. The
+    contents are returned unchanged if there is a figure or a motion, or a pose of anything else.
     """
-    captures = [
-        (path, capture if capture.in_space is None else capture.in_space(space))
-        for path, capture in contents.captures
-    ]
-    scene = assemble(replace(contents, captures=captures), settings)
-    # Done last: if the switch fails, the old scene is read to its end.
-    for builder in builders:
-        builder.is_cut = True
-    return scene
+    if contents.figures or contents.has_motion or contents.morphs or not contents.poses:
+        return contents
+    found = [(path, _lone_motion(path, record)) for path, record in contents.poses]
+    bodies = [(path, motion) for path, motion in found if motion is not None]
+    if len(bodies) < len(found):
+        return contents
+    return replace(contents, poses=[], body_motions=bodies)
 
 
-def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
-    """Assign motions and animations to actors, and pose them at the start."""
-    if contents.has_motion:
-        from viewer.loading.driving import drive
-
-        drive(contents, cast, settings)
-    # A name selects an animation of the files that are given as motions, if there are any.
-    wanted = "" if settings.motions else settings.animation
-    if settings.drives and _has_bare_motion(cast):
-        from viewer.loading.figure_motions import drive_by_figures
-
-        if drive_by_figures(cast, wanted, settings):
-            wanted = ""
-    if wanted or any(actor.figure.animations for actor in cast.actors):
-        _animate(cast, wanted)
-    if any(actor.clip is not None for actor in cast.actors):
-        from viewer.rig.motion.evaluation import pose_actor, time_span
-
-        start = time_span(cast.actors)[0]
-        for actor in cast.actors:
-            pose_actor(actor, start)
-
-
-def _note_unused_options(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
-    """Record the options that had no effect."""
-    if contents.used_options is None:
-        return
-    used = contents.used_options | cast.used_options
-    # The first body of a capture may appear later.
-    is_driving = any(builder.target is not None for builder in cast.builders)
-    if is_driving or any(actor.drive is not None for actor in cast.actors):
-        used.add("joint-map")
-    cast.diagnostics += _unused_options(settings, used)
+def _lone_motion(path: Path, record: PoseRecord) -> BodyMotion | None:
+    """Return a pose as a motion of one frame; None if it is not a pose of a known body."""
+    joints = _lone_joints(record)
+    if joints is None or record.scale not in (None, 1.0):
+        return None
+    names, vectors = joints
+    space = record.shape_space
+    hands: dict[str, Floats] = {}
+    for part, side in _HANDS.items():
+        numbers = record.parts.get(part)
+        if numbers is None:
+            continue
+        if numbers.size == _ANGLES and record.hand_coefficients is not True:
+            if record.flat_hands is False:  # angles relative to the mean hand of an unknown model
+                return None
+            names += _FINGERS[side]
+            vectors = np.concatenate([vectors, numbers.reshape(-1, 3)])
+        else:
+            hands[side] = numbers.reshape(1, -1)
+    return BodyMotion(
+        path.stem,
+        Timing(_RATE, np.zeros(1, dtype=np.int32)),
+        names,
+        vectors[None],
+        np.zeros((1, 3)) if record.translation is None else record.translation[None],
+        shape=None if record.shape is None else record.shape[None],
+        expression=None if record.expression is None else record.expression[None],
+        hands=hands,
+        flat_hands=bool(record.flat_hands),
+        shape_space=replace(space, model=space.model or model_of_joints(names)),
+    )
 
 
-def _has_bare_motion(cast: Cast) -> bool:
-    """Return whether a file has a skeleton with animations, but without a mesh."""
-    return any(a.figure.mesh is None and a.figure.animations for a in cast.actors)
+def _lone_joints(record: PoseRecord) -> tuple[tuple[str, ...], Floats] | None:
+    """Return the joints other than fingers and their rotation vectors, (K, 3); None if unknown."""
+    known, parts = members_by_numbers(), record.parts
+    if record.dofs or record.joint_rotations is not None:
+        own, vector = record.joint_rotations, record.vector
+        # A pose of a model that this program has written: its numbers are the whole pose.
+        is_whole = own is not None and not own.shifts.any() and own.scales is None
+        names = known.get(0 if vector is None else vector.size)
+        is_whole &= own is not None and names == own.names and bool(record.shape_space.model)
+        return (
+            None
+            if names is None or vector is None or not is_whole
+            else (names, vector.reshape(-1, 3))
+        )
+    if record.vector is not None:
+        names = known.get(record.vector.size)
+        return None if names is None or parts else (names, record.vector.reshape(-1, 3))
+    body = parts.get("body_pose", np.zeros(0))
+    rotated = {part: parts[part] for part in _SINGLE if part in parts}
+    names = known.get(body.size + 3)
+    is_known = names is not None and len(names) <= _MOST and set(parts) <= _READ
+    if names is None or not is_known or any(part.size != 3 for part in rotated.values()):
+        return None
+    root = rotated.pop("global_orient", np.zeros(3))
+    names += tuple(PARTS[part][0] for part in rotated)
+    return names, np.concatenate([root, body, *rotated.values()]).reshape(-1, 3)
 
 
-def _switch_on_springs(cast: Cast, up: str) -> None:
-    """Simulate the spring joints of all placed figures that have any."""
-    skeletons = [(actor, actor.figure.skeleton) for actor in cast.actors]
-    if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
-        return
-    from viewer.rig.motion.evaluation import pose_actor, time_span
-    from viewer.rig.motion.spring_motion import springs_for
-
-    start = time_span(cast.actors)[0]
-    for actor in cast.actors:
-        actor.springs = springs_for(actor, up)
-        pose_actor(actor, start)
-
-
-def _give_morphs(contents: Contents, cast: Cast) -> None:
+def _give_morphs(contents: Contents, draft: SceneDraft) -> None:
     """Give all blend shape targets to the first mesh with their vertex count."""
     if not contents.morphs:
         return
-    actors = cast.actors
+    actors = draft.actors
     from viewer.rig.morph_target import on_one_joint, with_morphs
 
     for path, target in contents.morphs:
@@ -219,7 +231,7 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
             try:
                 if figure.skeleton is None and figure.mesh is not None:
                     figure = on_one_joint(figure)
-                    cast.note("F007.only-morphs", figure=figure.name)
+                    draft.note("F007.only-morphs", figure=figure.name)
                 figure = with_morphs(figure, [target])
                 actors[index] = replace(actor, figure=figure, pose=None)
                 break
@@ -230,6 +242,92 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
                 raise RigError(Diagnostic("F004.morph-alone", path))
             found = problem.diagnostic
             raise problem if found is None else RigError(replace(found, path=path))
+
+
+def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> None:
+    """Assign motions and animations to actors, and pose them at the start."""
+    if contents.has_motion:
+        from viewer.loading.driving import drive
+
+        drive(contents, draft, settings)
+    # A name selects an animation of the files that are given as motions, if there are any.
+    wanted = "" if settings.motions else settings.animation
+    if settings.drives and _has_bare_motion(draft):
+        from viewer.loading.skeleton_motions import drive_by_figures
+
+        if drive_by_figures(draft, wanted, settings):
+            wanted = ""
+    if wanted or any(actor.figure.animations for actor in draft.actors):
+        _animate(draft, wanted)
+    if any(actor.clip is not None for actor in draft.actors):
+        from viewer.rig.motion.evaluation import pose_actor, time_span
+
+        start = time_span(draft.actors)[0]
+        for actor in draft.actors:
+            pose_actor(actor, start)
+
+
+def _has_bare_motion(draft: SceneDraft) -> bool:
+    """Return whether a file has a skeleton with animations, but without a mesh."""
+    return any(a.figure.mesh is None and a.figure.animations for a in draft.actors)
+
+
+def _animate(draft: SceneDraft, wanted: str) -> None:
+    """Let actors without a motion play an animation of their file.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+        The actors; their poses are computed later.
+    wanted : str
+        See ``chosen_animation``; figures of files without it keep their rest pose.
+
+    Raises
+    ------
+    RigError
+        If no file has the requested animation; every file can be shown without one.
+    FormatError
+        If the keys of a requested animation are invalid; for others, this is only a warning.
+    """
+    files = _files(draft)
+    if not files and wanted.lower() == NONE:
+        return
+    if wanted and not files:
+        raise RigError(Diagnostic("F004.no-animations", values={"name": wanted}))
+    refusals = []
+    for actors in files:
+        try:
+            chosen = chosen_animation([actor.figure for actor in actors], wanted)
+        except RigError as problem:
+            refusals.append(problem)
+        else:
+            _start(draft, actors, chosen, is_requested=bool(wanted))
+    if files and len(refusals) == len(files):
+        raise refusals[0]
+
+
+def _files(draft: SceneDraft) -> list[list[Actor]]:
+    """Return the actors that can be animated, grouped by file."""
+    files: dict[object, list[Actor]] = {}
+    for actor in draft.actors:
+        if actor.figure.animations and actor.clip is None:
+            files.setdefault(actor if actor.origin is None else actor.origin, []).append(actor)
+    return [*files.values()]
+
+
+def _start(
+    draft: SceneDraft, actors: list[Actor], chosen: Animation | None, is_requested: bool
+) -> None:
+    for actor in actors:
+        index = -1 if chosen is None else counterpart(actor.figure, chosen)
+        if index < 0 and chosen is not None and not is_requested:
+            index = own_first(actor.figure, [other.figure for other in actors])
+        try:
+            play_animation(actor, index)
+        except FormatError as problem:
+            if is_requested:
+                raise
+            draft.diagnostics.append(replace(problem.diagnostic, is_refusal=False))
 
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
@@ -267,168 +365,29 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     chosen.figure = with_texture(chosen.figure, path, pixels)
 
 
-def _animate(cast: Cast, wanted: str) -> None:
-    """Let actors without a motion play an animation of their file.
-
-    Parameters
-    ----------
-    cast : Cast
-        The actors; their poses are computed later.
-    wanted : str
-        See ``chosen_animation``; figures of files without it keep their rest pose.
-
-    Raises
-    ------
-    RigError
-        If no file has the requested animation; every file can be shown without one.
-    FormatError
-        If the keys of a requested animation are invalid; for others, this is only a warning.
-    """
-    files = _files(cast)
-    if not files and wanted.lower() == NONE:
+def _switch_on_springs(draft: SceneDraft, up: str) -> None:
+    """Simulate the spring joints of all placed figures that have any."""
+    skeletons = [(actor, actor.figure.skeleton) for actor in draft.actors]
+    if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
         return
-    if wanted and not files:
-        raise RigError(Diagnostic("F004.no-animations", values={"name": wanted}))
-    refusals = []
-    for actors in files:
-        try:
-            chosen = chosen_animation([actor.figure for actor in actors], wanted)
-        except RigError as problem:
-            refusals.append(problem)
-        else:
-            _start(cast, actors, chosen, is_requested=bool(wanted))
-    if files and len(refusals) == len(files):
-        raise refusals[0]
+    from viewer.rig.motion.evaluation import pose_actor, time_span
+    from viewer.rig.motion.spring_motion import springs_for
+
+    start = time_span(draft.actors)[0]
+    for actor in draft.actors:
+        actor.springs = springs_for(actor, up)
+        pose_actor(actor, start)
 
 
-def _files(cast: Cast) -> list[list[Actor]]:
-    """Return the actors that can be animated, grouped by file."""
-    files: dict[object, list[Actor]] = {}
-    for actor in cast.actors:
-        if actor.figure.animations and actor.clip is None:
-            files.setdefault(actor if actor.origin is None else actor.origin, []).append(actor)
-    return [*files.values()]
-
-
-def _start(cast: Cast, actors: list[Actor], chosen: Animation | None, is_requested: bool) -> None:
-    for actor in actors:
-        index = -1 if chosen is None else counterpart(actor.figure, chosen)
-        if index < 0 and chosen is not None and not is_requested:
-            index = own_first(actor.figure, [other.figure for other in actors])
-        try:
-            play_animation(actor, index)
-        except FormatError as problem:
-            if is_requested:
-                raise
-            cast.diagnostics.append(replace(problem.diagnostic, is_refusal=False))
-
-
-# Single poses of bodies of the SMPL family without a figure, as motions of one frame.
-#
-# They are then shown like all captured bodies: with the user's model, or with the bundled body.
-
-_RATE = 30.0  # of a motion with one frame, where it has no effect
-_ANGLES = 45  # rotation vectors of the fingers of a hand; fewer numbers are coefficients
-_HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
-_SINGLE = ("global_orient", "jaw_pose", "leye_pose", "reye_pose")  # rotations of one joint each
-_READ = {*_SINGLE, *_HANDS, "body_pose"}
-_MOST = len(FAMILY[24].names)  # maximum number of joints of body_pose and global_orient
-_FINGERS = {"left": FAMILY[55].names[25:40], "right": FAMILY[55].names[40:]}
-
-
-def with_bodies(contents: Contents) -> Contents:
-    """Return contents in which poses of bodies are motions, if no figure or motion is with them.
-
-    Parameters
-    ----------
-    contents : Contents
-        Contents of the files.
-
-    Returns
-    -------
-    Contents
-        The contents themselves if there is a figure, or a pose is not one of a body.
-    """
-    if contents.figures or contents.has_motion or contents.morphs or not contents.poses:
-        return contents
-    found = [(path, _motion(path, record)) for path, record in contents.poses]
-    bodies = [(path, motion) for path, motion in found if motion is not None]
-    if len(bodies) < len(found):
-        return contents
-    return replace(contents, poses=[], body_motions=bodies)
-
-
-def _motion(path: Path, record: PoseRecord) -> BodyMotion | None:
-    """Return a pose as a motion of one frame; None if it is not a pose of a known body."""
-    joints = _joints(record)
-    if joints is None or record.scale not in (None, 1.0):
-        return None
-    names, vectors = joints
-    space = record.shape_space
-    hands: dict[str, Floats] = {}
-    for part, side in _HANDS.items():
-        numbers = record.parts.get(part)
-        if numbers is None:
-            continue
-        if numbers.size == _ANGLES and record.hand_coefficients is not True:
-            if record.flat_hands is False:  # angles relative to the mean hand of an unknown model
-                return None
-            names += _FINGERS[side]
-            vectors = np.concatenate([vectors, numbers.reshape(-1, 3)])
-        else:
-            hands[side] = numbers.reshape(1, -1)
-    return BodyMotion(
-        path.stem,
-        Timing(_RATE, np.zeros(1, dtype=np.int32)),
-        names,
-        vectors[None],
-        np.zeros((1, 3)) if record.translation is None else record.translation[None],
-        shape=None if record.shape is None else record.shape[None],
-        expression=None if record.expression is None else record.expression[None],
-        hands=hands,
-        flat_hands=bool(record.flat_hands),
-        shape_space=replace(space, model=space.model or model_of_joints(names)),
-    )
-
-
-def _joints(record: PoseRecord) -> tuple[tuple[str, ...], Floats] | None:
-    """Return the joints other than fingers and their rotation vectors, (K, 3); None if unknown."""
-    known, parts = members_by_numbers(), record.parts
-    if record.dofs or record.joint_rotations is not None:
-        own, vector = record.joint_rotations, record.vector
-        # A pose of a model that this program has written: its numbers are the whole pose.
-        is_whole = own is not None and not own.shifts.any() and own.scales is None
-        names = known.get(0 if vector is None else vector.size)
-        is_whole &= own is not None and names == own.names and bool(record.shape_space.model)
-        return (
-            None
-            if names is None or vector is None or not is_whole
-            else (names, vector.reshape(-1, 3))
-        )
-    if record.vector is not None:
-        names = known.get(record.vector.size)
-        return None if names is None or parts else (names, record.vector.reshape(-1, 3))
-    body = parts.get("body_pose", np.zeros(0))
-    rotated = {part: parts[part] for part in _SINGLE if part in parts}
-    names = known.get(body.size + 3)
-    is_known = names is not None and len(names) <= _MOST and set(parts) <= _READ
-    if names is None or not is_known or any(part.size != 3 for part in rotated.values()):
-        return None
-    root = rotated.pop("global_orient", np.zeros(3))
-    names += tuple(PARTS[part][0] for part in rotated)
-    return names, np.concatenate([root, body, *rotated.values()]).reshape(-1, 3)
-
-
-def _unused_options(settings: MotionSettings, used: set[str]) -> Iterator[Diagnostic]:
-    """Yield a message for each option that was given but had no effect.
-
-    Parameters
-    ----------
-    settings : MotionSettings
-        The requested settings.
-    used : set of str
-        Names of the options that had an effect.
-    """
+def _note_unused_options(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> None:
+    """Record the options that were given but had no effect."""
+    if contents.used_options is None:
+        return
+    used = contents.used_options | draft.used_options
+    # The first body of a capture may appear later.
+    is_driving = any(builder.target is not None for builder in draft.builders)
+    if is_driving or any(actor.drive is not None for actor in draft.actors):
+        used.add("joint-map")
     given = {
         "rig": settings.rig,
         "lod": settings.lod,
@@ -441,7 +400,25 @@ def _unused_options(settings: MotionSettings, used: set[str]) -> Iterator[Diagno
     }
     for name, value in given.items():
         if value and name not in used:
-            yield Diagnostic(f"F007.unused-{name}", values={"value": value})
+            draft.note(f"F007.unused-{name}", value=value)
     joint_map = settings.joint_map
     if joint_map is not None and "joint-map" not in used:
-        yield Diagnostic("F007.unused-joint-map", joint_map.path)
+        draft.note("F007.unused-joint-map", joint_map.path)
+
+
+def _assembled_in(
+    contents: Contents, settings: MotionSettings | None, builders: Sequence[Builder], space: str
+) -> Scene:
+    """Return the scene with captured people in another space, where their files contain it.
+
+    ``builders``: captures of the scene that is replaced; their reading ends.
+    """
+    captures = [
+        (path, capture if capture.in_space is None else capture.in_space(space))
+        for path, capture in contents.captures
+    ]
+    scene = assemble(replace(contents, captures=captures), settings)
+    # Done last: if the switch fails, the old scene is read to its end.
+    for builder in builders:
+        builder.is_cut = True
+    return scene

@@ -12,9 +12,9 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.loading.body_driving import has_joints
-from viewer.loading.cast import Cast
 from viewer.loading.contents import read_files
 from viewer.loading.pairing import joined_figures
+from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.models import family_model, models_of_kind, named_files
 from viewer.models.bundled import bundled_body
@@ -72,7 +72,7 @@ class BodyModels:
     the body, else by the bundled body.
     """
 
-    cast: Cast
+    draft: SceneDraft
     settings: MotionSettings
     _read: dict[tuple[Path, ...], Figure] = field(default_factory=dict)
     _taken: list[Figure] = field(default_factory=list)
@@ -80,7 +80,7 @@ class BodyModels:
     def wanted(self, space: ShapeSpace) -> ShapeSpace:
         """Return a shape space with the gender that the user asked for."""
         if space.model:
-            self.cast.used_options.add("gender")
+            self.draft.used_options.add("gender")
         return replace(space, gender=self.settings.gender or space.gender)
 
     def choose(self, path: Path, space: ShapeSpace, joint_names: Sequence[str] = ()) -> Choice:
@@ -140,14 +140,14 @@ class BodyModels:
         figure = next((each for each in joined if each.is_attached), next(iter(joined), None))
         if figure is None or figure.skeleton is None or figure.mesh is None:
             raise FormatError(Diagnostic("F002.no-body-model", paths[0]))
-        self.cast.diagnostics += contents.diagnostics
-        self.cast.used_options |= {"model", *(contents.used_options or ())}
-        self.cast.files += contents.files
+        self.draft.diagnostics += contents.diagnostics
+        self.draft.used_options |= {"model", *(contents.used_options or ())}
+        self.draft.files += contents.files
         return figure
 
     def _among_files(self, space: ShapeSpace) -> Figure | None:
         """Return the body model among the files that suits a body best; it is no actor any more."""
-        actors = self.cast.actors
+        actors = self.draft.actors
         free = [actor for actor in actors if actor.clip is None and is_body(actor.figure)]
         figures = [*self._taken, *(actor.figure for actor in free)]
         if not figures:
@@ -160,7 +160,7 @@ class BodyModels:
         best = min(figures, key=misfit)
         index = next((row for row, actor in enumerate(actors) if actor.figure is best), None)
         if best not in self._taken and index is not None:
-            self._taken.append(self.cast.take(index).figure)
+            self._taken.append(self.draft.take(index).figure)
         return best
 
     def _of_folder(
@@ -187,7 +187,7 @@ class BodyModels:
             if not isinstance(model, Figure) or not (is_body(model) or space.model == "MHR"):
                 return None, ()
             self._read[(found,)] = model
-            self.cast.files.append(found)
+            self.draft.files.append(found)
         figure = self._read[(found,)]
         gender = figure.shape_space.gender
         if space.gender and gender and gender != space.gender:

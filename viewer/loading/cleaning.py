@@ -10,7 +10,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError
-from viewer.loading.cleaning_settings import CleanUp
+from viewer.loading.settings import CleanUp
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip

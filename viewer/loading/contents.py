@@ -49,8 +49,7 @@ class Contents:
     files : tuple of Path
         All files that were read.
     used_options : set of str or None
-        Options that had an effect on the contents, see ``unused_options``; None if unused options
-        are not to be reported.
+        Options that had an effect on the contents; None if unused options are not to be reported.
     """
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
@@ -222,7 +221,7 @@ def _add_motion(source: Source, contents: Contents, settings: MotionSettings) ->
     if kind in ("BodyMotion", "Capture", "Clip"):
         getattr(contents, _LISTS[kind]).append((source.path, content))
         return
-    from viewer.loading.figure_motions import motion_in
+    from viewer.loading.skeleton_motions import motion_in
 
     motion = motion_in(source, content, settings.animation)
     contents.skeleton_motions.append((source.path, motion))

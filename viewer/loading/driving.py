@@ -1,4 +1,9 @@
-"""Assignment of motions to actors: clips by channels, BVH by joints, captures with a model."""
+"""Assignment of motions to actors: clips by channels, BVH by joints, captures with a model.
+
+A body of the SMPL family, from a motion file or a capture, is shown by the figure that
+``BodyModels`` chooses. If nobody has asked to see that figure, the body moves an open character
+with other joints instead. Cameras of a capture get their images, or a video, here as well.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +21,17 @@ from viewer.formats.easymocap.images import ImageFolders, find_images
 from viewer.loading.body_driving import body_drive, with_joints
 from viewer.loading.body_models import BodyModels, Choice
 from viewer.loading.capturing import Builder
-from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.refusals import map_refusal, model_refusal
+from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
+from viewer.loading.skeleton_motions import (
+    Lone,
+    agree_on_units,
+    drive_somebody,
+    give_skeleton_motion,
+    map_refusal,
+    model_refusal,
+)
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
 from viewer.rig.captures.cameras import CameraImages, CameraView
 from viewer.rig.captures.capture import Capture, capture_rate
@@ -30,15 +41,17 @@ from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.scene import Actor
 
-if TYPE_CHECKING:
-    from viewer.loading.skeleton_motions import Lone
+_CAMERA = "video"  # name of the camera for captures that have none
+_SAME_RATE = 0.005  # maximum relative difference of equal frame rates, such as 29.97 and 30
 
 
-def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
+def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> None:
     """Assign every motion to an actor, or to a new one if none matches.
 
     Raises
@@ -49,25 +62,23 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         If a clip matches no skeleton, or bodies or a BVH do not match the model.
     """
     for path, clip in contents.clips:
-        _give_clip(path, clip, cast, contents)
-    bodies = bool(contents.body_motions or contents.captures)
+        _give_clip(path, clip, draft, contents)
     drives = bool(contents.skeleton_motions) and settings.drives
-    models = BodyModels(cast, settings)
+    models = BodyModels(draft, settings)
     named = models.named("") if drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
-        cast.note("F007.model-beside", model=settings.model)
-        cast.used_options |= {"model", "rig", "lod"}  # no further messages about these options
-    lone = _give_skeleton_motions(contents, cast, settings, named)
-    if bodies:
-        _check_footage(contents, settings)
-        for path, body in contents.body_motions:
-            _give_body_motion(path, body, cast, models)
-        for path, capture in contents.captures:
-            _begin_capture(path, capture, cast, models)
-    if lone:
-        from viewer.loading.skeleton_motions import agree_on_units
-
-        agree_on_units(cast, lone)
+        draft.note("F007.model-beside", model=settings.model)
+        draft.used_options |= {"model", "rig", "lod"}  # no further messages about these options
+    lone: list[Lone] = []
+    for path, motion in contents.skeleton_motions:
+        alone = give_skeleton_motion(path, motion, draft, settings, named)
+        lone += [] if alone is None else [alone]
+    _check_footage(contents, settings)
+    for path, body in contents.body_motions:
+        _give_body_motion(path, body, draft, models)
+    for path, capture in contents.captures:
+        _begin_capture(path, capture, draft, models)
+    agree_on_units(draft, lone)
 
 
 def _check_footage(contents: Contents, settings: MotionSettings) -> None:
@@ -79,25 +90,10 @@ def _check_footage(contents: Contents, settings: MotionSettings) -> None:
             raise RigError(Diagnostic("F001.several-captures", footage, values=values))
 
 
-def _give_skeleton_motions(
-    contents: Contents, cast: Cast, settings: MotionSettings, named: Figure | None
-) -> list[Lone]:
-    """Let BVH motions drive figures; return the separate skeletons of the others."""
-    if not contents.skeleton_motions:
-        return []
-    from viewer.loading.skeleton_motions import give_skeleton_motion
-
-    found = [
-        give_skeleton_motion(path, motion, cast, settings, named)
-        for path, motion in contents.skeleton_motions
-    ]
-    return [lone for lone in found if lone is not None]
-
-
-def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
+def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) -> None:
     """Assign a clip to the first actor that it matches."""
-    skeletons = [actor.figure.skeleton for actor in cast.actors]
-    for actor, skeleton in zip(cast.actors, skeletons, strict=True):
+    skeletons = [actor.figure.skeleton for actor in draft.actors]
+    for actor, skeleton in zip(draft.actors, skeletons, strict=True):
         if (
             skeleton is not None
             and suits(clip, skeleton)
@@ -116,57 +112,48 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
     raise RigError(Diagnostic("C009.clip", path, values=values))
 
 
-def _note_bundled(cast: Cast, path: Path, has_shape: bool, has_expression: bool) -> None:
-    """Record that the bundled body is shown, and which data it ignores."""
-    key = {
-        (False, False): "F007.bundled-body",
-        (True, False): "F007.bundled-body-without-shapes",
-        (False, True): "F007.bundled-body-without-expressions",
-        (True, True): "F007.bundled-body-without-either",
-    }[has_shape, has_expression]
-    cast.note(key, path)
-
-
-def _give_body_motion(path: Path, motion: BodyMotion, cast: Cast, models: BodyModels) -> None:
+def _give_body_motion(
+    path: Path, motion: BodyMotion, draft: SceneDraft, models: BodyModels
+) -> None:
     settings, space = models.settings, motion.shape_space
     choice = models.choose(path, space, motion.joint_names)
-    cast.diagnostics += choice.notes
+    draft.diagnostics += choice.notes
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
     lost = motion.shape is not None, motion.expression is not None
     if choice.is_bundled:
         motion = replace(motion, shape=None, expression=None)
-    driven = _may_be_driven(cast, settings, choice.target) if choice.drives else []
+    driven = _may_be_driven(draft, settings, choice.target) if choice.drives else []
     body = choice.figure
     if driven and choice.is_bundled:
         body = with_joints(body, _known_joints(motion.joint_names, driven, settings))
-    actor, notes = _moved(path, body, motion, cast)
+    actor, notes = _moved(path, body, motion, draft)
     actor.shape_space = models.wanted(motion.shape_space)
     up = settings.up or motion.up
     if not up:
-        up = _judged_up(path, [actor], cast)
+        up = _judged_up(path, [actor], draft)
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
     if choice.target is not None:
-        cast.diagnostics += notes
-        carried = _carried(path, actor, up, choice.target, cast, settings)
-        cast.add(carried, up[-1], placed=False)
+        draft.diagnostics += notes
+        carried = _carried(path, actor, up, choice.target, draft, settings)
+        draft.add(carried, up[-1], placed=False)
         return
-    if driven and _drives_character(path, motion.name, actor, up, cast, settings):
-        cast.diagnostics += notes
+    if driven and _drives_character(path, motion.name, actor, up, draft, settings):
+        draft.diagnostics += notes
         return
     if body is not choice.figure:
-        shown, notes = _moved(path, choice.figure, motion, cast)
+        shown, notes = _moved(path, choice.figure, motion, draft)
         shown.placement, shown.shape_space = actor.placement, actor.shape_space
         actor = shown
-    cast.diagnostics += notes
+    draft.diagnostics += notes
     if choice.is_bundled:
-        _note_bundled(cast, path, *lost)
-    cast.add(actor, up[-1], placed=False)
+        _note_bundled(draft, path, *lost)
+    draft.add(actor, up[-1], placed=False)
 
 
 def _moved(
-    path: Path, model: Figure, motion: BodyMotion, cast: Cast
+    path: Path, model: Figure, motion: BodyMotion, draft: SceneDraft
 ) -> tuple[Actor, list[Diagnostic]]:
     """Return an actor of a body model with a motion; raises RigError if the model does not fit."""
     try:
@@ -174,17 +161,19 @@ def _moved(
     except RigError as problem:
         values = {"problem": problem.cause}
         raise RigError(Diagnostic("F004.model", path, values=values)) from None
-    actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
+    actor = Actor(model, clip=clip, called=draft.free_title(motion.name))
     return actor, [replace(note, path=path) for note in notes]
 
 
-def _may_be_driven(cast: Cast, settings: MotionSettings, target: Figure | None) -> list[Figure]:
+def _may_be_driven(
+    draft: SceneDraft, settings: MotionSettings, target: Figure | None
+) -> list[Figure]:
     """Return the figures that a captured body could move: the target, or else open ones."""
     if target is not None:
         return [target]
     if not settings.drives:
         return []
-    still = [actor.figure for actor in cast.actors if actor.clip is None]
+    still = [actor.figure for actor in draft.actors if actor.clip is None]
     return [figure for figure in still if figure.is_attached]
 
 
@@ -196,8 +185,19 @@ def _known_joints(
     return [name for name in names if name in known or settings.joint_map is not None]
 
 
+def _judged_up(path: Path, actors: Sequence[Actor], draft: SceneDraft, usual: str = "") -> str:
+    """Return the up axis estimated from the people, and record it if it is unusual."""
+    from viewer.rig.motion.upright import guess_up
+
+    up = guess_up(actors)
+    if up != usual:
+        key = "F007.up-judged-over" if up.startswith("-") else "F007.up-judged"
+        draft.note(key, path, up=up)
+    return up
+
+
 def _carried(
-    path: Path, actor: Actor, up: str, target: Figure, cast: Cast, settings: MotionSettings
+    path: Path, actor: Actor, up: str, target: Figure, draft: SceneDraft, settings: MotionSettings
 ) -> Actor:
     """Return an actor of a figure with other joints that a body moves.
 
@@ -209,18 +209,14 @@ def _carried(
         clip, notes = driven_clip(drive, target)
     except RigError as problem:
         raise model_refusal(problem, path) from None
-    cast.diagnostics += [replace(note, path=path) for note in notes]
+    draft.diagnostics += [replace(note, path=path) for note in notes]
     return Actor(target, clip=clip, placement=actor.placement, called=actor.called, drive=drive)
 
 
 def _drives_character(
-    path: Path, name: str, actor: Actor, up: str, cast: Cast, settings: MotionSettings
+    path: Path, name: str, actor: Actor, up: str, draft: SceneDraft, settings: MotionSettings
 ) -> bool:
     """Let a motion of the bundled body drive another figure that has its joints, if any."""
-    from viewer.loading.skeleton_motions import drive_somebody
-    from viewer.rig.motion.skeleton_motion import SkeletonMotion
-    from viewer.rig.retargeting.drive import Drive
-
     assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
     body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
     drive = Drive(
@@ -229,40 +225,30 @@ def _drives_character(
         plants_feet=settings.feet,
         hangs=up.startswith("-"),
     )
-    return drive_somebody(path, drive, cast, actor.placement)[0]
+    return drive_somebody(path, drive, draft, actor.placement)[0]
 
 
-def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
-    """Return the up axis estimated from the people, and record it if it is unusual."""
-    from viewer.rig.motion.upright import guess_up
-
-    up = guess_up(actors)
-    if up != usual:
-        key = "F007.up-judged-over" if up.startswith("-") else "F007.up-judged"
-        cast.note(key, path, up=up)
-    return up
-
-
-def _with_cameras(capture: Capture, choice: Choice) -> Capture:
-    """Return a capture with the cameras that depend on the figure that shows its bodies."""
-    if capture.views_of is None:
-        return capture
-    found = capture.views_of(
-        lambda shape: rest_roots(choice.figure, None if choice.is_bundled else shape)
-    )
-    return replace(capture, views=(*capture.views, *found), views_of=None)
+def _note_bundled(draft: SceneDraft, path: Path, has_shape: bool, has_expression: bool) -> None:
+    """Record that the bundled body is shown, and which data it ignores."""
+    key = {
+        (False, False): "F007.bundled-body",
+        (True, False): "F007.bundled-body-without-shapes",
+        (False, True): "F007.bundled-body-without-expressions",
+        (True, True): "F007.bundled-body-without-either",
+    }[has_shape, has_expression]
+    draft.note(key, path)
 
 
-def _begin_capture(path: Path, capture: Capture, cast: Cast, models: BodyModels) -> None:
+def _begin_capture(path: Path, capture: Capture, draft: SceneDraft, models: BodyModels) -> None:
     """Read a capture until the first person appears; the remaining frames are read later."""
     settings = models.settings
     choice = models.choose(path, ShapeSpace(capture.model))
     capture = _with_cameras(capture, choice)
-    called = cast.free_title(capture.name)
-    cast.diagnostics += capture.warnings
+    called = draft.free_title(capture.name)
+    draft.diagnostics += capture.warnings
     if capture.model == "MHR":  # the choice for bodies of other models depends on their genders
-        cast.diagnostics += choice.notes
-    driven = _may_be_driven(cast, settings, choice.target) if choice.drives else []
+        draft.diagnostics += choice.notes
+    driven = _may_be_driven(draft, settings, choice.target) if choice.drives else []
     members = [each for each in FAMILY.values() if each.title == capture.model]
     body = choice.figure
     if members and driven and choice.is_bundled:
@@ -285,25 +271,35 @@ def _begin_capture(path: Path, capture: Capture, cast: Cast, models: BodyModels)
             except RigError as problem:
                 raise builder.refusal(problem) from None
         # EasyMocap's usual calibration has z up, which needs no message.
-        up = up or _judged_up(path, builder.actors, cast, usual="z")
+        up = up or _judged_up(path, builder.actors, draft, usual="z")
         builder.place(up)
         builder.swings, builder.joint_map = settings.springs, settings.joint_map
         builder.plants_feet = settings.feet
-        _carry(builder, cast, choice.target, drives=choice.drives and settings.drives)
+        _carry(builder, draft, choice.target, drives=choice.drives and settings.drives)
         if builder.target is not None or body is choice.figure:
             break
         body = choice.figure  # no figure matches, so the bundled body itself is shown
-    cast.diagnostics += notes
+    draft.diagnostics += notes
     if choice.is_bundled and any(actor.figure is choice.figure for actor in builder.actors):
-        _note_bundled(cast, path, builder.has_shape, builder.has_expression)
+        _note_bundled(draft, path, builder.has_shape, builder.has_expression)
     rate = _rate(builder.actors, settings)
     views, images, notes = filmed(capture, capture.views, settings, rate)
-    cast.diagnostics += notes
+    draft.diagnostics += notes
     builder.views = tuple(views)
-    cast.images = cast.images or images
+    draft.images = draft.images or images
     for actor in builder.actors:
-        cast.add(actor, up[-1], placed=True)
-    cast.builders.append(builder)
+        draft.add(actor, up[-1], placed=True)
+    draft.builders.append(builder)
+
+
+def _with_cameras(capture: Capture, choice: Choice) -> Capture:
+    """Return a capture with the cameras that depend on the figure that shows its bodies."""
+    if capture.views_of is None:
+        return capture
+    found = capture.views_of(
+        lambda shape: rest_roots(choice.figure, None if choice.is_bundled else shape)
+    )
+    return replace(capture, views=(*capture.views, *found), views_of=None)
 
 
 def _model_of(
@@ -314,28 +310,28 @@ def _model_of(
     return choice.figure, choice.notes
 
 
-def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) -> None:
+def _carry(builder: Builder, draft: SceneDraft, target: Figure | None, drives: bool) -> None:
     """Let captured bodies drive a figure with other joints: the requested one, or an open one.
 
     Raises RigError if too few joints of the requested figure match.
     """
     if target is not None:
         try:
-            cast.diagnostics += builder.carry_to(target)
+            draft.diagnostics += builder.carry_to(target)
         except RigError as problem:
             raise model_refusal(problem, builder.path) from None
         return
     if not (drives and builder.has_bodies):
         return
     refusal: RigError | None = None
-    for index, actor in enumerate(cast.actors):
+    for index, actor in enumerate(draft.actors):
         if actor.clip is None and actor.figure.is_attached:
             try:
-                cast.diagnostics += builder.carry_to(actor.figure)
+                draft.diagnostics += builder.carry_to(actor.figure)
             except RigError as problem:
                 refusal = refusal or problem
                 continue
-            cast.take(index)
+            draft.take(index)
             return
     if refusal is not None and builder.joint_map is not None:
         raise map_refusal(refusal, builder.path)
@@ -344,10 +340,6 @@ def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) ->
 def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:
     """Return the frame rate of a capture."""
     return scene_rate(actors) if actors else capture_rate(settings.frame_rate, None, None)
-
-
-_NAME = "video"  # name of the camera for captures that have none
-_ALIKE = 0.005  # maximum relative difference of equal frame rates, such as 29.97 and 30
 
 
 def filmed(
@@ -397,7 +389,7 @@ def filmed(
         return found, capture.images, []
     frames, notes = range(capture.first_frame, capture.first_frame + capture.n_frames), []
     if not found and capture.is_in_camera:
-        size = ImageFolders({_NAME: settings.images}, rate, frames).size_of(_NAME)
+        size = ImageFolders({_CAMERA: settings.images}, rate, frames).size_of(_CAMERA)
         if size is not None:
             found, notes = _assumed(size, settings.images)
     images = find_images([], found, rate, frames, settings.images)
@@ -405,7 +397,7 @@ def filmed(
 
 
 def _rate_notes(path: Path, video: float, rate: float) -> list[Diagnostic]:
-    if abs(video / rate - 1.0) <= _ALIKE:
+    if abs(video / rate - 1.0) <= _SAME_RATE:
         return []
     return [Diagnostic("F007.video-rate", path, values={"video": video, "rate": rate})]
 
@@ -428,4 +420,4 @@ def _assumed(size: tuple[int, int], path: Path) -> tuple[list[CameraView], list[
     )
     values = {"focal": focal, "width": size[0], "height": size[1]}
     note = Diagnostic("F007.assumed-camera", path, values=values)
-    return [CameraView(_NAME, intrinsic, np.eye(3), np.zeros(3), size)], [note]
+    return [CameraView(_CAMERA, intrinsic, np.eye(3), np.zeros(3), size)], [note]

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import known_unit, scale_to_unit, scaling
-from viewer.loading.cast import Cast
+from viewer.loading.scene_draft import SceneDraft
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box, scene_unit
 from viewer.rig.units import METRES
@@ -29,11 +29,11 @@ __all__ = [
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
 
-def stand_up(cast: Cast, world_up: str) -> None:
+def stand_up(draft: SceneDraft, world_up: str) -> None:
     """Rotate actors whose up axis differs from the scene's."""
-    for actor, up in zip(cast.actors, cast.ups, strict=True):
+    for actor, up in zip(draft.actors, draft.ups, strict=True):
         _turn(actor, up, world_up)
-    for builder in cast.builders:  # for people who appear later
+    for builder in draft.builders:  # for people who appear later
         _turn(builder, builder.up, world_up)
 
 
@@ -54,27 +54,27 @@ def placed_like(scene: Scene, actor: Actor) -> list[Diagnostic]:
     return scale_to_unit(actor, unit)
 
 
-def scale_to_one_unit(cast: Cast) -> None:
+def scale_to_one_unit(draft: SceneDraft) -> None:
     """Scale actors whose unit differs from that of the scene; a note names each of them.
 
     The unit of the scene is that of the first actor whose motion determines its position, or else
     of the first actor with a known unit. Actors with an unknown unit are not scaled.
     """
-    order = sorted(range(len(cast.actors)), key=lambda index: not cast.placed[index])
-    unit = next((found for index in order if (found := known_unit(cast.actors[index]))), "")
-    for actor in cast.actors:
-        cast.diagnostics += scale_to_unit(actor, unit)
-    for builder in cast.builders:
+    order = sorted(range(len(draft.actors)), key=lambda index: not draft.placed[index])
+    unit = next((found for index in order if (found := known_unit(draft.actors[index]))), "")
+    for actor in draft.actors:
+        draft.diagnostics += scale_to_unit(actor, unit)
+    for builder in draft.builders:
         builder.unit = unit
 
 
-def place_side_by_side(cast: Cast) -> None:
+def place_side_by_side(draft: SceneDraft) -> None:
     """Move actors without their own position to the right of the actors before them.
 
     Actors of one group of figures are moved together.
     """
-    loose = _by_group(cast)
-    placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
+    loose = _by_group(draft)
+    placed = [a for a, placed in zip(draft.actors, draft.placed, strict=True) if placed]
     if not loose or len(loose) + len(placed) < 2:
         return
     # Bounds of the drawn scene exclude stray vertices, which would displace the next actor.
@@ -94,25 +94,25 @@ def place_side_by_side(cast: Cast) -> None:
         before = span
 
 
-def _by_group(cast: Cast) -> list[list[Actor]]:
+def _by_group(draft: SceneDraft) -> list[list[Actor]]:
     """Return the actors without their own position, grouped by figure group."""
     groups: dict[FigureGroup | int, list[Actor]] = {}
-    for index, (actor, group) in enumerate(zip(cast.actors, cast.groups, strict=True)):
-        if not cast.placed[index]:
+    for index, (actor, group) in enumerate(zip(draft.actors, draft.groups, strict=True)):
+        if not draft.placed[index]:
             groups.setdefault(index if group is None else group, []).append(actor)
     return list(groups.values())
 
 
-def placed_views(cast: Cast) -> list[CameraView]:
+def placed_views(draft: SceneDraft) -> list[CameraView]:
     """Return the cameras of captures and figure groups, moved and scaled with their figures."""
     placed = [
         # Captures are in metres.
         (builder.views, scaling(1.0 / METRES[builder.unit or "m"]) @ builder.placement)
-        for builder in cast.builders
+        for builder in draft.builders
     ]
     placements = {
         group: actor.placement
-        for actor, group in zip(cast.actors, cast.groups, strict=True)
+        for actor, group in zip(draft.actors, draft.groups, strict=True)
         if group is not None
     }
     placed += [(group.views, placement) for group, placement in placements.items()]

@@ -1,23 +1,30 @@
-"""Assignment of BVH motions to figures, or to separate skeletons."""
+"""Motions of skeletons: a BVH, or an animation of one figure's file, on another figure.
+
+A motion drives the requested model, or else the first figure with a mesh whose joints match; the
+others are shown as separate skeletons (``Lone``). A skeleton that has animations but no mesh, as in
+a file of motions only, drives figures of other files in the same way.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.loading.cast import Cast
-from viewer.loading.refusals import map_refusal, model_refusal
+from viewer.formats import Source
+from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
+from viewer.rig.figure import Figure, FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.animation_choice import chosen_animation
+from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
@@ -26,7 +33,8 @@ from viewer.rig.retargeting.source_rest import rest_fault
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.units import METRES, is_metres
 
-__all__ = ["Lone", "agree_on_units", "as_asked", "drive_somebody", "give_skeleton_motion"]
+if TYPE_CHECKING:
+    from viewer.formats import Content
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +59,7 @@ class Lone:
 def give_skeleton_motion(
     path: Path,
     motion: SkeletonMotion,
-    cast: Cast,
+    draft: SceneDraft,
     settings: MotionSettings,
     model: Figure | None,
 ) -> Lone | None:
@@ -63,7 +71,7 @@ def give_skeleton_motion(
         File of the motion, for messages.
     motion : SkeletonMotion
         Motion as read from the file.
-    cast : Cast
+    draft : SceneDraft
         Receives a clip, or an actor.
     settings : MotionSettings
         Unit, up axis, frame rate, and whether it drives a figure.
@@ -82,7 +90,7 @@ def give_skeleton_motion(
     """
     motion = as_asked(motion, settings)
     for note in motion.up_notes:
-        cast.note("F007.up-taken", path, note=note)
+        draft.note("F007.up-taken", path, note=note)
     fault = rest_fault(motion, settings.source_rest)
     if fault is not None:
         raise RigError(replace(fault, path=path))
@@ -99,20 +107,20 @@ def give_skeleton_motion(
             clip, notes = driven_clip(drive, model)
         except RigError as problem:
             raise model_refusal(problem, path) from None
-        cast.diagnostics += [replace(note, path=path) for note in notes]
-        called = cast.free_title(motion.figure.name)
+        draft.diagnostics += [replace(note, path=path) for note in notes]
+        called = draft.free_title(motion.figure.name)
         actor = Actor(model, clip=clip, placement=placement, called=called, drive=drive)
-        cast.add(actor, model.up, placed=False)
+        draft.add(actor, model.up, placed=False)
         return None
     if settings.drives:
-        is_driving, refusal = drive_somebody(path, drive, cast, placement)
+        is_driving, refusal = drive_somebody(path, drive, draft, placement)
         if is_driving:
             return None
         if refusal:
-            cast.note("F007.stands-alone", path, problem=refusal)
-    called = cast.free_title(motion.figure.name)
+            draft.note("F007.stands-alone", path, problem=refusal)
+    called = draft.free_title(motion.figure.name)
     actor = Actor(motion.figure, clip=motion.clip, placement=placement, called=called)
-    cast.add(actor, motion.figure.up, placed=False)
+    draft.add(actor, motion.figure.up, placed=False)
     return Lone(path, motion, actor)
 
 
@@ -141,7 +149,7 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 def drive_somebody(
     path: Path,
     drive: Drive,
-    cast: Cast,
+    draft: SceneDraft,
     placement: Floats,
     among: Sequence[Actor] | None = None,
 ) -> tuple[bool, str | Diagnostic]:
@@ -153,13 +161,13 @@ def drive_somebody(
         File of the motion, for messages.
     drive : Drive
         Motion of another skeleton.
-    cast : Cast
+    draft : SceneDraft
         The figure's actor gets the clip. If none matches, the first one keeps the drive without a
         clip.
     placement : (4, 4)
         Applied to that actor.
     among : sequence of Actor, optional
-        Actors of the cast that may be moved; all if omitted.
+        Actors of the draft that may be moved; all if omitted.
 
     Returns
     -------
@@ -175,7 +183,7 @@ def drive_somebody(
     """
     refusal: RigError | None = None
     refused: Actor | None = None
-    for actor in cast.actors if among is None else among:
+    for actor in draft.actors if among is None else among:
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:
@@ -185,7 +193,7 @@ def drive_somebody(
             continue
         actor.clip, actor.drive = clip, drive
         actor.placement = placement @ actor.placement
-        cast.diagnostics += [replace(note, path=path) for note in notes]
+        draft.diagnostics += [replace(note, path=path) for note in notes]
         return True, ""
     if refusal is not None and drive.joint_map is not None:
         raise map_refusal(refusal, path)
@@ -194,30 +202,55 @@ def drive_somebody(
     return False, "" if refusal is None else refusal.cause
 
 
-def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
+def model_refusal(problem: RigError, path: Path | None) -> RigError:
+    """Return the error for a requested model that does not match.
+
+    Parameters
+    ----------
+    problem : RigError
+        Reason why it does not match; returned unchanged if it refers to a file, such as a joint
+        map.
+    path : Path or None
+        File of the motion.
+    """
+    cause = problem.cause
+    if isinstance(cause, Diagnostic) and cause.path is not None:
+        return problem
+    return RigError(Diagnostic("F004.model", path, values={"problem": cause}))
+
+
+def map_refusal(problem: RigError, path: Path | None) -> RigError:
+    """Return the error for a joint map that matches no figure; see ``model_refusal``."""
+    cause = problem.cause
+    if isinstance(cause, Diagnostic) and cause.path is None:
+        return RigError(replace(cause, path=path))
+    return problem
+
+
+def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
     """Scale separate skeletons to metres if other actors have another unit; record the estimates.
 
     A lone skeleton, or one among others in the same unit, keeps the values of its file.
 
     Parameters
     ----------
-    cast : Cast
+    draft : SceneDraft
         The scene, without people who appear later; actors of scaled skeletons are replaced.
     lone : list of Lone
         The separate skeletons in the scene.
     """
-    chosen = [one for one in lone if _is_odd(one, cast.actors)]
+    chosen = [one for one in lone if _is_odd(one, draft.actors)]
     for one in lone:
         if one in chosen:
             unit, facts = one.motion.figure.unit, dict(one.motion.figure.facts)
             scaled = _in_metres(one.motion, unit, str(facts.get("unit", unit)))
-            place = next(n for n, actor in enumerate(cast.actors) if actor is one.actor)
-            cast.actors[place] = replace(
+            place = next(n for n, actor in enumerate(draft.actors) if actor is one.actor)
+            draft.actors[place] = replace(
                 one.actor, figure=scaled.figure, clip=scaled.clip, pose=None
             )
         if one.motion.unit_note is not None:
             key = "F007.unit-taken-and-scaled" if one in chosen else "F007.unit-taken"
-            cast.note(key, one.path, note=one.motion.unit_note)
+            draft.note(key, one.path, note=one.motion.unit_note)
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:
@@ -235,3 +268,90 @@ def _is_otherwise(actor: Actor, unit: str) -> bool:
     if figure.unit in METRES:
         return figure.unit != unit
     return is_metres(float(np.ptp(scene_box(Scene([actor])), axis=0).max()))
+
+
+def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
+    """Return the motion of a file that was passed as a motion.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    content : Content
+        Its contents.
+    wanted : str
+        The animation, see ``chosen_animation``.
+
+    Raises
+    ------
+    FormatError
+        If it has no motion of a skeleton.
+    RigError
+        If there is no such animation.
+    """
+    if isinstance(content, SkeletonMotion):
+        return content
+    figures = content.figures if isinstance(content, FigureGroup) else (content,)
+    for figure in figures:
+        if isinstance(figure, Figure) and figure.skeleton is not None and figure.animations:
+            return _motion_of(figure, wanted)
+    raise source.fault("F002.no-motion")
+
+
+def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
+    """Return an animation of a figure as the motion of its skeleton, sampled at its own rate."""
+    chosen = chosen_animation([figure], wanted) or figure.animations[0]
+    clip = baked(figure, chosen.clip())
+    bare = Figure(figure.name, skeleton=figure.skeleton, up=figure.up, unit=figure.unit)
+    return SkeletonMotion(bare, clip)
+
+
+def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -> bool:
+    """Let skeletons with animations, but without a mesh, move figures that have no motion.
+
+    A skeleton that moves another figure is not shown itself. It does not move figures of its own
+    file, which is a scene and not a motion. Returns whether any skeleton moves a figure.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+        The actors before they play animations.
+    wanted : str
+        The animation, see ``chosen_animation``.
+    settings : MotionSettings
+        The requested match of joints, and whether feet are planted.
+
+    Raises
+    ------
+    RigError
+        If no figure matches, although a joint map is given.
+    """
+    found = False
+    for actor in [*draft.actors]:
+        figure = actor.figure
+        if figure.mesh is not None or actor.clip is not None or not figure.animations:
+            continue
+        others = _of_other_files(draft, actor)
+        if not any(other.figure.is_attached and other.clip is None for other in others):
+            continue
+        try:
+            motion = _motion_of(figure, wanted)
+        except RigError:
+            continue  # reported when the animations are started
+        drive = Drive(motion, joint_map=settings.joint_map, plants_feet=settings.feet)
+        path = actor.origin or Path(figure.name)
+        if drive_somebody(path, drive, draft, np.eye(4), others)[0]:
+            draft.take(next(n for n, other in enumerate(draft.actors) if other is actor))
+            found = True
+    return found
+
+
+def _of_other_files(draft: SceneDraft, actor: Actor) -> list[Actor]:
+    """Return the other actors, except those of figures from the same file."""
+    place = next(index for index, other in enumerate(draft.actors) if other is actor)
+    group = draft.groups[place]
+    return [
+        other
+        for other, of_other in zip(draft.actors, draft.groups, strict=True)
+        if other is not actor and (group is None or of_other is not group)
+    ]

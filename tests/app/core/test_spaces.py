@@ -13,9 +13,8 @@ from viewer.app.actors.actors_panel import switch_space
 from viewer.errors import RigError
 from viewer.loading import assembly
 from viewer.loading.cleaning import clean_up
-from viewer.loading.cleaning_settings import CleanUp
 from viewer.loading.contents import Contents
-from viewer.loading.settings import MotionSettings
+from viewer.loading.settings import CleanUp, MotionSettings
 from viewer.rig.captures.cameras import CameraView
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion

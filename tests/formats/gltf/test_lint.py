@@ -7,7 +7,7 @@ from formats.gltf.files import File, animated, skinned
 from formats.gltf.planted_gltf import PLANTED
 from formats.gltf.validator_faults import FAULTS
 
-from viewer.lint import recheck, lint_files
+from viewer.lint import lint_files, recheck
 from viewer.loading import MotionSettings, load
 from viewer.rig import skeleton
 from viewer.rig.motion.animation_choice import play_animation

@@ -1,4 +1,4 @@
-"""Cast of a scene under construction: its actors and their properties."""
+"""Draft of a scene: its actors and their properties while files are assembled."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ if TYPE_CHECKING:
     from viewer.rig.captures.cameras import CameraImages, CameraView
     from viewer.rig.figure import FigureGroup
 
-__all__ = ["Cast"]
-
 
 @dataclass(slots=True)
-class Cast:
+class SceneDraft:
     """The actors of a scene under construction.
 
     Attributes
@@ -41,7 +39,7 @@ class Cast:
     diagnostics : list of Diagnostic
         Messages from assembling the scene.
     used_options : set of str
-        Options that had an effect, see ``unused_options``.
+        Options that had an effect; ``begin`` reports the others.
     files : list of Path
         Files of body models, which are not among the opened files; the scene's list, once there
         is a scene.
