@@ -51,6 +51,121 @@ _Indices = NDArray[np.int64]
 _JOINT, _VERTEX = "noun-joint", "noun-vertex"  # keys of phrases
 _ODD_SUM = 0.01  # tolerance of sums, well above the rounding error of the authors' files
 
+_CORE = {
+    "vertices": 3,
+    "t_pose_joints": 3,
+    "parents": 1,
+    "skinning_weights": 3,
+    "faces_vert": 3,
+}
+"""Required arrays, with their columns in a text file."""
+_OPTIONAL = {
+    "J_regressor": 3,
+    "textures": 2,
+    "faces_tex": 3,
+    "body_parts": 1,
+    "reduced_ids": 1,
+    "reduced_faces": 3,
+    "sym": 1,
+}
+"""Optional arrays."""
+_WIDTHS = {**_CORE, **_OPTIONAL}
+# Matrices, of which text folders list the entries.
+_SPARSE = ("skinning_weights", "J_regressor")
+# What errors in an array affect in the figure.
+_PARTS: dict[str, FaultPart] = {
+    "vertices": "positions",
+    "t_pose_joints": "joints",
+    "parents": "joints",
+    "faces_vert": "triangles",
+}
+
+_NAMES = (
+    "Hip,Spine1,Spine2,Spine3,Front hip,RF hip,RF clavicle,RF leg,RF knee,RF foot,RF heel,"
+    "RF toe base,RF toe end,LF hip,LF clavicle,LF leg,LF knee,LF foot,LF heel,LF toe base,"
+    "LF toe end,Neck1,Neck2,Head,R eye,L eye,R ear,R ear1,R ear2,R ear3,R ear4,L ear,L ear1,"
+    "L ear2,L ear3,L ear4,Jaw,Jaw end,R leg,R leg,R knee,R foot,R foot base,R heel,R ball back,"
+    "R toe,Tail1,Tail2,Tail3,Tail4,Tail5,Tail6,Tail7,Tail8,L leg,L leg,L knee,L foot,L foot base,"
+    "L heel,L ball back,L toe"
+)
+_JOINTS = tuple(_NAMES.split(","))
+"""Names of the joints by index; two pairs of names repeat."""
+
+_KEYPOINTS = (
+    ("nose", "v", 10895),
+    ("left eye", "v", 938),
+    ("right eye", "v", 6053),
+    ("left ear", "v", 1368),
+    ("right ear", "v", 6600),
+    ("left shoulder", "j", 15),
+    ("right shoulder", "j", 7),
+    ("left elbow", "j", 16),
+    ("right elbow", "j", 8),
+    ("left paw", "j", 17),
+    ("right paw", "j", 9),
+    ("left hip", "j", 56),
+    ("right hip", "j", 40),
+    ("left knee", "j", 57),
+    ("right knee", "j", 41),
+    ("left foot", "j", 58),
+    ("right foot", "j", 42),
+    ("tail", "v", 7903),
+    ("centre", "j", 2),
+)
+"""The 19 defined keypoints of the authors' 23: name, vertex or joint, index."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One array and its origin.
+
+    Attributes
+    ----------
+    name : str
+        File name or key, for messages.
+    values : (N, columns)
+        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
+    source : Source
+        The file, which records errors.
+    offset_of : callable or None
+        Returns the offset of a row in a text file; None for archives, which have no lines.
+    """
+
+    name: str
+    values: NDArray[Any]
+    source: Source
+    offset_of: Callable[[int], int] | None = None
+
+    def offset(self, row: int) -> int | None:
+        """Return the offset of a row in the file; None for archives."""
+        return None if self.offset_of is None else self.offset_of(row)
+
+    def item(self, row: int | None = None) -> Phrase | str:
+        """Return the name of a row or of the array in messages; empty if the file identifies it."""
+        if self.offset_of is not None:
+            return ""
+        name = printable(self.name, 60)
+        return name if row is None else Phrase("row-of", name=name, index=row)
+
+    def odd_offset(self, wanted: int) -> int | None:
+        """Return the offset of the first surplus row, or of the last row if rows are missing."""
+        return self.offset(min(wanted, len(self.values) - 1))
+
+    def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
+        """Register a function that finds the row of an element; see ``Source.remember``."""
+        offset_of = self.offset_of
+        if offset_of is not None:
+            self.source.remember(kind, lambda index: offset_of(row_of(index)))
+
+
+@dataclass(slots=True)
+class _PigFiles:
+    """All arrays of a model that are present."""
+
+    parts: dict[str, _Part] = field(default_factory=dict)
+    part_names: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
 
 def read(source: Source) -> Figure:
     """Read the model.
@@ -68,9 +183,10 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        If the model is invalid; the error has the file, and the line in text files.
+        If the model is invalid or a required array is missing; the error has the file, and the line
+        in text files.
     """
-    files = _open_parts(source)
+    files = _from_folder(source) if source.is_folder else _from_archive(source)
     parts = files.parts
     positions = _neutral_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
@@ -84,7 +200,7 @@ def read(source: Source) -> Figure:
         ("joints", "t_pose_joints"),
     ):
         parts[name].remember(kind, lambda index: index)
-    names = JOINTS if n_joints == len(JOINTS) else tuple(f"joint_{j}" for j in range(n_joints))
+    names = _JOINTS if n_joints == len(_JOINTS) else tuple(f"joint_{j}" for j in range(n_joints))
     mesh = _mesh(source, parts, positions)
     skin = _skin(source, parts, joints, n_vertices)
     regressor = _regressor(parts, n_joints, n_vertices)
@@ -96,7 +212,7 @@ def read(source: Source) -> Figure:
         up="z",
         unit="m",
         joint_regressor=regressor,
-        pose_layout=_layout(n_joints),
+        pose_layout=_pose_layout(n_joints),
         body_parts=_body_parts(files, n_vertices),
         keypoints=_keypoints(n_vertices, n_joints),
         reduced=_reduced(parts, n_vertices),
@@ -105,26 +221,97 @@ def read(source: Source) -> Figure:
     )
 
 
-def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
-    """Return the error for a part whose number of rows differs from another part's."""
-    return part.source.fault(
-        "F002.pig-rows-as",
-        part.odd_offset(wanted),
-        item=part.item(),
-        expected=wanted,
-        other=other.name,
-        found=len(part.values),
-    )
+def _from_folder(source: Source) -> _PigFiles:
+    present = {path.name for path in source.path.iterdir()}
+    missing = [f"{name}.txt" for name in _CORE if f"{name}.txt" not in present]
+    if missing:
+        raise source.fault("F002.pig-folder", missing=missing)
+    files = _PigFiles()
+    for name, columns in _WIDTHS.items():
+        if f"{name}.txt" in present:
+            part = _text_part(source.inside(f"{name}.txt"), name, columns)
+            if len(part.values):
+                files.parts[name] = part
+    if "body_part_defs.txt" in present:
+        text = source.inside("body_part_defs.txt").data.decode("utf-8", "replace")
+        files.part_names = tuple(
+            printable(line.strip(), 60) for line in text.splitlines() if line.strip()
+        )
+    known = {f"{name}.txt" for name in (*_WIDTHS, "body_part_defs")}
+    files.ignored = tuple(sorted(name for name in present - known if not name.startswith(".")))
+    return files
 
 
-def _layout(n_joints: int) -> PoseLayout:
-    is_euler = np.zeros(n_joints, dtype=bool)
-    is_euler[0] = True
-    starts = 3 + 3 * np.arange(n_joints, dtype=np.int32)
-    return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
+def _text_part(source: Source, name: str, columns: int) -> _Part:
+    rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
+    if name not in _CORE and np.isnan(rows.sum()):
+        rows = rows[:0]  # an incomplete array cannot be used
+    return _Part(f"{name}.txt", rows, source, offset_of)
 
 
-def _neutral_mesh(parts: dict[str, Part]) -> Floats:
+def _from_archive(source: Source) -> _PigFiles:
+    archive = archive_of(source)
+    missing = [name for name in _CORE if not archive.has(name)]
+    if missing:
+        raise source.fault("F002.pig-keys", missing=missing, found=list(archive.keys))
+    files = _PigFiles()
+    for name, columns in _WIDTHS.items():
+        if archive.has(name):
+            files.parts[name] = _archive_part(source, name, columns)
+    if archive.has("body_part_defs"):
+        files.part_names = _part_names(source)
+    files.ignored = tuple(key for key in archive.keys if key not in (*_WIDTHS, "body_part_defs"))
+    return files
+
+
+def _part_names(source: Source) -> tuple[str, ...]:
+    archive = archive_of(source)
+    value = archive.get("body_part_defs")
+    if isinstance(value, list | tuple):
+        return tuple(printable(name, 60) for name in value if isinstance(name, str))
+    names = archive.array("body_part_defs", (None,), "SU").values()
+    return tuple(printable(name, 60) for name in names.astype(str).tolist())
+
+
+def _archive_part(source: Source, name: str, columns: int) -> _Part:
+    archive = archive_of(source)
+
+    if name in _SPARSE and not _is_entries(archive, name):
+        joints, vertices, weights = _entries(archive, name)
+        return _Part(name, np.stack([joints, vertices, weights], axis=1), source)
+    shape = (None,) if columns == 1 else (None, columns)
+    if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
+        shape = (None, 1)
+    numbers = archive.array(name, shape).values()
+    values = finite(archive, name, numbers, _PARTS.get(name, "")).reshape(-1, columns)
+    if len(values) == 0:
+        raise archive.fault("F002.no-rows", item=name)
+    return _Part(name, values, source)
+
+
+def _is_entries(archive: Archive, name: str) -> bool:
+    """Return whether a matrix is stored as rows of (joint, vertex, weight), as in text folders."""
+    shape: tuple[int, ...] = getattr(archive.get(name), "shape", ())
+    sides = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
+    return shape[1:] == (3,) and shape not in (sides, sides[::-1])
+
+
+def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
+    """Return joint, vertex and weight of each entry of a J x V or V x J matrix."""
+    n_joints, n_vertices = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
+    is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2
+    sides = (n_vertices, n_joints) if is_turned else (n_joints, n_vertices)
+    rows, columns, numbers = archive.sparse(name, sides).entries()
+    part: FaultPart = "weights" if name == "skinning_weights" else ""
+    weights = finite(archive, name, numbers, part, rows if is_turned else columns)
+    return (columns, rows, weights) if is_turned else (rows, columns, weights)
+
+
+def _rows(archive: Archive, name: str) -> int:
+    return archive.array(name, (None, 3)).shape[0]
+
+
+def _neutral_mesh(parts: dict[str, _Part]) -> Floats:
     """Return the vertices; vertices of invalid rows are moved between their neighbours."""
     positions, faces = parts["vertices"].values, parts["faces_vert"].values
     if not np.isnan(positions).any():
@@ -133,46 +320,7 @@ def _neutral_mesh(parts: dict[str, Part]) -> Floats:
     return neutral_positions(positions, faces[fits].astype(np.int32))
 
 
-def _indices(part: Part, column: int, end: int, noun: str, rows_of: Part | None = None) -> Ints:
-    """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part.
-
-    ``noun`` is the key of the phrase for the indexed elements, ``"noun-vertex"``.
-    """
-    return _columns(part, slice(column, column + 1), end, noun, rows_of)[:, 0]
-
-
-def _corners(part: Part, noun: str, rows_of: Part) -> Ints:
-    return _columns(part, slice(0, 3), len(rows_of.values), noun, rows_of)
-
-
-def _columns(part: Part, columns: slice, end: int, noun: str, rows_of: Part | None) -> Ints:
-    values = part.values[:, columns]
-    known = ~np.isnan(values)
-    fits = (values >= 0) & (values < end) & (values == np.floor(values))
-    wrong = np.argwhere(known & ~fits)
-    if len(wrong):
-        row, column = wrong[0].tolist()
-        is_mesh = part.name.startswith("faces_vert")
-        part.source.refuse(
-            "W010.pig-joint" if noun == _JOINT else "F002.pig-index",
-            part.offset(row),
-            len(wrong),
-            "triangles" if is_mesh else "",
-            wrong[:, 0] if is_mesh else None,
-            item=part.item(row),
-            noun=Phrase(noun),
-            last=end - 1,
-            found=float(values[row, column]),
-            proof=Phrase("rows-as", name=rows_of.name, n=end) if rows_of else "",
-        )
-    if fits.all():
-        return values.astype(np.int32)
-    if values.shape[1] == 3:
-        return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
-    return np.where(fits, values, -1).astype(np.int32)
-
-
-def _parents(part: Part) -> Ints:
+def _parents(part: _Part) -> Ints:
     parents = part.values[:, 0]
     result = parents.copy()
     for joint, parent in enumerate(parents.tolist()):
@@ -184,7 +332,7 @@ def _parents(part: Part) -> Ints:
     return result.astype(np.int32)
 
 
-def _refuse_parent(part: Part, parents: Floats, joint: int) -> None:
+def _refuse_parent(part: _Part, parents: Floats, joint: int) -> None:
     found, values = float(parents[joint]), {"joint": joint}
     if joint == 0:
         key, values = "F002.pig-root", {}
@@ -197,7 +345,19 @@ def _refuse_parent(part: Part, parents: Floats, joint: int) -> None:
     )
 
 
-def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
+def _count_fault(part: _Part, wanted: int, other: _Part) -> FormatError:
+    """Return the error for a part whose number of rows differs from another part's."""
+    return part.source.fault(
+        "F002.pig-rows-as",
+        part.odd_offset(wanted),
+        item=part.item(),
+        expected=wanted,
+        other=other.name,
+        found=len(part.values),
+    )
+
+
+def _mesh(source: Source, parts: dict[str, _Part], positions: Floats) -> Mesh:
     triangles = _corners(parts["faces_vert"], _VERTEX, parts["vertices"])
     uvs, uv_triangles = None, None
     if "textures" in parts and "faces_tex" in parts:
@@ -212,7 +372,7 @@ def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
     return Mesh(positions, normals, triangles, uvs, uv_triangles=uv_triangles)
 
 
-def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: int) -> Skin:
+def _skin(source: Source, parts: dict[str, _Part], joints: Floats, n_vertices: int) -> Skin:
     part = parts["skinning_weights"]
     columns = _indices(part, 0, len(joints), _JOINT, parts["t_pose_joints"])
     vertices = _indices(part, 1, n_vertices, _VERTEX, parts["vertices"])
@@ -291,7 +451,7 @@ def _check_weights(source: Source, name: str, skin: Skin, known: Bools) -> None:
         )
 
 
-def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointRegressor | None:
+def _regressor(parts: dict[str, _Part], n_joints: int, n_vertices: int) -> JointRegressor | None:
     if "J_regressor" not in parts:
         return None
     part = parts["J_regressor"]
@@ -302,20 +462,11 @@ def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointR
     return JointRegressor(n_joints, joints[usable], vertices[usable], weights)
 
 
-def _column(parts: dict[str, Part], name: str, rows: int, end: int, noun: str) -> Ints | None:
-    """Return an optional column with one value per vertex."""
-    if name not in parts:
-        return None
-    part = parts[name]
-    if len(part.values) != rows:
-        raise part.source.fault(
-            "F002.pig-rows",
-            part.odd_offset(rows),
-            item=part.item(),
-            expected=rows,
-            found=len(part.values),
-        )
-    return _indices(part, 0, end, noun)
+def _pose_layout(n_joints: int) -> PoseLayout:
+    is_euler = np.zeros(n_joints, dtype=bool)
+    is_euler[0] = True
+    starts = 3 + 3 * np.arange(n_joints, dtype=np.int32)
+    return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
 
 
 def _body_parts(files: _PigFiles, n_vertices: int) -> BodyParts | None:
@@ -327,7 +478,30 @@ def _body_parts(files: _PigFiles, n_vertices: int) -> BodyParts | None:
     return BodyParts(names or tuple(f"part {number}" for number in range(count)), of_vertex)
 
 
-def _symmetry(parts: dict[str, Part], n_vertices: int) -> Ints | None:
+def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
+    """Return the authors' keypoints, which are only defined for the published mesh."""
+    if n_joints != len(_JOINTS) or n_vertices <= max(i for _, kind, i in _KEYPOINTS if kind == "v"):
+        return None
+    count = len(_KEYPOINTS)
+    joints = np.array([index if kind == "j" else -1 for _, kind, index in _KEYPOINTS])
+    vertices = np.array([index if kind == "v" else 0 for _, kind, index in _KEYPOINTS])
+    return Keypoints(
+        names=tuple(name for name, _, _ in _KEYPOINTS),
+        joints=joints,
+        vertices=np.repeat(vertices[:, None], 3, axis=1),
+        weights=np.tile([1.0, 0.0, 0.0], (count, 1)),
+    )
+
+
+def _reduced(parts: dict[str, _Part], n_vertices: int) -> ReducedMesh | None:
+    if "reduced_ids" not in parts or "reduced_faces" not in parts:
+        return None
+    vertices = _indices(parts["reduced_ids"], 0, n_vertices, _VERTEX, parts["vertices"])
+    corners = _corners(parts["reduced_faces"], "noun-reduced-vertex", parts["reduced_ids"])
+    return ReducedMesh(vertices, corners)
+
+
+def _symmetry(parts: dict[str, _Part], n_vertices: int) -> Ints | None:
     partners = _column(parts, "sym", n_vertices, n_vertices, _VERTEX)
     if partners is None:
         return None
@@ -346,27 +520,59 @@ def _symmetry(parts: dict[str, Part], n_vertices: int) -> Ints | None:
     return partners
 
 
-def _reduced(parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
-    if "reduced_ids" not in parts or "reduced_faces" not in parts:
+def _column(parts: dict[str, _Part], name: str, rows: int, end: int, noun: str) -> Ints | None:
+    """Return an optional column with one value per vertex."""
+    if name not in parts:
         return None
-    vertices = _indices(parts["reduced_ids"], 0, n_vertices, _VERTEX, parts["vertices"])
-    corners = _corners(parts["reduced_faces"], "noun-reduced-vertex", parts["reduced_ids"])
-    return ReducedMesh(vertices, corners)
+    part = parts[name]
+    if len(part.values) != rows:
+        raise part.source.fault(
+            "F002.pig-rows",
+            part.odd_offset(rows),
+            item=part.item(),
+            expected=rows,
+            found=len(part.values),
+        )
+    return _indices(part, 0, end, noun)
 
 
-def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
-    """Return the authors' keypoints, which are only defined for the published mesh."""
-    if n_joints != len(JOINTS) or n_vertices <= max(i for _, kind, i in _KEYPOINTS if kind == "v"):
-        return None
-    count = len(_KEYPOINTS)
-    joints = np.array([index if kind == "j" else -1 for _, kind, index in _KEYPOINTS])
-    vertices = np.array([index if kind == "v" else 0 for _, kind, index in _KEYPOINTS])
-    return Keypoints(
-        names=tuple(name for name, _, _ in _KEYPOINTS),
-        joints=joints,
-        vertices=np.repeat(vertices[:, None], 3, axis=1),
-        weights=np.tile([1.0, 0.0, 0.0], (count, 1)),
-    )
+def _indices(part: _Part, column: int, end: int, noun: str, rows_of: _Part | None = None) -> Ints:
+    """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part.
+
+    ``noun`` is the key of the phrase for the indexed elements, ``"noun-vertex"``.
+    """
+    return _columns(part, slice(column, column + 1), end, noun, rows_of)[:, 0]
+
+
+def _corners(part: _Part, noun: str, rows_of: _Part) -> Ints:
+    return _columns(part, slice(0, 3), len(rows_of.values), noun, rows_of)
+
+
+def _columns(part: _Part, columns: slice, end: int, noun: str, rows_of: _Part | None) -> Ints:
+    values = part.values[:, columns]
+    known = ~np.isnan(values)
+    fits = (values >= 0) & (values < end) & (values == np.floor(values))
+    wrong = np.argwhere(known & ~fits)
+    if len(wrong):
+        row, column = wrong[0].tolist()
+        is_mesh = part.name.startswith("faces_vert")
+        part.source.refuse(
+            "W010.pig-joint" if noun == _JOINT else "F002.pig-index",
+            part.offset(row),
+            len(wrong),
+            "triangles" if is_mesh else "",
+            wrong[:, 0] if is_mesh else None,
+            item=part.item(row),
+            noun=Phrase(noun),
+            last=end - 1,
+            found=float(values[row, column]),
+            proof=Phrase("rows-as", name=rows_of.name, n=end) if rows_of else "",
+        )
+    if fits.all():
+        return values.astype(np.int32)
+    if values.shape[1] == 3:
+        return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
+    return np.where(fits, values, -1).astype(np.int32)
 
 
 def _facts(
@@ -393,216 +599,3 @@ def _facts(
     if files.ignored:
         facts.append(("not needed", ", ".join(files.ignored)))
     return tuple(facts)
-
-
-_JOINTS = (
-    "Hip,Spine1,Spine2,Spine3,Front hip,RF hip,RF clavicle,RF leg,RF knee,RF foot,RF heel,"
-    "RF toe base,RF toe end,LF hip,LF clavicle,LF leg,LF knee,LF foot,LF heel,LF toe base,"
-    "LF toe end,Neck1,Neck2,Head,R eye,L eye,R ear,R ear1,R ear2,R ear3,R ear4,L ear,L ear1,"
-    "L ear2,L ear3,L ear4,Jaw,Jaw end,R leg,R leg,R knee,R foot,R foot base,R heel,R ball back,"
-    "R toe,Tail1,Tail2,Tail3,Tail4,Tail5,Tail6,Tail7,Tail8,L leg,L leg,L knee,L foot,L foot base,"
-    "L heel,L ball back,L toe"
-)
-JOINTS = tuple(_JOINTS.split(","))
-"""Names by index; two pairs of names repeat."""
-_KEYPOINTS = (
-    ("nose", "v", 10895),
-    ("left eye", "v", 938),
-    ("right eye", "v", 6053),
-    ("left ear", "v", 1368),
-    ("right ear", "v", 6600),
-    ("left shoulder", "j", 15),
-    ("right shoulder", "j", 7),
-    ("left elbow", "j", 16),
-    ("right elbow", "j", 8),
-    ("left paw", "j", 17),
-    ("right paw", "j", 9),
-    ("left hip", "j", 56),
-    ("right hip", "j", 40),
-    ("left knee", "j", 57),
-    ("right knee", "j", 41),
-    ("left foot", "j", 58),
-    ("right foot", "j", 42),
-    ("tail", "v", 7903),
-    ("centre", "j", 2),
-)
-"""The 19 defined keypoints of the authors' 23: name, vertex or joint, index."""
-_CORE = {
-    "vertices": 3,
-    "t_pose_joints": 3,
-    "parents": 1,
-    "skinning_weights": 3,
-    "faces_vert": 3,
-}
-"""Required arrays, with their columns in a text file."""
-_OPTIONAL = {
-    "J_regressor": 3,
-    "textures": 2,
-    "faces_tex": 3,
-    "body_parts": 1,
-    "reduced_ids": 1,
-    "reduced_faces": 3,
-    "sym": 1,
-}
-"""Optional arrays."""
-_SPARSE = ("skinning_weights", "J_regressor")
-_WIDTHS = {**_CORE, **_OPTIONAL}
-_PARTS: dict[str, FaultPart] = {
-    "vertices": "positions",
-    "t_pose_joints": "joints",
-    "parents": "joints",
-    "faces_vert": "triangles",
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """One array and its origin.
-
-    Attributes
-    ----------
-    name : str
-        File name or key, for messages.
-    values : (N, columns)
-        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
-    source : Source
-        The file, which records errors.
-    offset_of : callable or None
-        Returns the offset of a row in a text file; None for archives, which have no lines.
-    """
-
-    name: str
-    values: NDArray[Any]
-    source: Source
-    offset_of: Callable[[int], int] | None = None
-
-    def offset(self, row: int) -> int | None:
-        """Return the offset of a row in the file; None for archives."""
-        return None if self.offset_of is None else self.offset_of(row)
-
-    def item(self, row: int | None = None) -> Phrase | str:
-        """Return the name of a row or of the array in messages; empty if the file identifies it."""
-        if self.offset_of is not None:
-            return ""
-        name = printable(self.name, 60)
-        return name if row is None else Phrase("row-of", name=name, index=row)
-
-    def odd_offset(self, wanted: int) -> int | None:
-        """Return the offset of the first surplus row, or of the last row if rows are missing."""
-        return self.offset(min(wanted, len(self.values) - 1))
-
-    def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
-        """Register a function that finds the row of an element; see ``Source.remember``."""
-        offset_of = self.offset_of
-        if offset_of is not None:
-            self.source.remember(kind, lambda index: offset_of(row_of(index)))
-
-
-@dataclass(slots=True)
-class _PigFiles:
-    """All arrays of a model that are present."""
-
-    parts: dict[str, Part] = field(default_factory=dict)
-    part_names: tuple[str, ...] = ()
-    ignored: tuple[str, ...] = ()
-
-
-def _open_parts(source: Source) -> _PigFiles:
-    """Read all arrays of a text folder, pickle or ``.npz``.
-
-    Raises
-    ------
-    FormatError
-        If a required array is missing; the message lists all missing arrays.
-    """
-    return _from_folder(source) if source.is_folder else _from_archive(source)
-
-
-def _from_folder(source: Source) -> _PigFiles:
-    present = {path.name for path in source.path.iterdir()}
-    missing = [f"{name}.txt" for name in _CORE if f"{name}.txt" not in present]
-    if missing:
-        raise source.fault("F002.pig-folder", missing=missing)
-    files = _PigFiles()
-    for name, columns in _WIDTHS.items():
-        if f"{name}.txt" in present:
-            part = _text_part(source.inside(f"{name}.txt"), name, columns)
-            if len(part.values):
-                files.parts[name] = part
-    if "body_part_defs.txt" in present:
-        text = source.inside("body_part_defs.txt").data.decode("utf-8", "replace")
-        files.part_names = tuple(
-            printable(line.strip(), 60) for line in text.splitlines() if line.strip()
-        )
-    known = {f"{name}.txt" for name in (*_WIDTHS, "body_part_defs")}
-    files.ignored = tuple(sorted(name for name in present - known if not name.startswith(".")))
-    return files
-
-
-def _text_part(source: Source, name: str, columns: int) -> Part:
-    rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
-    if name not in _CORE and np.isnan(rows.sum()):
-        rows = rows[:0]  # an incomplete array cannot be used
-    return Part(f"{name}.txt", rows, source, offset_of)
-
-
-def _from_archive(source: Source) -> _PigFiles:
-    archive = archive_of(source)
-    missing = [name for name in _CORE if not archive.has(name)]
-    if missing:
-        raise source.fault("F002.pig-keys", missing=missing, found=list(archive.keys))
-    files = _PigFiles()
-    for name, columns in _WIDTHS.items():
-        if archive.has(name):
-            files.parts[name] = _archive_part(source, name, columns)
-    if archive.has("body_part_defs"):
-        files.part_names = _names(source)
-    files.ignored = tuple(key for key in archive.keys if key not in (*_WIDTHS, "body_part_defs"))
-    return files
-
-
-def _archive_part(source: Source, name: str, columns: int) -> Part:
-    archive = archive_of(source)
-
-    if name in _SPARSE and not _is_entries(archive, name):
-        joints, vertices, weights = _entries(archive, name)
-        return Part(name, np.stack([joints, vertices, weights], axis=1), source)
-    shape = (None,) if columns == 1 else (None, columns)
-    if columns == 1 and len(getattr(archive.get(name), "shape", ())) == 2:
-        shape = (None, 1)
-    numbers = archive.array(name, shape).values()
-    values = finite(archive, name, numbers, _PARTS.get(name, "")).reshape(-1, columns)
-    if len(values) == 0:
-        raise archive.fault("F002.no-rows", item=name)
-    return Part(name, values, source)
-
-
-def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
-    """Return joint, vertex and weight of each entry of a J x V or V x J matrix."""
-    n_joints, n_vertices = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
-    is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2
-    sides = (n_vertices, n_joints) if is_turned else (n_joints, n_vertices)
-    rows, columns, numbers = archive.sparse(name, sides).entries()
-    part: FaultPart = "weights" if name == "skinning_weights" else ""
-    weights = finite(archive, name, numbers, part, rows if is_turned else columns)
-    return (columns, rows, weights) if is_turned else (rows, columns, weights)
-
-
-def _is_entries(archive: Archive, name: str) -> bool:
-    """Return whether a matrix is stored as rows of (joint, vertex, weight), as in text folders."""
-    shape: tuple[int, ...] = getattr(archive.get(name), "shape", ())
-    sides = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
-    return shape[1:] == (3,) and shape not in (sides, sides[::-1])
-
-
-def _rows(archive: Archive, name: str) -> int:
-    return archive.array(name, (None, 3)).shape[0]
-
-
-def _names(source: Source) -> tuple[str, ...]:
-    archive = archive_of(source)
-    value = archive.get("body_part_defs")
-    if isinstance(value, list | tuple):
-        return tuple(printable(name, 60) for name in value if isinstance(name, str))
-    names = archive.array("body_part_defs", (None,), "SU").values()
-    return tuple(printable(name, 60) for name in names.astype(str).tolist())

@@ -61,28 +61,50 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
 from viewer.rig.retargeting.pose_transfer import JointRotations
 
-_HANDS = ("left_hand_pose", "right_hand_pose", "hand_pose")
-_VECTORS = ("own_numbers", "poses", "pose", "fullpose")
+_VERSION = 1  # of the format, the value of "viewer_pose"
+
+# Keys by what they hold; of several for one part of a pose, the first with a value is used.
 _NAMES = {
     "shape": ("shape", "betas", "shapes"),
     "expression": ("expression", "expressions"),
     "translation": ("translation", "transl", "trans"),
 }
-_ALIASES = (key for keys in _NAMES.values() for key in keys)
+_VECTORS = ("own_numbers", "poses", "pose", "fullpose")
+_HANDS = ("left_hand_pose", "right_hand_pose", "hand_pose")
 _PARTS = (*PARTS, "body_pose", *_HANDS)
 _FLAGS = ("flat_hand_mean", "use_pca")
-_KNOWN = ("viewer_pose", "dofs", "dof_names", "scale", *_ALIASES, *_PARTS, *_VECTORS, *_FLAGS)
+_ROTATION_KEYS = (
+    "joint_turns",
+    "joint_names",
+    "joint_rotations",
+    "joint_shifts",
+    "joint_scales",
+    "joint_meanings",
+    "left",
+    "up",
+    "dof_layout",
+    "figure",
+)
+"""Keys of joint rotations; all are ignored if the first is missing."""
+_KNOWN = (
+    *("viewer_pose", "dofs", "dof_names", "scale"),
+    *(key for keys in _NAMES.values() for key in keys),
+    *(*_PARTS, *_VECTORS, *_FLAGS),
+)
 _BESIDES = (
     "figure num_betas mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
 )
-
 # Keys in pose and motion files that are not needed for a pose.
 _NOT_NEEDED = (*GENDERS, *MODELS, *RATES, *_BESIDES.split())
-
 # Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
-_VERSION = 1
+
+_UPS = ("y", "z")  # axes that may be up
+_SHORTEST = 1e-6  # minimum length of a quaternion; a shorter one defines no reliable rotation
+_LONGEST_WORD = 200  # maximum number of characters of a text
+_DEEPEST = 500  # nesting level that is reported for a text nested too deeply for Python
+_MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
 
 
 def read(source: Source) -> PoseRecord:
@@ -119,7 +141,7 @@ def _archive_values(source: Source) -> _NamedValues:
     """Return the values needed for a pose; other keys, which may be large, are not read."""
     archive = archive_of(source)
     values: dict[str, Any] = dict.fromkeys(archive.keys)
-    wanted = (*_KNOWN, *KEYS) if KEYS[0] in archive.keys else _KNOWN
+    wanted = (*_KNOWN, *_ROTATION_KEYS) if _ROTATION_KEYS[0] in archive.keys else _KNOWN
     for key in set(wanted).intersection(archive.keys):
         value = archive.get(key)
         values[key] = value.values() if isinstance(value, Deferred) else value
@@ -176,6 +198,52 @@ def _from_values(named: _NamedValues) -> PoseRecord:
     return record
 
 
+def _first(named: _NamedValues, keys: tuple[str, ...]) -> str:
+    """Return the first key with a value; if there is none, the first key."""
+    return next((key for key in keys if named.values.get(key) is not None), keys[0])
+
+
+def _numbers(named: _NamedValues, key: str) -> Floats | None:
+    """Return the numbers of a key as one row; several frames are refused."""
+    if named.values.get(key) is None:
+        return None
+    array = named.numbers(key)
+    is_per_joint = key in _PER_JOINT and array.shape[-1:] == (3,)
+    frames = math.prod(array.shape[: -2 if is_per_joint else -1])
+    if frames > 1:
+        raise named.fault("F002.pose-frames", key, item=key, found=frames)
+    return array.ravel()
+
+
+def _single(named: _NamedValues, key: str) -> float | None:
+    values = _numbers(named, key)
+    if values is not None and len(values) != 1:
+        raise named.fault("F002.pose-single", key, item=key, found=len(values))
+    return None if values is None else float(values[0])
+
+
+def _flag(named: _NamedValues, key: str) -> bool | None:
+    if named.values.get(key) is None:
+        return None
+    return bool(named.array(key, "bi", Phrase("pose-flag")).all())
+
+
+def _dofs(named: _NamedValues) -> dict[str, float]:
+    given = named.values.get("dofs")
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise named.fault("F002.pose-dofs", "dofs", found=_described(given))
+    dofs: dict[str, float] = {}
+    for name, value in given.items():
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not abs(value) < 1e9:
+            item = printable(name, 60)
+            raise named.fault("F002.pose-dof", "dofs", name, item=item, found=describe(value))
+        dofs[str(name)] = float(value)
+    return dofs
+
+
 def _shape_space(named: _NamedValues) -> ShapeSpace:
     values = named.values
     key = next((key for key in GENDERS if values.get(key) is not None), GENDERS[0])
@@ -203,17 +271,17 @@ def _check_keys(named: _NamedValues, record: PoseRecord) -> None:
     arrays = (record.vector, record.shape, record.expression, record.translation)
     is_empty = not record.dofs and not record.parts and record.scale is None
     if is_empty and all(array is None for array in arrays):
-        known = (*_KNOWN, *_NOT_NEEDED, *KEYS)
+        known = (*_KNOWN, *_NOT_NEEDED, *_ROTATION_KEYS)
         odd = next((key for key in named.values if key not in known), "")
         if not named.values:
             raise named.fault("F002.pose-no-keys")
         where = [odd] if odd else []
-        near = did_you_mean(odd, (*_KNOWN, *KEYS))
+        near = did_you_mean(odd, (*_KNOWN, *_ROTATION_KEYS))
         raise named.fault("F002.pose-keys", *where, keys=list(named.values), near=near)
     used = (
         (*_KNOWN, *_NOT_NEEDED)
         if record.joint_rotations is None
-        else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+        else (*_KNOWN, *_NOT_NEEDED, *_ROTATION_KEYS)
     )
     unread = [key for key in named.values if key not in used]
     if unread:
@@ -222,175 +290,17 @@ def _check_keys(named: _NamedValues, record: PoseRecord) -> None:
 
 def _with_hint(key: str) -> Phrase | str:
     """Return a description of an unknown key, with the most similar known key."""
-    near = [] if key in KEYS else near_names(key, (*_KNOWN, *KEYS))[:1]
+    near = [] if key in _ROTATION_KEYS else near_names(key, (*_KNOWN, *_ROTATION_KEYS))[:1]
     shown = printable(key, 40)
     return Phrase("pose-key-near", name=shown, near=question(near)) if near else shown
 
 
-def _flag(named: _NamedValues, key: str) -> bool | None:
-    if named.values.get(key) is None:
-        return None
-    return bool(named.array(key, "bi", Phrase("pose-flag")).all())
-
-
-def _single(named: _NamedValues, key: str) -> float | None:
-    values = _numbers(named, key)
-    if values is not None and len(values) != 1:
-        raise named.fault("F002.pose-single", key, item=key, found=len(values))
-    return None if values is None else float(values[0])
-
-
-def _first(named: _NamedValues, keys: tuple[str, ...]) -> str:
-    """Return the first key with a value; if there is none, the first key."""
-    return next((key for key in keys if named.values.get(key) is not None), keys[0])
-
-
-def _numbers(named: _NamedValues, key: str) -> Floats | None:
-    """Return the numbers of a key as one row; several frames are refused."""
-    if named.values.get(key) is None:
-        return None
-    array = named.numbers(key)
-    is_per_joint = key in _PER_JOINT and array.shape[-1:] == (3,)
-    frames = math.prod(array.shape[: -2 if is_per_joint else -1])
-    if frames > 1:
-        raise named.fault("F002.pose-frames", key, item=key, found=frames)
-    return array.ravel()
-
-
-def _dofs(named: _NamedValues) -> dict[str, float]:
-    given = named.values.get("dofs")
-    if given is None:
-        return {}
-    if not isinstance(given, Mapping):
-        raise named.fault("F002.pose-dofs", "dofs", found=described(given))
-    dofs: dict[str, float] = {}
-    for name, value in given.items():
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not is_number or not abs(value) < 1e9:
-            item = printable(name, 60)
-            raise named.fault("F002.pose-dof", "dofs", name, item=item, found=describe(value))
-        dofs[str(name)] = float(value)
-    return dofs
-
-
-def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError:
-    """Return the error for a pose that does not match the figure, with its line if known."""
-    line = None
-    if isinstance(problem, PosePartError) and record.line_of is not None:
-        line = record.line_of(problem.part, problem.name)
-    found = problem.diagnostic
-    if found is None:
-        found = Diagnostic("F002.pose-misfit", values={"problem": str(problem)})
-    return FormatError(replace(found, path=path, line=line))
-
-
-def pose_text(record: PoseRecord) -> str:
-    """Return a pose as JSON, one DOF per line."""
-    values = {"viewer_pose": _VERSION, **_named(record)}
-    return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _named(record: PoseRecord) -> dict[str, Any]:
-    named: dict[str, Any] = {"dofs": dict(record.dofs)}
-    space = record.shape_space
-    named |= {key: text for key, text in (("model", space.model), ("gender", space.gender)) if text}
-    for name, array in (
-        ("shape", record.shape),
-        ("expression", record.expression),
-        ("translation", record.translation),
-        ("own_numbers", record.vector),
-    ):
-        if array is not None:
-            named[name] = array.tolist()
-    named |= {key: np.asarray(array).tolist() for key, array in record.parts.items()}
-    for name, single in (
-        ("scale", record.scale),
-        ("flat_hand_mean", record.flat_hands),
-        ("use_pca", record.hand_coefficients),
-    ):
-        if single is not None:
-            named[name] = single
-    return (
-        named if record.joint_rotations is None else named | named_rotations(record.joint_rotations)
-    )
-
-
-def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
-    """Write one pose in the format of the suffix.
-
-    Parameters
-    ----------
-    content : PoseRecord
-        Pose to write; other content is refused.
-    path : str or Path
-        ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector.
-
-    Returns
-    -------
-    list of Diagnostic
-        Empty: the formats store everything that is written to them.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If the content is not a pose.
-    OutputError
-        If the file cannot be written.
-    """
-    suffix = Path(path).suffix.lower()
-    if not isinstance(content, PoseRecord):
-        raise UnsupportedFormatError(f"{suffix} stores a pose, not a figure or clip")
-    if suffix == ".json":
-        save_text(path, pose_text(content))
-    elif suffix == ".txt":
-        if content.vector is None:
-            raise UnsupportedFormatError("the pose has no raw pose vector to write as .txt")
-        save_text(path, "".join(f"{number!r}\n" for number in content.vector.tolist()))
-    else:
-        named = _named(content)
-        dofs = named.pop("dofs")
-        arrays = {key: np.asarray(value) for key, value in named.items()}
-        arrays["dof_names"] = np.array(list(dofs), dtype=np.str_)
-        arrays["dofs"] = np.array(list(dofs.values()))
-        save_arrays(path, arrays)
-    return []
-
-
-KEYS = (
-    "joint_turns",
-    "joint_names",
-    "joint_rotations",
-    "joint_shifts",
-    "joint_scales",
-    "joint_meanings",
-    "left",
-    "up",
-    "dof_layout",
-    "figure",
-)
-"""Keys that are read; all are ignored if the first is missing."""
-_UPS = ("y", "z")
-_SHORTEST = 1e-6  # minimum length of a quaternion; a shorter one defines no reliable rotation
-_LONGEST_WORD = 200  # maximum number of characters of a text
-
-
 def _read_rotations(named: _NamedValues) -> JointRotations | None:
-    """Return the joint rotations in a pose file, or None.
-
-    Parameters
-    ----------
-    named : NamedValues
-        Values of the file by name.
-
-    Raises
-    ------
-    FormatError
-        If the rotations are incomplete or not quaternions.
-    """
+    """Return the joint rotations in a pose file, or None."""
     values = named.values
     if values.get("joint_turns") is None:
         return None
-    names = _names(named)
+    names = _joint_names(named)
     turns = _quaternions(named, "joint_turns", names)
     rotations = values.get("joint_rotations")
     shifts, scales = values.get("joint_shifts"), values.get("joint_scales")
@@ -410,33 +320,33 @@ def _read_rotations(named: _NamedValues) -> JointRotations | None:
     )
 
 
-def named_rotations(rotations: JointRotations) -> dict[str, Any]:
-    """Return joint rotations by their keys in files; rest transforms are omitted."""
-    named: dict[str, Any] = {
-        "figure": printable(rotations.figure, _LONGEST_WORD),
-        "up": rotations.up,
-        "dof_layout": rotations.layout,
-        "joint_names": list(rotations.names),
-        "joint_turns": rotations.relative.tolist(),
-    }
-    if rotations.rotations is not None:
-        named["joint_rotations"] = rotations.rotations.tolist()
-    if rotations.meanings:
-        named["joint_meanings"] = list(rotations.meanings)
-        named["left"] = rotations.left[None].tolist()
-    if rotations.shifts.any():
-        named["joint_shifts"] = rotations.shifts.tolist()
-    if rotations.scales is not None:
-        named["joint_scales"] = rotations.scales.tolist()
-    return named
-
-
-def _names(named: _NamedValues) -> tuple[str, ...]:
+def _joint_names(named: _NamedValues) -> tuple[str, ...]:
     names = named.array("joint_names", "U", Phrase("pose-names"))
     if names.ndim != 1:
         key = "joint_names"
         raise named.fault("F002.pose-list", key, item=key, found=names.ndim)
     return tuple(names.tolist())
+
+
+def _quaternions(named: _NamedValues, key: str, names: tuple[str, ...]) -> Floats:
+    """Return a quaternion per joint, of any length but 0."""
+    rows = _rows(named, key, len(names), 4)
+    short = np.flatnonzero(np.linalg.norm(rows, axis=1) < _SHORTEST)
+    if len(short):
+        row = int(short[0])
+        joint = printable(names[row], 60)
+        raise named.fault("F002.pose-quaternion", key, row, item=key, joint=joint)
+    return rows
+
+
+def _rows(named: _NamedValues, key: str, count: int, width: int) -> Floats:
+    array = named.array(key, "iuf", Phrase("pose-numbers"))
+    if array.shape != (count, width):
+        expected = Phrase("wanted-numbers", shape=(count, width))
+        shape = Phrase("pose-shape", shape=array.shape)
+        found = shape if array.shape else Phrase("pose-one-number")
+        raise named.fault("F002.pose-array", key, item=key, expected=expected, found=found)
+    return named.numbers(key)
 
 
 def _meanings(named: _NamedValues, count: int) -> tuple[str, ...]:
@@ -456,25 +366,11 @@ def _left(named: _NamedValues) -> Floats:
     return found / length if length > _SHORTEST else np.array([1.0, 0.0, 0.0])
 
 
-def _rows(named: _NamedValues, key: str, count: int, width: int) -> Floats:
-    array = named.array(key, "iuf", Phrase("pose-numbers"))
-    if array.shape != (count, width):
-        expected = Phrase("wanted-numbers", shape=(count, width))
-        shape = Phrase("pose-shape", shape=array.shape)
-        found = shape if array.shape else Phrase("pose-one-number")
-        raise named.fault("F002.pose-array", key, item=key, expected=expected, found=found)
-    return named.numbers(key)
-
-
-def _quaternions(named: _NamedValues, key: str, names: tuple[str, ...]) -> Floats:
-    """Return a quaternion per joint, of any length but 0."""
-    rows = _rows(named, key, len(names), 4)
-    short = np.flatnonzero(np.linalg.norm(rows, axis=1) < _SHORTEST)
-    if len(short):
-        row = int(short[0])
-        joint = printable(names[row], 60)
-        raise named.fault("F002.pose-quaternion", key, row, item=key, joint=joint)
-    return rows
+def _up(named: _NamedValues) -> str:
+    word = _word(named, "up", "y")
+    if word not in _UPS:
+        raise named.fault("F002.pose-up", "up", found=printable(word, 20))
+    return word
 
 
 def _word(named: _NamedValues, key: str, default: str) -> str:
@@ -483,17 +379,6 @@ def _word(named: _NamedValues, key: str, default: str) -> str:
     if not isinstance(word, str):
         raise named.fault("F002.pose-word", key, item=key, found=describe(value))
     return word[:_LONGEST_WORD]
-
-
-def _up(named: _NamedValues) -> str:
-    word = _word(named, "up", "y")
-    if word not in _UPS:
-        raise named.fault("F002.pose-up", "up", found=printable(word, 20))
-    return word
-
-
-_DEEPEST = 500  # nesting level that is reported for a text nested too deeply for Python
-_MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -558,7 +443,7 @@ class _NamedValues:
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return array
         path, odd = _odd_value(value, kinds)
-        found = Phrase("pose-ragged") if path is None else described(odd)
+        found = Phrase("pose-ragged") if path is None else _described(odd)
         raise self.fault(
             "F002.pose-array", key, *(path or ()), item=key, expected=expected, found=found
         )
@@ -572,6 +457,38 @@ class _NamedValues:
             found = float(array[tuple(place)])
             raise self.fault("F003.pose-number", key, *place, item=key, found=found)
         return array
+
+
+def _described(value: Any) -> Phrase:
+    """Return a description of a value for messages: an array by its shape and type."""
+    is_array = isinstance(value, np.ndarray)
+    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)
+
+
+def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
+    """Return the indices of the first value of a different kind in nested lists, and the value.
+
+    The indices are None if there is no such value, which means that the lists are ragged.
+    """
+    if not isinstance(value, list | tuple):
+        return (), value
+    waiting: list[tuple[tuple[int, ...], Any]] = [((), value)]
+    while waiting:
+        path, one = waiting.pop()
+        if isinstance(one, list | tuple):
+            waiting += [((*path, index), part) for index, part in reversed([*enumerate(one)])]
+        elif not _is_of(one, kinds):
+            return path, one
+    return None, value
+
+
+def _is_of(one: Any, kinds: str) -> bool:
+    """Return whether a single value is of one of the kinds, given by numpy's letters."""
+    if kinds == "U":
+        return isinstance(one, str)
+    if kinds == "bi":
+        return isinstance(one, int)
+    return isinstance(one, int | float) and not isinstance(one, bool)
 
 
 def _parse_json(source: Source) -> _NamedValues:
@@ -633,33 +550,105 @@ def _byte_offset(text: str, place: int) -> int:
     return len(text[:place].encode("utf-8", "surrogateescape"))
 
 
-def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
-    """Return the indices of the first value of a different kind in nested lists, and the value.
+def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError:
+    """Return the error for a pose that does not match the figure, with its line if known."""
+    line = None
+    if isinstance(problem, PosePartError) and record.line_of is not None:
+        line = record.line_of(problem.part, problem.name)
+    found = problem.diagnostic
+    if found is None:
+        found = Diagnostic("F002.pose-misfit", values={"problem": str(problem)})
+    return FormatError(replace(found, path=path, line=line))
 
-    The indices are None if there is no such value, which means that the lists are ragged.
+
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
+    """Write one pose in the format of the suffix.
+
+    Parameters
+    ----------
+    content : PoseRecord
+        Pose to write; other content is refused.
+    path : str or Path
+        ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the formats store everything that is written to them.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If the content is not a pose.
+    OutputError
+        If the file cannot be written.
     """
-    if not isinstance(value, list | tuple):
-        return (), value
-    waiting: list[tuple[tuple[int, ...], Any]] = [((), value)]
-    while waiting:
-        path, one = waiting.pop()
-        if isinstance(one, list | tuple):
-            waiting += [((*path, index), part) for index, part in reversed([*enumerate(one)])]
-        elif not _is_of(one, kinds):
-            return path, one
-    return None, value
+    suffix = Path(path).suffix.lower()
+    if not isinstance(content, PoseRecord):
+        raise UnsupportedFormatError(f"{suffix} stores a pose, not a figure or clip")
+    if suffix == ".json":
+        save_text(path, pose_text(content))
+    elif suffix == ".txt":
+        if content.vector is None:
+            raise UnsupportedFormatError("the pose has no raw pose vector to write as .txt")
+        save_text(path, "".join(f"{number!r}\n" for number in content.vector.tolist()))
+    else:
+        named = _values_of(content)
+        dofs = named.pop("dofs")
+        arrays = {key: np.asarray(value) for key, value in named.items()}
+        arrays["dof_names"] = np.array(list(dofs), dtype=np.str_)
+        arrays["dofs"] = np.array(list(dofs.values()))
+        save_arrays(path, arrays)
+    return []
 
 
-def _is_of(one: Any, kinds: str) -> bool:
-    """Return whether a single value is of one of the kinds, given by numpy's letters."""
-    if kinds == "U":
-        return isinstance(one, str)
-    if kinds == "bi":
-        return isinstance(one, int)
-    return isinstance(one, int | float) and not isinstance(one, bool)
+def pose_text(record: PoseRecord) -> str:
+    """Return a pose as JSON, one DOF per line."""
+    values = {"viewer_pose": _VERSION, **_values_of(record)}
+    return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def described(value: Any) -> Phrase:
-    """Return a description of a value for messages: an array by its shape and type."""
-    is_array = isinstance(value, np.ndarray)
-    return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)
+def _values_of(record: PoseRecord) -> dict[str, Any]:
+    named: dict[str, Any] = {"dofs": dict(record.dofs)}
+    space = record.shape_space
+    named |= {key: text for key, text in (("model", space.model), ("gender", space.gender)) if text}
+    for name, array in (
+        ("shape", record.shape),
+        ("expression", record.expression),
+        ("translation", record.translation),
+        ("own_numbers", record.vector),
+    ):
+        if array is not None:
+            named[name] = array.tolist()
+    named |= {key: np.asarray(array).tolist() for key, array in record.parts.items()}
+    for name, single in (
+        ("scale", record.scale),
+        ("flat_hand_mean", record.flat_hands),
+        ("use_pca", record.hand_coefficients),
+    ):
+        if single is not None:
+            named[name] = single
+    return (
+        named if record.joint_rotations is None else named | named_rotations(record.joint_rotations)
+    )
+
+
+def named_rotations(rotations: JointRotations) -> dict[str, Any]:
+    """Return joint rotations by their keys in files; rest transforms are omitted."""
+    named: dict[str, Any] = {
+        "figure": printable(rotations.figure, _LONGEST_WORD),
+        "up": rotations.up,
+        "dof_layout": rotations.layout,
+        "joint_names": list(rotations.names),
+        "joint_turns": rotations.relative.tolist(),
+    }
+    if rotations.rotations is not None:
+        named["joint_rotations"] = rotations.rotations.tolist()
+    if rotations.meanings:
+        named["joint_meanings"] = list(rotations.meanings)
+        named["left"] = rotations.left[None].tolist()
+    if rotations.shifts.any():
+        named["joint_shifts"] = rotations.shifts.tolist()
+    if rotations.scales is not None:
+        named["joint_scales"] = rotations.scales.tolist()
+    return named

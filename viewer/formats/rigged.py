@@ -3,7 +3,15 @@
 ::
 
     viewer_rig ()   name ()   up ()   unit ()
-    positions (V, 3) triangles (T, 3) and other arrays of the mesh, see ``_rigged/mesh.py``
+
+    positions (V, 3)   triangles (T, 3)   colors (V, 4)                       at rest
+    uvs (U, 2)   uv_triangles (T, 3)   second_uvs (U, 2)   uvs_2 (U, 2) …
+    part_names (P,)   triangle_parts (T,)
+    material_names (M,)   material_textures (M,)   triangle_materials (T,)
+    image_0 (H, W, 4) …                           base colours
+    material_records (M,)                         JSON: what else differs from the default
+    picture_0 (H, W, 4) …                         images of the other textures, each once
+
     joint_names (J,)   parents (J,)   rest_translations (J, 3)   rest_rotations (J, 4)
     rest_scales (J, 3)   dof_joints (D,)   dof_kinds (D,)   rest_dofs (D,)   dof_limits (D, 2)
     boxes (J, 2, 3)   auxiliary (J,)   skin_starts (V + 1,)   skin_joints (N,)
@@ -14,9 +22,10 @@
     field_0_names (N,) …
 
 Rotations are (x, y, z, w); matrices are for column vectors. ``dof_kinds`` are 0 to 2 for
-translations, 3 to 5 for rotations about x, y, z. Keys that ``viewer rig`` adds for other programs
-are not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``target_scales``,
-``target_place``, ``placement``, ``alignment``.
+translations, 3 to 5 for rotations about x, y, z. Normals are not stored. The rim light and the
+outline of a toon material are objects in its record, with their textures. Keys that ``viewer rig``
+adds for other programs are not read: ``target_dofs``, ``target_translations``,
+``target_rotations``, ``target_scales``, ``target_place``, ``placement``, ``alignment``.
 """
 
 from __future__ import annotations
@@ -53,6 +62,22 @@ from viewer.rig.skin import Skin
 _VERSION = 1
 _MOST_HANDS = 2
 
+_SKELETON = (
+    *("parents", "rest_translations", "rest_rotations", "rest_scales"),
+    *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes", "auxiliary"),
+)
+"""Keys with the same names as in ``Skeleton``."""
+
+_PLAIN_MATERIAL, _PLAIN_TEXTURE = Material(), Texture("")
+# Fields of a material that are objects with textures of their own.
+_LOOKS: dict[str, Callable[..., Any]] = {"rim": Rim, "outline": Outline}
+# All other fields of a material, which JSON can hold.
+_NUMBERS = tuple(
+    field.name for field in fields(Material) if field.name not in ("name", *TEXTURES, *_LOOKS)
+)
+_PLACING = ("channel", "uv_set", "transform", "wrap", "is_smooth", "minification")
+_RECORDS = "material_records"
+
 
 def read(source: Source) -> Figure:
     """Read a rigged mesh.
@@ -84,7 +109,7 @@ def read(source: Source) -> Figure:
         count = skeleton.n_joints
         return Figure(
             name=archive.text("name") or source.path.stem,
-            mesh=_read_mesh(archive),
+            mesh=_mesh(archive),
             skeleton=skeleton,
             skin=_skin(archive, count),
             up="z" if up == "z" else "y",
@@ -100,16 +125,138 @@ def read(source: Source) -> Figure:
         raise source.fault("F002.rig-parts", problem=str(problem)) from None
 
 
-def _numbers(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    return archive.array(key, shape).values()
+def _mesh(archive: Archive) -> Mesh:
+    """Return the mesh of an archive.
+
+    Raises
+    ------
+    FormatError
+        If an array is missing or invalid.
+    RigError
+        If arrays do not match each other.
+    """
+    positions = _finite(archive, "positions", (None, 3), "positions")
+    listed = archive.array("triangles", (None, 3)).values()
+    triangles = corners_of(archive, "triangles", listed, len(positions))
+    positions = neutral_positions(positions, triangles)
+    materials = _materials(archive)
+    return Mesh(
+        positions=positions,
+        normals=vertex_normals(positions, triangles),
+        triangles=triangles,
+        uvs=_finite(archive, "uvs", (None, 2)) if archive.has("uvs") else None,
+        uv_triangles=_optional(archive, "uv_triangles", (None, 3)),
+        other_uvs=tuple(_finite(archive, key, (None, 2)) for key in _present_uvs(archive)),
+        colors=_finite(archive, "colors", (None, 4)) if archive.has("colors") else None,
+        parts=_texts(archive, "part_names") if archive.has("part_names") else (),
+        triangle_parts=_optional(archive, "triangle_parts", (None,)),
+        materials=materials,
+        triangle_materials=_optional(archive, "triangle_materials", (None,)) if materials else None,
+    )
 
 
-def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Part = "") -> Floats:
-    return finite(archive, key, _numbers(archive, key, shape), part)
+def _present_uvs(archive: Archive) -> list[str]:
+    """Return the keys of the sets of texture coordinates after the first that an archive has."""
+    return next(
+        _more_uvs(number) for number in count() if not archive.has(_more_uvs(number + 1)[-1])
+    )
+
+
+def _more_uvs(number: int) -> list[str]:
+    """Return the keys of the sets of texture coordinates after the first."""
+    return ["second_uvs", *(f"uvs_{index}" for index in range(2, number + 1))][:number]
+
+
+def _materials(archive: Archive) -> tuple[Material, ...]:
+    """Return the materials of an archive.
+
+    Raises
+    ------
+    FormatError
+        If arrays do not match each other, or a record does not describe a material.
+    """
+    if not archive.has("material_names"):
+        return ()
+    names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
+    if len(names) != len(textures):
+        raise archive.fault(
+            "F002.value", item="material_textures", expected=len(names), found=len(textures)
+        )
+    materials = []
+    for index, (name, texture) in enumerate(zip(names, textures, strict=True)):
+        image = _picture(archive, f"image_{index}")
+        has_texture = texture or image is not None
+        materials.append(Material(name, Texture(texture, image) if has_texture else None))
+    if not archive.has(_RECORDS):
+        return tuple(materials)
+    records = _texts(archive, _RECORDS)
+    if len(records) != len(names):
+        raise archive.fault("F002.value", item=_RECORDS, expected=len(names), found=len(records))
+    pictures: dict[str, Bytes | None] = {}
+    return tuple(
+        _completed(archive, material, records[index], index, pictures)
+        for index, material in enumerate(materials)
+    )
+
+
+def _completed(
+    archive: Archive,
+    material: Material,
+    text: str,
+    index: int,
+    pictures: dict[str, Bytes | None],
+) -> Material:
+    """Return a material with the fields of its record."""
+    try:
+        record = json.loads(text)
+        found = {name: _tuples(record.pop(name)) for name in _NUMBERS if name in record}
+        for name in TEXTURES:
+            if name not in record:
+                continue
+            base = material.base_texture if name == "base_texture" else None
+            found[name] = _placed(archive, base or Texture(""), record.pop(name), pictures)
+        for name, kind in _LOOKS.items():
+            if name in record:
+                found[name] = kind(
+                    **{
+                        key: _placed(archive, Texture(""), value, pictures)
+                        if isinstance(value, dict)
+                        else _tuples(value)
+                        for key, value in record.pop(name).items()
+                    }
+                )
+        return replace(material, **found, **record)
+    except (ValueError, TypeError, AttributeError, RecursionError, RigError) as problem:
+        raise archive.fault(
+            "F002.rig-material", item=_RECORDS, index=index, problem=str(problem)[:200]
+        ) from None
+
+
+def _placed(
+    archive: Archive, texture: Texture, record: Any, pictures: dict[str, Bytes | None]
+) -> Texture:
+    """Return a texture with the fields of its record."""
+    placing = {part: _tuples(value) for part, value in record.items()}
+    number = placing.pop("picture", None)
+    if number is not None:
+        key = f"picture_{int(number)}"
+        if key not in pictures:
+            pictures[key] = _picture(archive, key)
+        placing["image"] = pictures[key]
+    return replace(texture, **placing)
+
+
+def _tuples(value: Any) -> Any:
+    """Return a JSON value with tuples in place of lists."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _picture(archive: Archive, key: str) -> Bytes | None:
+    return archive.array(key, (None, None, 4)).values() if archive.has(key) else None
 
 
 def _skeleton(archive: Archive) -> Skeleton:
-    count = len(names := texts(archive, "joint_names"))
+    count = len(names := _texts(archive, "joint_names"))
     n_dofs = len(_numbers(archive, "dof_joints", (None,)))
     return Skeleton(
         names=names,
@@ -122,7 +269,7 @@ def _skeleton(archive: Archive) -> Skeleton:
         rest_dofs=_finite(archive, "rest_dofs", (n_dofs,)),
         dof_limits=_limits(archive, n_dofs),
         boxes=_finite(archive, "boxes", (count, 2, 3)) if archive.has("boxes") else None,
-        auxiliary=_numbers(archive, "auxiliary", (count,)) if archive.has("auxiliary") else None,
+        auxiliary=_optional(archive, "auxiliary", (count,)),
     )
 
 
@@ -249,10 +396,28 @@ def _fields(archive: Archive) -> tuple[VertexField, ...]:
                 title=archive.text(f"{key}_title"),
                 values=_finite(archive, f"{key}_values", (None,)),
                 unit=archive.text(f"{key}_unit"),
-                names=texts(archive, f"{key}_names") if archive.has(f"{key}_names") else (),
+                names=_texts(archive, f"{key}_names") if archive.has(f"{key}_names") else (),
             )
         )
     return tuple(fields)
+
+
+def _numbers(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    return archive.array(key, shape).values()
+
+
+def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Part = "") -> Floats:
+    return finite(archive, key, _numbers(archive, key, shape), part)
+
+
+def _optional(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any] | None:
+    """Return an array; None if the archive does not have it."""
+    return archive.array(key, shape).values() if archive.has(key) else None
+
+
+def _texts(archive: Archive, key: str) -> tuple[str, ...]:
+    """Return an array of strings."""
+    return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))
 
 
 def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | None = None) -> None:
@@ -312,44 +477,6 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
     return {key: array for key, array in arrays.items() if array is not None}
 
 
-_SKELETON = (
-    *("parents", "rest_translations", "rest_rotations", "rest_scales"),
-    *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes", "auxiliary"),
-)
-"""Keys with the same names as in ``Skeleton``."""
-
-
-def _field_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {}
-    for index, field in enumerate(figure.fields):
-        for key in ("name", "title", "unit"):
-            arrays[f"field_{index}_{key}"] = np.array(getattr(field, key))
-        arrays[f"field_{index}_values"] = field.values
-        if field.names:
-            arrays[f"field_{index}_names"] = np.array(field.names)
-    return arrays
-
-
-def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[Any]]:
-    if layout is None:
-        return {}
-    return {
-        "layout_starts": layout.starts,
-        "layout_is_euler": layout.is_euler,
-        "layout_counts": np.array([layout.n_numbers, layout.translation, layout.scale]),
-    }
-
-
-# Meshes of rigged figures as arrays of an ``.npz``.
-#
-# ::
-#
-#     positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
-#     second_uvs (U, 2)   uvs_2 (U, 2) …                           other texture coordinates
-#     colors (V, 4)   part_names (P,)   triangle_parts (T,)
-#     triangle_materials (T,)   and the materials, see ``materials.py``
-
-
 def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
     """Return the arrays of a mesh with its materials; normals are not stored."""
     arrays: dict[str, NDArray[Any] | None] = {
@@ -364,79 +491,6 @@ def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
     if mesh.parts:
         found |= {"part_names": np.array(mesh.parts), "triangle_parts": mesh.part_indices}
     return found | _material_arrays(mesh)
-
-
-def _read_mesh(archive: Archive) -> Mesh:
-    """Return the mesh of an archive.
-
-    Raises
-    ------
-    FormatError
-        If an array is missing or invalid.
-    RigError
-        If arrays do not match each other.
-    """
-    positions = _finite_array(archive, "positions", (None, 3), "positions")
-    listed = archive.array("triangles", (None, 3)).values()
-    triangles = corners_of(archive, "triangles", listed, len(positions))
-    positions = neutral_positions(positions, triangles)
-    materials = _read_materials(archive)
-    return Mesh(
-        positions=positions,
-        normals=vertex_normals(positions, triangles),
-        triangles=triangles,
-        uvs=_finite_array(archive, "uvs", (None, 2)) if archive.has("uvs") else None,
-        uv_triangles=_optional(archive, "uv_triangles", (None, 3)),
-        other_uvs=tuple(_finite_array(archive, key, (None, 2)) for key in _present_uvs(archive)),
-        colors=_finite_array(archive, "colors", (None, 4)) if archive.has("colors") else None,
-        parts=texts(archive, "part_names") if archive.has("part_names") else (),
-        triangle_parts=_optional(archive, "triangle_parts", (None,)),
-        materials=materials,
-        triangle_materials=_optional(archive, "triangle_materials", (None,)) if materials else None,
-    )
-
-
-def _more_uvs(number: int) -> list[str]:
-    """Return the keys of the sets of texture coordinates after the first."""
-    return ["second_uvs", *(f"uvs_{index}" for index in range(2, number + 1))][:number]
-
-
-def _present_uvs(archive: Archive) -> list[str]:
-    """Return the keys of the sets of texture coordinates after the first that an archive has."""
-    return next(
-        _more_uvs(number) for number in count() if not archive.has(_more_uvs(number + 1)[-1])
-    )
-
-
-def _finite_array(
-    archive: Archive, key: str, shape: tuple[int | None, ...], part: Part = ""
-) -> Floats:
-    return finite(archive, key, archive.array(key, shape).values(), part)
-
-
-def _optional(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any] | None:
-    """Return an array; None if the archive does not have it."""
-    return archive.array(key, shape).values() if archive.has(key) else None
-
-
-# Materials of rigged meshes as arrays of an ``.npz``.
-#
-# ::
-#
-#     material_names (M,)   material_textures (M,)   image_0 (H, W, 4) …            base colours
-#     material_records (M,): JSON, other fields of each material that differ from the default
-#     picture_0 (H, W, 4) …                          images of the other textures, without
-#     duplicates
-#
-# The rim light and the outline of a toon material are objects in its record, with their textures.
-
-_PLAIN_MATERIAL, _PLAIN_TEXTURE = Material(), Texture("")
-_LOOKS: dict[str, Callable[..., Any]] = {"rim": Rim, "outline": Outline}
-_NUMBERS = tuple(
-    field.name for field in fields(Material) if field.name not in ("name", *TEXTURES, *_LOOKS)
-)
-_PLACING = ("channel", "uv_set", "transform", "wrap", "is_smooth", "minification")
-_RECORDS = "material_records"
 
 
 def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
@@ -498,94 +552,22 @@ def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) ->
     return placing
 
 
-def _read_materials(archive: Archive) -> tuple[Material, ...]:
-    """Return the materials of an archive.
-
-    Raises
-    ------
-    FormatError
-        If arrays do not match each other, or a record does not describe a material.
-    """
-    if not archive.has("material_names"):
-        return ()
-    names, textures = texts(archive, "material_names"), texts(archive, "material_textures")
-    if len(names) != len(textures):
-        raise archive.fault(
-            "F002.value", item="material_textures", expected=len(names), found=len(textures)
-        )
-    materials = []
-    for index, (name, texture) in enumerate(zip(names, textures, strict=True)):
-        image = _picture(archive, f"image_{index}")
-        has_texture = texture or image is not None
-        materials.append(Material(name, Texture(texture, image) if has_texture else None))
-    if not archive.has(_RECORDS):
-        return tuple(materials)
-    records = texts(archive, _RECORDS)
-    if len(records) != len(names):
-        raise archive.fault("F002.value", item=_RECORDS, expected=len(names), found=len(records))
-    pictures: dict[str, Bytes | None] = {}
-    return tuple(
-        _completed(archive, material, records[index], index, pictures)
-        for index, material in enumerate(materials)
-    )
+def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[Any]]:
+    if layout is None:
+        return {}
+    return {
+        "layout_starts": layout.starts,
+        "layout_is_euler": layout.is_euler,
+        "layout_counts": np.array([layout.n_numbers, layout.translation, layout.scale]),
+    }
 
 
-def _completed(
-    archive: Archive,
-    material: Material,
-    text: str,
-    index: int,
-    pictures: dict[str, Bytes | None],
-) -> Material:
-    """Return a material with the fields of its record."""
-    try:
-        record = json.loads(text)
-        found = {name: _tuples(record.pop(name)) for name in _NUMBERS if name in record}
-        for name in TEXTURES:
-            if name not in record:
-                continue
-            base = material.base_texture if name == "base_texture" else None
-            found[name] = _placed(archive, base or Texture(""), record.pop(name), pictures)
-        for name, kind in _LOOKS.items():
-            if name in record:
-                found[name] = kind(
-                    **{
-                        key: _placed(archive, Texture(""), value, pictures)
-                        if isinstance(value, dict)
-                        else _tuples(value)
-                        for key, value in record.pop(name).items()
-                    }
-                )
-        return replace(material, **found, **record)
-    except (ValueError, TypeError, AttributeError, RecursionError, RigError) as problem:
-        raise archive.fault(
-            "F002.rig-material", item=_RECORDS, index=index, problem=str(problem)[:200]
-        ) from None
-
-
-def _placed(
-    archive: Archive, texture: Texture, record: Any, pictures: dict[str, Bytes | None]
-) -> Texture:
-    """Return a texture with the fields of its record."""
-    placing = {part: _tuples(value) for part, value in record.items()}
-    number = placing.pop("picture", None)
-    if number is not None:
-        key = f"picture_{int(number)}"
-        if key not in pictures:
-            pictures[key] = _picture(archive, key)
-        placing["image"] = pictures[key]
-    return replace(texture, **placing)
-
-
-def _tuples(value: Any) -> Any:
-    """Return a JSON value with tuples in place of lists."""
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
-
-
-def _picture(archive: Archive, key: str) -> Bytes | None:
-    return archive.array(key, (None, None, 4)).values() if archive.has(key) else None
-
-
-def texts(archive: Archive, key: str) -> tuple[str, ...]:
-    """Return an array of strings."""
-    return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))
+def _field_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {}
+    for index, field in enumerate(figure.fields):
+        for key in ("name", "title", "unit"):
+            arrays[f"field_{index}_{key}"] = np.array(getattr(field, key))
+        arrays[f"field_{index}_values"] = field.values
+        if field.names:
+            arrays[f"field_{index}_names"] = np.array(field.names)
+    return arrays

@@ -33,9 +33,14 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
-_VECTORS = {b"offset": 3, b"boxmin": 3, b"boxmax": 3, b"pose": 3}
-_LIMITS = {b"rotxlimit": 0, b"rotylimit": 1, b"rotzlimit": 2}
 _JOINT = b"balljoint"
+_VECTORS = (b"offset", b"boxmin", b"boxmax", b"pose")
+_LIMITS = {b"rotxlimit": 0, b"rotylimit": 1, b"rotzlimit": 2}
+KEYWORDS = frozenset((*_VECTORS, *_LIMITS, _JOINT))
+"""Words that begin an item of a joint, and cannot be part of a name."""
+_UNLIMITED = 100_000.0
+"""CSE169's value for "no limit", which some files contain."""
+_DEEPEST = 32  # maximum number of tabs at the beginning of a line
 _Word = re.Match[bytes]
 
 
@@ -80,21 +85,6 @@ def read(source: Source) -> Figure:
     source.remember("joints", lambda joint: joints[joint].start)
     skeleton, dofs = _skeleton(source, joints)
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
-
-
-def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
-    """Return a message about DOFs of the file's pose that were clamped to their limits."""
-    moved = np.flatnonzero(skeleton.rest_dofs != dofs)
-    if len(moved) == 0:
-        return ()
-    from viewer.rig.posing.dof_text import beyond_text
-
-    first = int(moved[0])
-    beyond = beyond_text(skeleton, first, float(dofs[first]))
-    values = {"n": len(moved), "dof": beyond}
-    joints = np.unique(skeleton.dof_joints[moved])
-    clamped = Diagnostic("S004.clamped", part="joints", places=joints, values=values)
-    return (("pose outside limits", clamped),)
 
 
 class _Parser:
@@ -328,7 +318,19 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
         limits[wrong] = -np.inf, np.inf
 
 
-_DEEPEST = 32  # maximum number of tabs at the beginning of a line
+def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
+    """Return a message about DOFs of the file's pose that were clamped to their limits."""
+    moved = np.flatnonzero(skeleton.rest_dofs != dofs)
+    if len(moved) == 0:
+        return ()
+    from viewer.rig.posing.dof_text import beyond_text
+
+    first = int(moved[0])
+    beyond = beyond_text(skeleton, first, float(dofs[first]))
+    values = {"n": len(moved), "dof": beyond}
+    joints = np.unique(skeleton.dof_joints[moved])
+    clamped = Diagnostic("S004.clamped", part="joints", places=joints, values=values)
+    return (("pose outside limits", clamped),)
 
 
 def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
@@ -431,25 +433,17 @@ def _indent(open_joints: list[int]) -> str:
 
 
 def _items(skeleton: Skeleton, joint: int) -> list[str]:
-    items = [f"offset {_numbers(skeleton.rest_translations[joint])}"]
+    items = [f"offset {_number_text(skeleton.rest_translations[joint])}"]
     if skeleton.boxes is not None:
         low, high = skeleton.boxes[joint]
-        items += [f"boxmin {_numbers(low)}", f"boxmax {_numbers(high)}"]
+        items += [f"boxmin {_number_text(low)}", f"boxmax {_number_text(high)}"]
     rows = slice(3 + 3 * joint, 6 + 3 * joint)
     for axis, limits in zip("xyz", skeleton.dof_limits[rows], strict=True):
         if np.isfinite(limits).any():
             written = np.nan_to_num(limits, posinf=_UNLIMITED, neginf=-_UNLIMITED)
-            items.append(f"rot{axis}limit {_numbers(written)}")
-    return [*items, f"pose {_numbers(skeleton.rest_dofs[rows])}"]
+            items.append(f"rot{axis}limit {_number_text(written)}")
+    return [*items, f"pose {_number_text(skeleton.rest_dofs[rows])}"]
 
 
-def _numbers(values: Floats) -> str:
+def _number_text(values: Floats) -> str:
     return " ".join(map(repr, values.tolist()))
-
-
-_UNLIMITED = 100_000.0
-"""CSE169's value for "no limit", which some files contain."""
-KEYWORDS = frozenset(
-    (b"offset", b"boxmin", b"boxmax", b"pose", b"rotxlimit", b"rotylimit", b"rotzlimit")
-) | {b"balljoint"}
-"""Words that begin an item of a joint, and cannot be part of a name."""

@@ -59,7 +59,7 @@ class Sparse:
 
     Raises
     ------
-    MisfitError
+    InvalidValueError
         If the parts are inconsistent.
     """
 
@@ -496,7 +496,7 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
 
     Raises
     ------
-    MisfitError
+    InvalidValueError
         If an element of a string array is not a valid character.
     """
     if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:

@@ -523,7 +523,7 @@ def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], ob
 
     Raises
     ------
-    MisfitError
+    InvalidValueError
         If the wrapper is not one that joblib writes.
     FormatError
         If the file has fewer bytes than the wrapper declares.

@@ -84,7 +84,7 @@ def find(module: str, name: str) -> StandIn:
 
     Raises
     ------
-    MisfitError
+    InvalidValueError
         If the pair is not in the table.
     """
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
@@ -152,7 +152,7 @@ def as_key(value: object) -> str | bytes | int:
 
     Raises
     ------
-    MisfitError
+    InvalidValueError
         If it has another type. Objects are refused so that their hashes are never computed; large
         numbers are refused because they could be chosen so that all hashes collide.
     """

@@ -167,7 +167,7 @@ class Array:
 
         Raises
         ------
-        MisfitError
+        InvalidValueError
             If the sizes differ.
         """
         found = dtype.dtype()
@@ -198,7 +198,7 @@ class Array:
 
         Raises
         ------
-        MisfitError
+        InvalidValueError
             If a string contains invalid code points.
         """
         if self.payload is None or self.dtype is None:
