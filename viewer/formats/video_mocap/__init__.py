@@ -1,7 +1,7 @@
 """Reader of results of video motion capture: people reconstructed from a video.
 
-Each tool writes different files: see the modules in ``_video_mocap/``. They are
-recognised by their contents. People keep their IDs and the frames in which they are visible.
+Each tool writes different files, which are recognised by their contents: see the modules of this
+folder. People keep their IDs and the frames in which they are visible.
 """
 
 from __future__ import annotations

@@ -1,25 +1,11 @@
-"""SMPL parameters in dicts of any layout, found by the usual spellings of their keys.
+"""SMPL parameters in dicts of any layout: whose they are, and in which frame.
 
-::
-
-    poses      poses, pose, rotmat … of all joints; or global_orient … and body_pose …
-    places     trans, transl … ; cam_t … in the space of a camera, where y points down
-    shape      betas, shape …
-    frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
-    person     person_id, track_id, id …, one number or name, or one for each row
-    gender     gender, of the body model; one, or one for each row
-    model      model_type, model …: SMPL, SMPL+H or SMPL-X
-    rate       fps, frame_rate, frameRate …, frames per second
-    scale      smpl_scaling, by which places are divided
-
-Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
-except the poses may also stand in one of the dicts around them, once, or as a list or dict with one
-value for each dict. Gender, model and rate may also stand in a dict beside the parameters. Several
-rows with the same frame are several people. Poses may also be a list with the rows of each frame or
-person, or an array with an axis more than usual; other lists and arrays of this length then belong
-to the frames or people too. In a list of frames, None, an empty list, no rows and a dict without
-poses are frames without people. AMASS files and single poses have other spellings and are read by
-``amass.py`` and ``pose.py``.
+``parameter_layout.py`` finds the dicts, and which of their keys hold what. A dict has all frames of
+one or several people, or one frame of one or several people. Several rows with the same frame are
+several people. In a list of frames, None, an empty list, no rows and a dict without poses are
+frames without people. What the file does not tell, such as which of two lists has the people, is
+derived from the values, and a note says what was assumed. AMASS files and single poses have other
+spellings and are read by ``amass.py`` and ``pose.py``.
 """
 
 from __future__ import annotations
@@ -27,7 +13,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,148 +22,78 @@ from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
-from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in, scale_in
+from viewer.formats._body_keys import gender_in, model_in, scale_in
 from viewer.formats._frame_gaps import frame_spans
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import (
-    Form,
     Frames,
     RowBudget,
     first_rows,
-    form_of,
     frames_of,
     person_number,
     places,
     rotation_vectors,
     rows,
-    shape_form,
+)
+from viewer.formats.video_mocap.parameter_layout import (
+    ASSUMED,
+    COST,
+    JOINT_NAMES,
+    OF_PEOPLE,
+    ParameterDict,
+    ParameterLayout,
+    StatedValue,
+    identities,
+    parameter_dicts,
+    parameter_layout,
+    with_facts,
 )
 from viewer.formats.video_mocap.results import Results, Track
 from viewer.phrases import counted, printable
 from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.bodies.smpl_family import FAMILY, gender_of, members_by_numbers
+from viewer.rig.bodies.smpl_family import FAMILY, gender_of
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
 
 _AMASS = {
     *("poses", "pose", "fullpose", "smpl_poses"),
     *("root_orient", "global_orient", "pose_body", "body_pose"),
 }
-_WHOLE = (
-    *("pose_world", "poses_world", "poses", "pose", "fullpose", "full_pose", "smpl_poses"),
-    *("smpl_pose", "thetas", "theta", "pred_thetas", "smpl_thetas"),
-    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "body_rotmat", "bodyPose"),
-)
-_ROOTS = (
-    *("global_orient", "root_orient", "pred_global_orient", "orient", "root_pose", "root_rot"),
-    *("smplx_root_pose", "global_rot", "poses_root"),
-)
-_BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose", "poses_body")
-_WORLD = (
-    *("trans_world", "trans", "transl", "translation", "smpl_trans", "root_trans"),
-    *("smplx_transl", "Th", "bodyTranslation"),
-)
-_CAMERA = (
-    *("cam_t", "pred_cam_t", "cam_trans", "camera_translation", "pred_trans", "pred_cam_trans"),
-    *("trans_cam", "cam_transl", "transl_cam", "trans_full", "global_t"),
-)
-_SHAPES = (
-    *("betas", "shape", "shapes", "pred_betas", "pred_shape", "beta", "smpl_shape", "smplx_shape"),
-    *("shapeParameters",),
-)
-_FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
 _OF_SMPLX = ("jaw_pose", "leye_pose", "reye_pose", "pose_jaw", "pose_eye", "expression")
 _BODY_JOINTS = 22  # of a body without hands, which SMPL, SMPL+H and SMPL-X share
-_COUNTS = ("frames", "frame_ids")  # a single number there is that of all frames
-_SCALES = ("smpl_scaling",)
-_DETECTIONS = "detection_all"
-_PEOPLE = (
-    *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
-    *("person_ids", "track_ids", "tracklet_ids", "pids", "ids"),
-)
-
-# Kinds of archives of the people in an array, whose axis other values tell, or nothing does.
-_OF_PEOPLE = _TOLD, _ASSUMED = "people", "assumed people"
-_EACH = (*_PEOPLE, *GENDERS, *_SHAPES)  # keys with one value for each person
-_NAMES = {len(names): names for names in members_by_numbers().values()}
-_LARGEST = 1 << 30  # maximum number of a frame or person
-_DEEPEST = 3  # maximum depth of dicts inside dicts; lists between them do not count
+_LISTED = 12  # maximum number of ignored keys that are listed
 _NAMED_PERSON = re.compile(r"(?:subj|subject|person|people|pid|id|track|tracklet)[_ -]?(\d{1,9})")
 _NAMED_FRAME = re.compile(r"\D*(?:.*\D)?(\d{1,9})(?:\.[A-Za-z]\w*)?")
-_COST = 20  # number of frames that take about as long to read as one dict takes to inspect
 _LOOKED_AT = 5000  # number of dicts of which at least one must be recognised
 
 # Maximum number of frames of a numbered dict: this many for every item, plus a constant.
 _MOST_HOLES, _FEW = 10, 1000
-_STEADIER = (
-    0.1  # ratio of variances of one person and of several; they have the same number of rows
-)
-_LISTED = 12  # maximum number of ignored keys that are listed
+# Ratio of variances of one person and of several; they have the same number of rows.
+_STEADIER = 0.1
+_Person = int | str | tuple[int, ...]
+"""A person of a row: an ID or name of the file, or the index of a dict and the person in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Value:
-    """A value of a dict, or of one around it; ``item``: only this item of the value."""
+class _Rows:
+    """A track of several people: the frame and person of each row."""
 
-    archive: Archive
-    key: str
-    item: int | None = None
-    within: str = ""
-    """The key of the dict that has the value, if neither has parameters."""
-
-    @property
-    def title(self) -> str:
-        return f"{self.within}.{self.key}" if self.within else self.key
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Layout:
-    """Keys of one dict of parameters, and the forms of its rotations."""
-
-    poses: tuple[tuple[str, Form], ...]
-    place: _Value | None
-    shape: _Value | None
-    frames: _Value | None  # a number for each of several rows
-    frame: _Value | None  # one number for all rows
-    person: _Value | None
-    rate: _Value | None
-    gender: _Value | None
-    model: _Value | None
-    scale: _Value | None
-
-    @property
-    def count(self) -> int:
-        """Number of rows."""
-        return self.poses[0][1].n_frames
-
-    @property
-    def others(self) -> list[_Value]:
-        """Values other than the poses."""
-        frames = self.frames or self.frame
-        found = (self.place, self.shape, frames, self.person, self.rate)
-        return [each for each in (*found, self.gender, self.model, self.scale) if each is not None]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """A dict of parameters; its path from the outermost, and the dicts and lists on this path."""
-
-    path: tuple[str, ...]
-    around: tuple[Archive, ...]
-    archive: Archive
-    layout: _Layout
+    track: Track
+    frames: Frames
+    persons: Sequence[_Person]
+    genders: Sequence[str]
 
 
 def recognises(archive: Archive) -> bool:
     """Return whether an archive has SMPL parameters in a layout other than AMASS's."""
-    layout = _layout(archive)
+    layout = parameter_layout(archive)
     if layout is None:
-        budget = RowBudget(archive, _COST * _LOOKED_AT)
+        budget = RowBudget(archive, COST * _LOOKED_AT)
         try:
-            return next(_found(archive, budget), None) is not None
+            return next(parameter_dicts(archive, budget), None) is not None
         except FormatError:  # there are thousands of dicts without poses
             return False
     is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
-    is_plain &= layout.place is None or layout.place.key not in _CAMERA
+    is_plain &= not layout.is_in_camera
     has_people = layout.person is not None and layout.count > 1
     is_numbered = layout.frames is not None or (layout.frame is not None and layout.count == 1)
     return not is_plain or is_numbered or has_people
@@ -185,12 +101,12 @@ def recognises(archive: Archive) -> bool:
 
 def read(source: Source, archive: Archive) -> Results:
     """Read all people."""
-    found = _with_facts([*_found(archive)])
+    found = with_facts([*parameter_dicts(archive)])
     layout = found[0].layout
     people, span = _people(source, found)
-    is_camera = layout.place is not None and layout.place.key in _CAMERA
+    is_camera = layout.is_in_camera
     space = "camera" if is_camera else "world"
-    if any(scope.kind == _ASSUMED for one in found for scope in one.around):
+    if any(scope.kind == ASSUMED for one in found for scope in one.around):
         source.warn("F007.video-axes", people=len(found), frames=layout.count)
     if layout.place is None:
         source.warn("F007.motion-place")
@@ -225,7 +141,7 @@ def read(source: Source, archive: Archive) -> Results:
     )
 
 
-def _rate(source: Source, found: list[_Found]) -> float | None:
+def _rate(source: Source, found: list[ParameterDict]) -> float | None:
     """Return the first frame rate; note values that differ from it, or are not frame rates."""
     values = [one.layout.rate for one in found if one.layout.rate is not None]
     rates: list[float] = []
@@ -255,359 +171,7 @@ def _number(value: Value) -> float | None:
         return None
 
 
-def _layout(
-    archive: Archive, around: Sequence[Archive] = (), path: Sequence[str] = ()
-) -> _Layout | None:
-    """Return the layout of a dict inside others; None if it has no poses."""
-    whole = _first_form(archive, _WHOLE, tuple(_NAMES))
-    if whole is not None:
-        poses: tuple[tuple[str, Form], ...] = (whole,)
-    else:
-        root, body = _first_form(archive, _ROOTS, (1,)), _first_form(archive, _BODIES, (21, 23))
-        if root is None or body is None:
-            return None
-        count = body[1].n_frames
-        if root[1].n_frames != count and archive.shape(root[0]) == (count, 3):
-            root = root[0], Form(count, 1, 3)  # three frames, not one matrix
-        if root[1].n_frames != count:
-            return None
-        poses = (root, body)
-    count = poses[0][1].n_frames
-    scopes = (archive, *reversed(around))
-
-    def first(keys: Sequence[str], fits: Callable[[Archive, str], bool]) -> _Value | None:
-        return next(
-            (
-                _Value(scope, key)
-                for scope in scopes
-                for key in keys
-                if scope.has(key) and key not in path and fits(scope, key)
-            ),
-            None,
-        )
-
-    def is_single(scope: Archive, key: str) -> bool:
-        return scope.shape(key) in ((), (1,)) and _identity(scope.get(key)) is not None
-
-    def of_item(keys: Sequence[str]) -> _Value | None:
-        """Find a list with one value for each item of a list, or of a dict, on the path."""
-        for level in range(len(around) - 1, 0, -1):
-            items, beside = around[level].keys, around[level - 1]
-            for key in keys:
-                if not beside.has(key) or key in path:
-                    continue
-                is_free = not archive.has(key) or is_single(archive, key)
-                if is_free and _length(beside, key) == len(items):
-                    return _Value(beside, key, items.index(path[level]))
-                named = beside.inside(key)
-                if named is not None and not named.is_list and named.has(path[level]):
-                    return _Value(named, path[level], within=key)
-        return None
-
-    frames = frame = None
-    if count > 1:
-        # A number in the dict itself is that of all rows, whatever stands around it.
-        frames = first(
-            _FRAMES,
-            lambda scope, key: (
-                scope.shape(key) == (count,) and (scope is archive or not archive.has(key))
-            ),
-        )
-        frames = frames or first(
-            (_DETECTIONS,), lambda scope, key: scope.shape(key)[:1] == (count,)
-        )
-    if frames is None:
-        single = _FRAMES if count == 1 else [key for key in _FRAMES if key not in _COUNTS]
-        frame = first(single, is_single) or of_item(_FRAMES)
-    person = of_item(_PEOPLE) or first(
-        _PEOPLE, lambda scope, key: count > 1 and _length(scope, key) == count
-    )
-    person = person or first(_PEOPLE, is_single)
-    place = first((*_WORLD, *_CAMERA), lambda scope, key: _is_place(scope.shape(key), count))
-    shape = first(_SHAPES, lambda scope, key: _is_shape(scope.shape(key), count))
-    return _Layout(
-        poses,
-        place,
-        shape,
-        frames,
-        frame,
-        person,
-        rate=first(RATES, _is_number),
-        gender=of_item(GENDERS) or first(GENDERS, lambda scope, key: _is_gender(scope, key, count)),
-        model=first(MODELS, _is_model),
-        scale=first(_SCALES, _is_number),
-    )
-
-
-def _is_number(scope: Archive, key: str) -> bool:
-    return scope.shape(key) in ((), (1,))
-
-
-def _is_model(scope: Archive, key: str) -> bool:
-    return bool(model_in([scope.objects(key)]))
-
-
-def _is_gender(scope: Archive, key: str, count: int) -> bool:
-    """Return whether a value states one gender, or that of each row."""
-    said = texts_in(scope.objects(key))
-    is_each = len(said) == count and all(map(gender_of, said))
-    return is_each or bool(gender_in(scope.objects(key))[0])
-
-
-def _with_facts(found: list[_Found]) -> list[_Found]:
-    """Return dicts with the gender, model and rate that a dict beside them states.
-
-    Such a dict describes the parameters, as "meta" or "info", and has none itself.
-    """
-    on_path = {id(scope) for one in found for scope in (one.archive, *one.around)}
-    described: dict[int, list[tuple[str, Archive]]] = {}
-
-    def facts(scope: Archive) -> list[tuple[str, Archive]]:
-        if id(scope) not in described:
-            known = described[id(scope)] = []
-            for key in () if scope.is_list else scope.keys:
-                try:
-                    inner = scope.inside(key)
-                except FormatError:  # its values are not needed
-                    continue
-                if inner is not None and not inner.is_list and id(inner) not in on_path:
-                    known.append((key, inner))
-        return described[id(scope)]
-
-    def first(
-        one: _Found, keys: Sequence[str], fits: Callable[[Archive, str], bool]
-    ) -> _Value | None:
-        for scope in reversed(one.around):
-            for name, inner in facts(scope):
-                for key in keys:
-                    if inner.has(key) and fits(inner, key):
-                        return _Value(inner, key, within=name)
-        return None
-
-    def completed(one: _Found) -> _Found:
-        layout = one.layout
-        rate = layout.rate or first(one, RATES, _is_number)
-
-        def is_gender(scope: Archive, key: str) -> bool:
-            return _is_gender(scope, key, layout.count)
-
-        gender = layout.gender or first(one, GENDERS, is_gender)
-        model = layout.model or first(one, MODELS, _is_model)
-        return replace(one, layout=replace(layout, rate=rate, gender=gender, model=model))
-
-    return [completed(one) for one in found]
-
-
-def _first_form(
-    archive: Archive, keys: tuple[str, ...], joints: tuple[int, ...]
-) -> tuple[str, Form] | None:
-    for key in keys:
-        form = form_of(archive, key, joints) if archive.has(key) else None
-        if form is not None:
-            return key, form
-    return None
-
-
-def _length(archive: Archive, key: str) -> int:
-    """Return the number of items of a list or array with one axis; -1 for other values."""
-    value = archive.get(key)
-    if isinstance(value, list | tuple):
-        return len(value)
-    is_row = isinstance(value, Deferred) and len(value.shape) == 1
-    return value.shape[0] if isinstance(value, Deferred) and is_row else -1
-
-
-def _identity(value: Value) -> int | str | None:
-    """Return the number or name of a person or frame; None for other values."""
-    if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
-        value = value.values().reshape(-1)[0].item()
-    if isinstance(value, list | tuple) and len(value) == 1:
-        return _identity(value[0])
-    if isinstance(value, bytes):
-        value = value.decode("utf-8", "replace")
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if isinstance(value, str):
-        number = person_number(value)
-        return value if number is None else number
-    if isinstance(value, bool) or not isinstance(value, int):
-        return None
-    return value if abs(value) < _LARGEST else None
-
-
-def _identities(value: _Value, count: int) -> list[int | str]:
-    """Return the person of each row, or of all rows."""
-    found = value.archive.get(value.key)
-    if isinstance(found, Deferred) and len(found.shape) == 1:
-        found = [np.asarray(item).item() for item in found.values()]
-    items = list(found) if isinstance(found, list | tuple) else [found]
-    chosen = items if value.item is None else items[value.item : value.item + 1]
-    persons = [_identity(item) for item in chosen]
-    if None in persons:
-        odd = describe(chosen[persons.index(None)])
-        raise value.archive.fault("F002.video-identity", item=value.key, found=odd)
-    known = [person for person in persons if person is not None]
-    return known if len(known) == count else known[:1] * count
-
-
-def _is_place(shape: tuple[int, ...], count: int) -> bool:
-    return shape in ((count, 3), (count, 1, 3)) or (count == 1 and shape == (3,))
-
-
-def _is_shape(shape: tuple[int, ...], count: int) -> bool:
-    return (len(shape) == 1 and shape[0] > 0) or (len(shape) == 2 and shape[0] in (1, count))
-
-
-def _found(
-    archive: Archive,
-    budget: RowBudget | None = None,
-    around: tuple[Archive, ...] = (),
-    path: tuple[str, ...] = (),
-) -> Iterator[_Found]:
-    """Yield all dicts with poses."""
-    layout = _layout(archive, around, path)
-    budget = budget or RowBudget(archive)
-    budget.spend(_COST if layout is None else layout.count)
-    if layout is not None:
-        # A frame with arrays of no rows has no people.
-        if layout.count or not (around and around[-1].is_list):
-            yield _Found(path, around, archive, layout)
-        return
-    parts = None if archive.is_list else _parts(archive)
-    if parts is not None:
-        key, items = parts
-        found = [*_found(items, budget, (*around, archive), (*path, key))]
-        known = {one.path[len(path) + 1] for one in found}
-        if found and all(name in known or items.get(name) is None for name in items.keys):
-            yield from found
-            return
-    depth = sum(not scope.is_list for scope in around)
-    for key in archive.keys if depth < _DEEPEST or archive.is_list else ():
-        inner = archive.inside(key)
-        if inner is not None:
-            yield from _found(inner, budget, (*around, archive), (*path, key))
-
-
-def _parts(archive: Archive) -> tuple[str, Archive] | None:
-    """Return the key of poses with an axis more than usual, and their items as a list of dicts.
-
-    The items of a list of arrays are the rows of frames or of people (3DPW), and so are those of an
-    array with IDs of each person and frame; ``_are_frames`` tells which. Of other arrays, they are
-    people: of the axis as long as their shapes, genders or IDs, or else of the shorter one, which a
-    note says. None if there are no such poses.
-    """
-    kinds = ((_WHOLE, tuple(_NAMES)), (_BODIES, (21, 23)))
-    candidates = ((key, joints) for keys, joints in kinds for key in keys if archive.has(key))
-    key, joints = next(candidates, ("", ()))
-    shape = archive.shape(key) if key else ()
-    axis, kind = 0, archive.kind
-    if shape:
-        is_usual = len(shape) < 3 or shape_form(shape, joints) is not None
-        if is_usual or shape[0] * shape[1] < 2 or shape_form(shape[1:], joints) is None:
-            return None
-        if not any(archive.shape(name) == shape[:2] for name in _PEOPLE):
-            told = _axis_of_people(archive, shape)
-            axis = int(shape[1] < shape[0]) if told is None else told
-            kind = _ASSUMED if told is None else _TOLD
-    poses = _along(archive, key, axis) if key else ()
-    shapes = [
-        Archive(archive.source, "item", (key,), {key: item}.__getitem__).shape(key)
-        for item in poses
-    ]
-    forms = [shape_form(one, joints) for one in shapes]
-    has_rows = [
-        bool(item.shape[:1] != (0,) if isinstance(item, Deferred) else item) for item in poses
-    ]
-    if not any(forms) or any(has and not form for has, form in zip(has_rows, forms, strict=True)):
-        return None
-
-    def column(name: str) -> Sequence[Value]:
-        own = archive.shape(name)
-        is_table = own[:2] == shape[:2] and (len(own) > 2 or name in (*_PEOPLE, *_FRAMES))
-        if kind in _OF_PEOPLE and not is_table and name not in _EACH and shape[0] == shape[1]:
-            return ()  # one for each frame, or one for each person
-        if name in _SHAPES and len(own) == 1:
-            return ()  # that of all
-        return _along(archive, name, axis if is_table else 0, len(poses))
-
-    found = {name: column(name) for name in archive.keys}
-    columns = {name: items for name, items in found.items() if items}
-    prefix = "person_" if kind in _OF_PEOPLE else ""
-    places = {f"{prefix}{index}": index for index in range(len(poses))}
-
-    def item(name: str) -> Archive:
-        return Archive(
-            archive.source,
-            archive.kind,
-            tuple(columns),
-            lambda key: columns[key][places[name]],
-            label=f"{archive.label}{name}.",
-        )
-
-    return key, Archive(
-        archive.source,
-        kind,
-        tuple(places),
-        lambda name: poses[places[name]] if has_rows[places[name]] else None,
-        item,
-        archive.label,
-        is_list=True,
-    )
-
-
-def _along(archive: Archive, key: str, axis: int, count: int | None = None) -> Sequence[Value]:
-    """Return the items of a list, or those of an array along an axis; none of other values.
-
-    ``count``: the number of items; none if there are more or fewer.
-    """
-    value = archive.objects(key)
-    if axis == 0 and isinstance(value, list | tuple):
-        return value if count in (None, len(value)) else ()
-    if axis > 0:
-        value = archive.array(key)
-    if not isinstance(value, Deferred) or len(value.shape) <= axis:
-        return ()
-    known = value.shape[axis]
-    return [_item(value, index, axis) for index in range(known)] if count in (None, known) else ()
-
-
-def _item(array: Deferred, index: int, axis: int) -> Deferred:
-    shape = (*array.shape[:axis], *array.shape[axis + 1 :])
-    return Deferred(shape, array.dtype, lambda: np.asarray(array.values().take(index, axis)))
-
-
-def _axis_of_people(archive: Archive, shape: tuple[int, ...]) -> int | None:
-    """Return which of the first two axes of poses is as long as what each person has once."""
-    for key in filter(archive.has, _EACH):
-        texts = texts_in(archive.objects(key))
-        own = archive.shape(key) or ((len(texts),) if texts else ())
-        matches = [axis for axis in (0, 1) if own[:1] == shape[axis : axis + 1]]
-        if len(own) == 1 and key in _SHAPES:
-            continue  # the shape of all
-        if len(own) <= 2 and len(matches) == 1:
-            return matches[0]
-    for key in filter(archive.has, _FRAMES):
-        matches = [axis for axis in (0, 1) if archive.shape(key) == shape[axis : axis + 1]]
-        if len(matches) == 1:
-            return 1 - matches[0]
-    return None
-
-
-_Person = int | str | tuple[int, ...]
-"""A person of a row: an ID or name of the file, or the index of a dict and the person in it."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Rows:
-    """A track of several people: the frame and person of each row."""
-
-    track: Track
-    frames: Frames
-    persons: Sequence[_Person]
-    genders: Sequence[str]
-
-
-def _people(source: Source, found: list[_Found]) -> tuple[dict[int, Track], tuple[int, ...]]:
+def _people(source: Source, found: list[ParameterDict]) -> tuple[dict[int, Track], tuple[int, ...]]:
     """Return the tracks of people, and the first and last frame of a list of frames.
 
     A dict has all frames of one or several people, or one frame of one or several people.
@@ -621,7 +185,38 @@ def _people(source: Source, found: list[_Found]) -> tuple[dict[int, Track], tupl
     return _assembled(source, rows), span
 
 
-def _rows_of_people(source: Source, found: list[_Found], tracks: list[Track]) -> list[_Rows]:
+def _are_frames(found: list[ParameterDict]) -> bool:
+    """Return whether dicts are frames, and not people.
+
+    A single dict is one if it is an item of a longer list, whose other items are missing. Dicts of
+    several rows are frames if they have one frame number each, if each row is another person, or if
+    they are items of a list that has more items than any of them has rows.
+    """
+    most = max(one.layout.count for one in found)
+    if len(found) == 1 and not any(
+        scope.is_list and len(scope.keys) > 1 for scope in found[0].around
+    ):
+        return False
+    if most == 1:
+        return True
+    if any(scope.kind in OF_PEOPLE for one in found for scope in one.around):
+        return False
+    if any(one.layout.frames is not None for one in found):
+        return False
+    if all(one.layout.frame is not None for one in found):
+        return True
+    listed = [
+        identities(one.layout.person, one.layout.count)
+        for one in found
+        if one.layout.person is not None
+    ]
+    if len(listed) == len(found):
+        return all(len(set(persons)) == len(persons) for persons in listed)
+    container = found[0].around[-1]
+    return container.is_list and len(container.keys) > most
+
+
+def _rows_of_people(source: Source, found: list[ParameterDict], tracks: list[Track]) -> list[_Rows]:
     """Return the rows of dicts, each of which has all frames of one or several people."""
     rows: list[_Rows] = []
     taken: dict[int, int] = {}
@@ -630,7 +225,7 @@ def _rows_of_people(source: Source, found: list[_Found], tracks: list[Track]) ->
         again = _occurrences(frames.tolist())
         persons: list[_Person]
         if one.layout.person is not None:
-            persons = [*_identities(one.layout.person, len(frames))]
+            persons = [*identities(one.layout.person, len(frames))]
             if one.layout.frames is None and len(set(persons)) > 1:
                 frames = _occurrences(persons)
                 source.warn("F007.video-rows", item=one.layout.person.key)
@@ -646,39 +241,8 @@ def _rows_of_people(source: Source, found: list[_Found], tracks: list[Track]) ->
     return rows
 
 
-def _are_frames(found: list[_Found]) -> bool:
-    """Return whether dicts are frames, and not people.
-
-    A single dict is one if it is an item of a longer list, whose other items are missing. Dicts of
-    several rows are frames if they have one frame number each, if each row is another person, or if
-    they are items of a list that has more items than any of them has rows.
-    """
-    most = max(one.layout.count for one in found)
-    if len(found) == 1 and not any(
-        scope.is_list and len(scope.keys) > 1 for scope in found[0].around
-    ):
-        return False
-    if most == 1:
-        return True
-    if any(scope.kind in _OF_PEOPLE for one in found for scope in one.around):
-        return False
-    if any(one.layout.frames is not None for one in found):
-        return False
-    if all(one.layout.frame is not None for one in found):
-        return True
-    listed = [
-        _identities(one.layout.person, one.layout.count)
-        for one in found
-        if one.layout.person is not None
-    ]
-    if len(listed) == len(found):
-        return all(len(set(persons)) == len(persons) for persons in listed)
-    container = found[0].around[-1]
-    return container.is_list and len(container.keys) > most
-
-
 def _rows_of_frames(
-    source: Source, found: list[_Found], tracks: list[Track]
+    source: Source, found: list[ParameterDict], tracks: list[Track]
 ) -> tuple[list[_Rows], tuple[int, ...]]:
     """Return the rows of dicts of single frames, and the first and last frame of their list."""
     frames, persons, span = _on_timeline(source, found, tracks)
@@ -689,7 +253,7 @@ def _rows_of_frames(
         count = one.layout.count
         own: list[_Person] = [*range(seen[frame], seen[frame] + count)]
         if is_known and one.layout.person is not None:
-            own = [*_identities(one.layout.person, count)]
+            own = [*identities(one.layout.person, count)]
         elif number is not None and count == 1:
             own = [number]
         seen[frame] += count
@@ -702,7 +266,7 @@ def _rows_of_frames(
 
 
 def _on_timeline(
-    source: Source, found: list[_Found], tracks: list[Track]
+    source: Source, found: list[ParameterDict], tracks: list[Track]
 ) -> tuple[list[int], list[int | None], tuple[int, ...]]:
     """Return the frame of each dict, its person if its place tells it, and the range of frames.
 
@@ -717,7 +281,7 @@ def _on_timeline(
         or len({one.path[: level + 1] for one in found}) > len({one.path[:level] for one in found})
     ]
     numbers = [
-        None if one.layout.frame is None else _identities(one.layout.frame, 1)[0] for one in found
+        None if one.layout.frame is None else identities(one.layout.frame, 1)[0] for one in found
     ]
     keyed = [number for number in numbers if isinstance(number, int)]
     of_people = [level for level in levels if _are_people(found, level)]
@@ -745,8 +309,13 @@ def _on_timeline(
     return frames, persons, span
 
 
+def _are_people(found: list[ParameterDict], level: int) -> bool:
+    """Return whether the keys of a dict on the path say that they are people."""
+    return all(_NAMED_PERSON.fullmatch(one.path[level].lower()) for one in found)
+
+
 def _level_of_people(
-    source: Source, found: list[_Found], tracks: list[Track], levels: Sequence[int]
+    source: Source, found: list[ParameterDict], tracks: list[Track], levels: Sequence[int]
 ) -> int:
     """Return which of two lists or dicts, one inside the other, has the people.
 
@@ -784,8 +353,8 @@ def _level_of_people(
     return chosen
 
 
-def _stated(one: _Found, value: _Value | None) -> int | str | None:
-    return None if value is None else _identities(value, 1)[0]
+def _stated(one: ParameterDict, value: StatedValue | None) -> int | str | None:
+    return None if value is None else identities(value, 1)[0]
 
 
 def _most_repeated(groups: Sequence[str], values: Sequence[object]) -> int:
@@ -819,12 +388,9 @@ def _steadier_level(
     return low if spreads[low] < _STEADIER * spreads[high] else None
 
 
-def _are_people(found: list[_Found], level: int) -> bool:
-    """Return whether the keys of a dict on the path say that they are people."""
-    return all(_NAMED_PERSON.fullmatch(one.path[level].lower()) for one in found)
-
-
-def _numbered(found: list[_Found], level: int) -> tuple[list[int], list[int], tuple[int, ...]]:
+def _numbered(
+    found: list[ParameterDict], level: int
+) -> tuple[list[int], list[int], tuple[int, ...]]:
     """Return the frames of items of lists or dicts, those without people, and their range."""
     keys = [one.path[level] for one in found]
     scopes = dict.fromkeys(one.around[level] for one in found)
@@ -936,7 +502,7 @@ def _joined(tracks: list[Track]) -> Track:
     )
 
 
-def _track(one: _Found) -> Track:
+def _track(one: ParameterDict) -> Track:
     archive, layout = one.archive, one.layout
     parts = [rotation_vectors(archive, key, form) for key, form in layout.poses]
     vectors = np.concatenate(parts, axis=1)
@@ -954,18 +520,18 @@ def _track(one: _Found) -> Track:
     if layout.frames is not None:
         frames = frames_of(layout.frames.archive, layout.frames.key, count)
     elif layout.frame is not None and count == 1:
-        number = _identities(layout.frame, 1)[0]
+        number = identities(layout.frame, 1)[0]
         frames = np.array([number if isinstance(number, int) else 0])
     return Track(
         frames,
-        _NAMES[vectors.shape[1]],
+        JOINT_NAMES[vectors.shape[1]],
         vectors,
         placed,
         _coefficients(layout, count),
     )
 
 
-def _genders(value: _Value | None, count: int) -> tuple[str, ...]:
+def _genders(value: StatedValue | None, count: int) -> tuple[str, ...]:
     """Return the gender of each row; empty if the file does not state it."""
     if value is None:
         return ("",) * count
@@ -979,7 +545,7 @@ def _genders(value: _Value | None, count: int) -> tuple[str, ...]:
     return (gender_in(found)[0],) * count
 
 
-def _coefficients(layout: _Layout, count: int) -> Floats | None:
+def _coefficients(layout: ParameterLayout, count: int) -> Floats | None:
     if layout.shape is None:
         return None
     archive, key = layout.shape.archive, layout.shape.key

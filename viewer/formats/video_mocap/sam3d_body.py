@@ -7,8 +7,8 @@
             expr_params (72,)  focal_length  mask …
     npz     one person; arrays with one more axis in front are frames
     pickle  person, [person, …] of one picture, or frames of them in a list or dict
-    folder  files of people or frames, see ``sam3d_files.py``; files of several frames follow one
-            another
+    folder  files of people or frames by their names, see ``_frames_and_people``; files of several
+            frames follow one another
 
 Positions are in the camera's space, with y down, relative to ``pred_cam_t``. They are points: a
 mesh needs the triangles of the Momentum Human Rig, whose parameters are read, too.
