@@ -40,15 +40,16 @@ from viewer.rig.skin import Skin, skin_from_entries
 
 _RIG = "rig.npz"
 _LOD = re.compile(r"lod([0-6])\.npz")
-_USUAL = 1  # default level of detail in MHR's loader and in SAM 3D Body
-_ROWS = 8  # number of correctives per block, 1.8 MB at the default level of detail
-_N_IDENTITY = 45  # number of shapes of the identity; all other shapes are expressions
-_SMALLEST = 1e-5  # minimum weight; MHR's skinning omits smaller weights
 _RIG_KEYS = (
     "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "
     "joint_parents joint_names inverse_bind_pose"
 )
 _LOD_KEYS = "base_shape shape_vectors faces texcoords texcoord_faces skin_indices skin_weights"
+_VERSION = 1  # of the schema of ``rig.npz``
+_USUAL = 1  # default level of detail in MHR's loader and in SAM 3D Body
+_N_IDENTITY = 45  # number of shapes of the identity; all other shapes are expressions
+_SMALLEST = 1e-5  # minimum weight; MHR's skinning omits smaller weights
+_ROWS = 8  # number of correctives per block, 1.8 MB at the default level of detail
 
 
 def read(source: Source) -> Figure:
@@ -72,8 +73,8 @@ def read(source: Source) -> Figure:
     rig_source, lod_source = _files(source)
     rig, lod = _opened(rig_source, _RIG_KEYS), _opened(lod_source, _LOD_KEYS)
     n_shapes = lod.array("shape_vectors", (None, None, 3)).shape[0]
-    parameters = _read_parameters(rig, n_shapes)
-    skeleton = _read_skeleton(rig, parameters)
+    parameters = _parameters(rig, n_shapes)
+    skeleton = _skeleton(rig, parameters)
     mesh = _mesh(lod)
     correctives = _correctives(rig_source, rig, lod, skeleton.n_joints, mesh.n_vertices)
     return Figure(
@@ -97,7 +98,7 @@ def _files(source: Source) -> tuple[Source, Source]:
     """Return the rig and the chosen level of detail."""
     folder = source.path if source.is_folder else source.path.parent
     place = source.inside if source.is_folder else source.beside
-    names = _names(folder)
+    names = _file_names(folder)
     if _RIG not in names:
         raise source.fault("F002.mhr-folder")
     rig = source if source.path.name == _RIG else place(_RIG)
@@ -114,7 +115,7 @@ def _files(source: Source) -> tuple[Source, Source]:
     return rig, source if is_this else place(f"lod{level}.npz")
 
 
-def _names(folder: Path) -> list[str]:
+def _file_names(folder: Path) -> list[str]:
     """Return the names of the files in a folder; raise FormatError if it cannot be listed."""
     try:
         return [path.name for path in folder.iterdir()]
@@ -128,6 +129,59 @@ def _opened(source: Source, keys: str) -> Archive:
     if missing:
         raise source.fault("F002.mhr-keys", missing=missing, found=list(archive.keys))
     return archive
+
+
+def _parameters(archive: Archive, n_shapes: int) -> ModelParameters:
+    """Return the model parameters, without those of the blend shapes, which come last."""
+    version = archive.array("schema_version", ()).values()
+    if int(version) != _VERSION:
+        raise archive.fault("F002.mhr-version", item="schema_version", found=int(version))
+    n_joints = archive.array("joint_offsets", (None, 3)).shape[0]
+    transform = _floats(archive, "parameter_transform", (PER_JOINT * n_joints, None))
+    names = archive.array("parameter_names", (transform.shape[1],), "SU").values().tolist()
+    count = transform.shape[1] - n_shapes
+    if count < 0 or transform[:, count:].any():
+        found = transform.shape[1]
+        raise archive.fault(
+            "F002.mhr-parameters", item="parameter_transform", found=found, n=n_shapes
+        )
+    return ModelParameters(tuple(map(str, names[:count])), transform[:, :count])
+
+
+def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
+    """Return the skeleton, with a DOF for each joint parameter that model parameters drive."""
+    offsets = _floats(archive, "joint_offsets", (None, 3), "joints")
+    count = len(offsets)
+    parents = archive.array("joint_parents", (count,)).values()
+    places = np.arange(count)
+    is_root = parents < 0
+    wrong = np.flatnonzero((parents >= places) | (parents % 1 != 0) | (is_root != (places == 0)))
+    if len(wrong):
+        joint = int(wrong[0])
+        key = "F002.root" if joint == 0 else "S001.parent"
+        found = float(parents[joint])
+        raise archive.fault(key, item="joint_parents", joint=joint, found=found)
+    rotations = _quaternions(archive, "joint_prerotations", count)
+    joints, kinds = driven_dofs(parameters.transform)
+    return Skeleton(
+        names=tuple(map(str, archive.array("joint_names", (count,), "SU").values().tolist())),
+        parents=np.where(is_root, -1, parents).astype(np.int32),
+        rest_translations=offsets,
+        rest_rotations=rotations,
+        rest_scales=np.ones((count, 3)),
+        dof_joints=joints,
+        dof_kinds=kinds,
+        rest_dofs=np.zeros(len(joints)),
+        # Momentum's limits are soft: fitted parameters may exceed them, and are shown unchanged.
+        dof_limits=np.tile([-np.inf, np.inf], (len(joints), 1)),
+    )
+
+
+def _quaternions(archive: Archive, key: str, count: int) -> Floats:
+    values = _floats(archive, key, (count, 4))
+    if not values.any(axis=1).all():
+        raise archive.fault("F002.mhr-quaternion", item=key)
+    return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
 def _mesh(lod: Archive) -> Mesh:
@@ -160,6 +214,18 @@ def _skin(lod: Archive, n_vertices: int, inverse_bind: Floats) -> Skin:
     )
 
 
+def _bind_matrices(archive: Archive, n_joints: int) -> Floats:
+    """Return the inverse bind matrices, stored as translation, quaternion and scale: (J, 4, 4)."""
+    key = "inverse_bind_pose"
+    rows = _floats(archive, key, (n_joints, 8), "bindings")
+    if not rows[:, 3:7].any(axis=1).all():
+        raise archive.fault("F002.mhr-quaternion", item=key)
+    matrices = np.tile(np.eye(4), (n_joints, 1, 1))
+    matrices[:, :3, :3] = quaternion_to_matrix(rows[:, 3:7]) * rows[:, 7:, None]
+    matrices[:, :3, 3] = rows[:, :3]
+    return matrices
+
+
 def _shapes(lod: Archive, n_vertices: int) -> BlendShapes | None:
     array = lod.array("shape_vectors", (None, n_vertices, 3))
     count = array.shape[0]
@@ -184,7 +250,7 @@ def _correctives(
         source.warn("F007.mhr-correctives")
         return None
     array = lod.array("corrective_blendshapes", (None, n_vertices, 3))
-    feature = _read_feature(rig, n_joints, array.shape[0])
+    feature = _feature(rig, n_joints, array.shape[0])
 
     def load() -> Floats:
         values = array.values()
@@ -202,56 +268,7 @@ def _correctives(
     return Correctives(SparseOffsets(array.shape, array.dtype, load, blocks), feature)
 
 
-_VERSION = 1
-
-
-def _read_skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
-    """Return the skeleton, with a DOF for each joint parameter that model parameters drive."""
-    offsets = _floats(archive, "joint_offsets", (None, 3), "joints")
-    count = len(offsets)
-    parents = archive.array("joint_parents", (count,)).values()
-    places = np.arange(count)
-    is_root = parents < 0
-    wrong = np.flatnonzero((parents >= places) | (parents % 1 != 0) | (is_root != (places == 0)))
-    if len(wrong):
-        joint = int(wrong[0])
-        key = "F002.root" if joint == 0 else "S001.parent"
-        found = float(parents[joint])
-        raise archive.fault(key, item="joint_parents", joint=joint, found=found)
-    rotations = _quaternions(archive, "joint_prerotations", count)
-    joints, kinds = driven_dofs(parameters.transform)
-    return Skeleton(
-        names=tuple(map(str, archive.array("joint_names", (count,), "SU").values().tolist())),
-        parents=np.where(is_root, -1, parents).astype(np.int32),
-        rest_translations=offsets,
-        rest_rotations=rotations,
-        rest_scales=np.ones((count, 3)),
-        dof_joints=joints,
-        dof_kinds=kinds,
-        rest_dofs=np.zeros(len(joints)),
-        # Momentum's limits are soft: fitted parameters may exceed them, and are shown unchanged.
-        dof_limits=np.tile([-np.inf, np.inf], (len(joints), 1)),
-    )
-
-
-def _read_parameters(archive: Archive, n_shapes: int) -> ModelParameters:
-    """Return the model parameters, without those of the blend shapes, which come last."""
-    version = archive.array("schema_version", ()).values()
-    if int(version) != _VERSION:
-        raise archive.fault("F002.mhr-version", item="schema_version", found=int(version))
-    n_joints = archive.array("joint_offsets", (None, 3)).shape[0]
-    transform = _floats(archive, "parameter_transform", (PER_JOINT * n_joints, None))
-    names = archive.array("parameter_names", (transform.shape[1],), "SU").values().tolist()
-    count = transform.shape[1] - n_shapes
-    if count < 0 or transform[:, count:].any():
-        found = transform.shape[1]
-        raise archive.fault(
-            "F002.mhr-parameters", item="parameter_transform", found=found, n=n_shapes
-        )
-    return ModelParameters(tuple(map(str, names[:count])), transform[:, :count])
-
-
-def _read_feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFeature:
+def _feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFeature:
     """Return the feature of the correctives."""
     indices = archive.array("0.sparse_indices", (2, None)).values()
     entries = _floats(archive, "0.sparse_weight", (indices.shape[1],))
@@ -260,25 +277,6 @@ def _read_feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFea
             raise archive.fault("F002.mhr-index", item="0.sparse_indices", last=end - 1)
     outputs, inputs = indices.astype(np.int32)
     return NetworkFeature(n_joints, n_weights, outputs, inputs, entries)
-
-
-def _bind_matrices(archive: Archive, n_joints: int) -> Floats:
-    """Return the inverse bind matrices, stored as translation, quaternion and scale: (J, 4, 4)."""
-    key = "inverse_bind_pose"
-    rows = _floats(archive, key, (n_joints, 8), "bindings")
-    if not rows[:, 3:7].any(axis=1).all():
-        raise archive.fault("F002.mhr-quaternion", item=key)
-    matrices = np.tile(np.eye(4), (n_joints, 1, 1))
-    matrices[:, :3, :3] = quaternion_to_matrix(rows[:, 3:7]) * rows[:, 7:, None]
-    matrices[:, :3, 3] = rows[:, :3]
-    return matrices
-
-
-def _quaternions(archive: Archive, key: str, count: int) -> Floats:
-    values = _floats(archive, key, (count, 4))
-    if not values.any(axis=1).all():
-        raise archive.fault("F002.mhr-quaternion", item=key)
-    return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
 def _floats(archive: Archive, key: str, shape: tuple[int | None, ...], part: str = "") -> Floats:

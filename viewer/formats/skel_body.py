@@ -31,8 +31,6 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, skin_from_entries
 
-__all__ = ["read"]
-
 _KEYS = (
     "skin_template_v skin_template_f weights shapedirs J_regressor_osim osim_kintree_table "
     "apose_rel_transfo per_joint_rot"
@@ -113,13 +111,6 @@ def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
     )
 
 
-def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:
-    products = np.swapaxes(matrices, 1, 2) @ matrices
-    wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > _ROUNDED
-    if wrong.any():
-        raise archive.fault("F002.skel-rotation", item=key, joint=int(wrong.argmax()))
-
-
 def _parents(archive: Archive) -> Ints:
     table = archive.array("osim_kintree_table", (2, len(JOINTS))).values().astype(np.float64)
     places = np.arange(len(JOINTS))
@@ -127,6 +118,13 @@ def _parents(archive: Archive) -> Ints:
     if (table[1] != places).any() or ((inner < 0) | (inner >= places[1:]) | (inner % 1 != 0)).any():
         raise archive.fault("F002.skel-tree", item="osim_kintree_table")
     return np.append(-1, inner).astype(np.int32)
+
+
+def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:
+    products = np.swapaxes(matrices, 1, 2) @ matrices
+    wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > _ROUNDED
+    if wrong.any():
+        raise archive.fault("F002.skel-rotation", item=key, joint=int(wrong.argmax()))
 
 
 def _skin(archive: Archive, joints: Floats, n_vertices: int) -> Skin:

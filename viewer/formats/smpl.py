@@ -51,11 +51,19 @@ from viewer.rig.skin import Skin, skin_from_entries
 
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Required keys, which identify such a model."""
-
-# Maximum deviation of a joint regressor's sum from 1; a larger one would displace the joint.
-_ODD_SUM = 0.05
-_ROUNDED = 1e-3  # maximum deviation of weight sums from 1 that is corrected by normalising
+_NOT_NEEDED = (
+    "J bs_style bs_type J_regressor_prior weights_prior pose_training_info trans pose betas "
+    "v_shaped v_posed r hands_coeffs hands_coeffsl hands_coeffsr dynamic_lmk_faces_idx "
+    "dynamic_lmk_bary_coords joint2num part2num allow_pickle gender"
+)
+_IGNORED = frozenset(_NOT_NEEDED.split())
+"""Keys of models that are not needed for posing."""
 _ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and as uint32 converted to float32
+_ODD_SUM = 0.05  # maximum deviation of a joint regressor's sum from 1; more displaces the joint
+_ROUNDED = 1e-3  # maximum deviation of weight sums from 1 that is corrected by normalising
+_SHAPES = 300  # number of shapes, before the expressions, of models with at least 400 columns
+_FEW_SHAPES = 10  # number of shapes of older models with expressions
+_STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STAR
 
 
 def read(source: Source) -> Figure:
@@ -88,7 +96,7 @@ def read(source: Source) -> Figure:
     member = member_of(tuple(parents.tolist()))
     animal = animal_of(parents.tolist())
     names = _names(member, animal, len(parents))
-    shapes = _model_shapes(source, archive, mesh.n_vertices, member, used)
+    shapes = _shapes(source, archive, mesh.n_vertices, member, used)
     correctives, title = _correctives(source, archive, mesh.n_vertices, len(parents), used)
     title = title or (member.title if member else animal.title if animal else "")
     space = _shape_space(source, archive, title, used)
@@ -102,33 +110,13 @@ def read(source: Source) -> Figure:
         blend_shapes=shapes,
         correctives=correctives,
         joint_regressor=regressor,
-        hands=_model_hands(archive, member, used),
+        hands=_hands(archive, member, used),
         pose_layout=_layout(len(parents)),
-        keypoints=_model_keypoints(source, archive, mesh, used),
-        symmetry=_model_symmetry(source, archive, mesh.n_vertices, used),
+        keypoints=_keypoints(source, archive, mesh, used),
+        symmetry=_symmetry(source, archive, mesh.n_vertices, used),
         facts=_facts(archive, title, space.gender, shapes, correctives, used),
         shape_space=space,
     )
-
-
-def _shape_space(source: Source, archive: Archive, title: str, used: list[str]) -> ShapeSpace:
-    """Return the model and the gender, which most files state only in their name."""
-    kind, _, variant = published_name(source.path).partition(":")
-    gender = gender_of(archive.plain_text("gender"))
-    if gender:
-        used.append("gender")
-    return ShapeSpace("SMIL" if kind == "smil" else title, gender or gender_of(variant))
-
-
-def _names(member: Member | None, animal: Animal | None, count: int) -> tuple[str, ...]:
-    if member is not None:
-        return member.names
-    return animal.names if animal else tuple(f"joint_{j}" for j in range(count))
-
-
-def _layout(n_joints: int) -> PoseLayout:
-    starts = 3 * np.arange(n_joints, dtype=np.int32)
-    return PoseLayout(3 * n_joints, starts, np.zeros(n_joints, dtype=bool))
 
 
 def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
@@ -139,7 +127,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
     positions = neutral_positions(positions, triangles)
     used += ["v_template", "f"]
-    uvs, uv_triangles = _model_uvs(source, archive, len(triangles), used)
+    uvs, uv_triangles = _uvs(source, archive, len(triangles), used)
     return Mesh(
         positions=positions,
         normals=vertex_normals(positions, triangles),
@@ -147,6 +135,21 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
         uvs=uvs,
         uv_triangles=uv_triangles,
     )
+
+
+def _uvs(
+    source: Source, archive: Archive, n_triangles: int, used: list[str]
+) -> tuple[Floats | None, Ints | None]:
+    """Return texture coordinates and their triangles, if the file has both."""
+    if not (archive.has("vt") and archive.has("ft")):
+        return None, None
+    uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
+    corners = archive.array("ft", (n_triangles, 3)).values()
+    if not are_indices(corners, len(uvs)):
+        source.warn("F007.smpl-uvs")
+        return None, None
+    used += ["vt", "ft"]
+    return uvs, corners.astype(np.int32)
 
 
 def _parents(archive: Archive, used: list[str]) -> Ints:
@@ -189,15 +192,6 @@ def _refuse_parent(archive: Archive, parents: Floats, joint: int) -> None:
         archive.refuse(code, item=key, part="joints", places=[0], found=found)
 
 
-def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
-    value = archive.get(key)
-    if isinstance(value, Opaque):
-        # numpy pickles a sparse matrix in an .npz, and unpickling could run code.
-        problem = Phrase("matrix-objects", shape=shape, what=value.what)
-        raise archive.fault("F002.archive-value", item=key, problem=problem)
-    return archive.sparse(key, shape)
-
-
 def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:
     shape = 3 * n_joints, 3 * n_vertices + 1
     value = archive.get("J_regressor")
@@ -222,6 +216,137 @@ def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]
         )
     used.append("J_regressor")
     return JointRegressor(n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights)
+
+
+def _coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> JointRegressor:
+    """Return SUPR's regressor: rows are coordinates of joints, the last column is a constant."""
+    rows, columns, numbers = matrix.entries()
+    weights = finite(archive, "J_regressor", numbers, "joints", rows // 3)
+    last = matrix.shape[1] - 1
+    constant = columns == last
+    bias = np.bincount(rows[constant], weights[constant], minlength=3 * n_joints)
+    rows, columns, weights = rows[~constant], columns[~constant], weights[~constant]
+    return JointRegressor(
+        n_joints,
+        (rows // 3).astype(np.int32),
+        (columns // 3).astype(np.int32),
+        weights,
+        axes=np.stack([rows % 3, columns % 3], axis=1).astype(np.int32),
+        bias=bias.astype(np.float64, copy=False).reshape(-1, 3),
+    )
+
+
+def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
+    value = archive.get(key)
+    if isinstance(value, Opaque):
+        # numpy pickles a sparse matrix in an .npz, and unpickling could run code.
+        problem = Phrase("matrix-objects", shape=shape, what=value.what)
+        raise archive.fault("F002.archive-value", item=key, problem=problem)
+    return archive.sparse(key, shape)
+
+
+def _names(member: Member | None, animal: Animal | None, count: int) -> tuple[str, ...]:
+    if member is not None:
+        return member.names
+    return animal.names if animal else tuple(f"joint_{j}" for j in range(count))
+
+
+def _shapes(
+    source: Source, archive: Archive, n_vertices: int, member: Member | None, used: list[str]
+) -> BlendShapes | None:
+    """Return shape and expression directions, read on first use."""
+    if not archive.has("shapedirs"):
+        source.warn("F007.smpl-shapedirs")
+        return None
+    array = archive.array("shapedirs", (n_vertices, 3, "S"))
+    count = array.shape[2]
+    n_shapes = count
+    if member is not None and member.has_expressions:
+        n_shapes = _SHAPES if count >= _SHAPES + 100 else min(_FEW_SHAPES, count)
+
+    def load() -> Floats:
+        rows = np.moveaxis(array.values(), 2, 0)
+        return finite(archive, "shapedirs", np.ascontiguousarray(rows, np.float64))
+
+    used.append("shapedirs")
+    if count == 0:
+        return None
+    names = _shape_names(archive, n_shapes, used)
+    names += tuple(f"expression {k}" for k in range(count - n_shapes))
+    groups = ("shape",) * n_shapes + ("expression",) * (count - n_shapes)
+    return BlendShapes(names, Deferred((count, n_vertices, 3), np.float64, load), groups)
+
+
+def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
+    """Return the names of the coefficients if the file has them, as the bundled body does."""
+    if archive.has("shape_names"):
+        values = archive.array("shape_names", (count,), "SU").values()
+        used.append("shape_names")
+        return tuple(str(name) for name in values.tolist())
+    return tuple(f"shape {k}" for k in range(count))
+
+
+def _correctives(
+    source: Source, archive: Archive, n_vertices: int, n_joints: int, used: list[str]
+) -> tuple[Correctives | None, str]:
+    """Return the correctives, and the title of the model that has them instead of SMPL's."""
+    if not archive.has("posedirs"):
+        source.warn("F007.smpl-posedirs")
+        return None, ""
+    other = _quaternion_correctives(archive, n_vertices, n_joints)
+    if other is not None:
+        used.append("posedirs")
+        return other
+    array = archive.array("posedirs")
+    count = 9 * (n_joints - 1)
+    is_flat = array.shape == (count, 3 * n_vertices)
+    if not is_flat and array.shape != (n_vertices, 3, count):
+        array = archive.array("posedirs", (n_vertices, 3, count))
+
+    def load() -> Floats:
+        values = array.values()
+        rows = values if is_flat else np.moveaxis(values, 2, 0)
+        offsets = finite(archive, "posedirs", np.ascontiguousarray(rows, np.float64))
+        return offsets.reshape(count, n_vertices, 3)
+
+    used.append("posedirs")
+    if not count:
+        return None, ""
+    return Correctives(Deferred((count, n_vertices, 3), np.float64, load)), ""
+
+
+def _quaternion_correctives(
+    archive: Archive, n_vertices: int, n_joints: int
+) -> tuple[Correctives, str] | None:
+    """Return correctives that quaternions drive, and the model's title; None for SMPL's.
+
+    STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR has
+    four for each joint.
+    """
+    array = archive.array("posedirs")
+    kinds = {
+        4 * (n_joints - 1) + 1: (QuaternionFeature(n_joints, False, _STAR_SHAPE), "STAR"),
+        4 * n_joints: (QuaternionFeature(n_joints, True), "SUPR"),
+    }
+    count = array.shape[-1] if len(array.shape) == 3 else 0
+    if array.shape != (n_vertices, 3, count) or count not in kinds or n_joints < 2:
+        return None
+
+    def load() -> np.ndarray:
+        rows = np.ascontiguousarray(np.moveaxis(array.values(), 2, 0), np.float64)
+        return finite(archive, "posedirs", rows)
+
+    feature, title = kinds[count]
+    return Correctives(Deferred((count, n_vertices, 3), np.float64, load), feature), title
+
+
+def _shape_space(source: Source, archive: Archive, title: str, used: list[str]) -> ShapeSpace:
+    """Return the model and the gender, which most files state only in their name."""
+    kind, _, variant = published_name(source.path).partition(":")
+    gender = gender_of(archive.plain_text("gender"))
+    if gender:
+        used.append("gender")
+    return ShapeSpace("SMIL" if kind == "smil" else title, gender or gender_of(variant))
 
 
 def _skin(
@@ -264,33 +389,58 @@ def _skin(
     )
 
 
-def _correctives(
-    source: Source, archive: Archive, n_vertices: int, n_joints: int, used: list[str]
-) -> tuple[Correctives | None, str]:
-    """Return the correctives, and the title of the model that has them instead of SMPL's."""
-    if not archive.has("posedirs"):
-        source.warn("F007.smpl-posedirs")
-        return None, ""
-    other = _quaternion_correctives(archive, n_vertices, n_joints)
-    if other is not None:
-        used.append("posedirs")
-        return other
-    array = archive.array("posedirs")
-    count = 9 * (n_joints - 1)
-    is_flat = array.shape == (count, 3 * n_vertices)
-    if not is_flat and array.shape != (n_vertices, 3, count):
-        array = archive.array("posedirs", (n_vertices, 3, count))
+def _hands(archive: Archive, member: Member | None, used: list[str]) -> tuple[Hand, ...]:
+    """Return the hands whose components are in the file."""
+    hands = []
+    for side, first in member.hands if member else ():
+        components, mean = f"hands_components{side[:1]}", f"hands_mean{side[:1]}"
+        if archive.has(components) and archive.has(mean):
+            joints = np.arange(first, first + 15, dtype=np.int32)
+            rows = finite(archive, components, archive.array(components, (None, 45)).values())
+            middle = finite(archive, mean, archive.array(mean, (45,)).values())
+            hands.append(Hand(side, joints, rows, middle))
+            used += [components, mean]
+    return tuple(hands)
 
-    def load() -> Floats:
-        values = array.values()
-        rows = values if is_flat else np.moveaxis(values, 2, 0)
-        offsets = finite(archive, "posedirs", np.ascontiguousarray(rows, np.float64))
-        return offsets.reshape(count, n_vertices, 3)
 
-    used.append("posedirs")
-    if not count:
-        return None, ""
-    return Correctives(Deferred((count, n_vertices, 3), np.float64, load)), ""
+def _layout(n_joints: int) -> PoseLayout:
+    starts = 3 * np.arange(n_joints, dtype=np.int32)
+    return PoseLayout(3 * n_joints, starts, np.zeros(n_joints, dtype=bool))
+
+
+def _keypoints(source: Source, archive: Archive, mesh: Mesh, used: list[str]) -> Keypoints | None:
+    """Return the static face landmarks as keypoints."""
+    if not (archive.has("lmk_faces_idx") and archive.has("lmk_bary_coords")):
+        return None
+    faces = archive.array("lmk_faces_idx", ("L",)).values()
+    shares = archive.array("lmk_bary_coords", (len(faces), 3)).values()
+    weights = finite(archive, "lmk_bary_coords", shares)
+    if not are_indices(faces, mesh.n_triangles):
+        source.warn("F007.smpl-landmarks")
+        return None
+    used += ["lmk_faces_idx", "lmk_bary_coords"]
+    return Keypoints(
+        names=tuple(f"landmark {number}" for number in range(len(faces))),
+        joints=np.full(len(faces), -1, dtype=np.int32),
+        vertices=mesh.triangles[faces.astype(np.int64)],
+        weights=weights,
+    )
+
+
+def _symmetry(source: Source, archive: Archive, n_vertices: int, used: list[str]) -> Ints | None:
+    """Return each vertex's mirror counterpart, if the file has a valid map."""
+    if not archive.has("vert_sym_idxs"):
+        return None
+    partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
+    if not are_indices(partners, n_vertices):
+        source.warn("F007.smpl-symmetry-range")
+        return None
+    indices = partners.astype(np.int32)
+    if (indices[indices] != np.arange(n_vertices)).any():
+        source.warn("F007.smpl-symmetry")
+        return None
+    used.append("vert_sym_idxs")
+    return indices
 
 
 def _facts(
@@ -318,163 +468,3 @@ def _facts(
     if unknown:
         facts.append(("keys unknown", ", ".join(unknown)))
     return tuple(facts)
-
-
-_NOT_NEEDED = (
-    "J bs_style bs_type J_regressor_prior weights_prior pose_training_info trans pose betas "
-    "v_shaped v_posed r hands_coeffs hands_coeffsl hands_coeffsr dynamic_lmk_faces_idx "
-    "dynamic_lmk_bary_coords joint2num part2num allow_pickle gender"
-)
-_IGNORED = frozenset(_NOT_NEEDED.split())
-"""Keys of models that are not needed for posing."""
-_SHAPES = 300  # number of shapes, before the expressions, of models with at least 400 columns
-_FEW_SHAPES = 10  # number of shapes of older models
-
-
-def _model_shapes(
-    source: Source, archive: Archive, n_vertices: int, member: Member | None, used: list[str]
-) -> BlendShapes | None:
-    """Return shape and expression directions, read on first use."""
-    if not archive.has("shapedirs"):
-        source.warn("F007.smpl-shapedirs")
-        return None
-    array = archive.array("shapedirs", (n_vertices, 3, "S"))
-    count = array.shape[2]
-    n_shapes = count
-    if member is not None and member.has_expressions:
-        n_shapes = _SHAPES if count >= _SHAPES + 100 else min(_FEW_SHAPES, count)
-
-    def load() -> Floats:
-        rows = np.moveaxis(array.values(), 2, 0)
-        return finite(archive, "shapedirs", np.ascontiguousarray(rows, np.float64))
-
-    used.append("shapedirs")
-    if count == 0:
-        return None
-    names = _shape_names(archive, n_shapes, used)
-    names += tuple(f"expression {k}" for k in range(count - n_shapes))
-    groups = ("shape",) * n_shapes + ("expression",) * (count - n_shapes)
-    return BlendShapes(names, Deferred((count, n_vertices, 3), np.float64, load), groups)
-
-
-def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
-    """Return the names of the coefficients if the file has them, as the bundled body does."""
-    if archive.has("shape_names"):
-        values = archive.array("shape_names", (count,), "SU").values()
-        used.append("shape_names")
-        return tuple(str(name) for name in values.tolist())
-    return tuple(f"shape {k}" for k in range(count))
-
-
-def _model_hands(archive: Archive, member: Member | None, used: list[str]) -> tuple[Hand, ...]:
-    """Return the hands whose components are in the file."""
-    hands = []
-    for side, first in member.hands if member else ():
-        components, mean = f"hands_components{side[:1]}", f"hands_mean{side[:1]}"
-        if archive.has(components) and archive.has(mean):
-            joints = np.arange(first, first + 15, dtype=np.int32)
-            rows = finite(archive, components, archive.array(components, (None, 45)).values())
-            middle = finite(archive, mean, archive.array(mean, (45,)).values())
-            hands.append(Hand(side, joints, rows, middle))
-            used += [components, mean]
-    return tuple(hands)
-
-
-def _model_uvs(
-    source: Source, archive: Archive, n_triangles: int, used: list[str]
-) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates and their triangles, if the file has both."""
-    if not (archive.has("vt") and archive.has("ft")):
-        return None, None
-    uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
-    corners = archive.array("ft", (n_triangles, 3)).values()
-    if not are_indices(corners, len(uvs)):
-        source.warn("F007.smpl-uvs")
-        return None, None
-    used += ["vt", "ft"]
-    return uvs, corners.astype(np.int32)
-
-
-def _model_symmetry(
-    source: Source, archive: Archive, n_vertices: int, used: list[str]
-) -> Ints | None:
-    """Return each vertex's mirror counterpart, if the file has a valid map."""
-    if not archive.has("vert_sym_idxs"):
-        return None
-    partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
-    if not are_indices(partners, n_vertices):
-        source.warn("F007.smpl-symmetry-range")
-        return None
-    indices = partners.astype(np.int32)
-    if (indices[indices] != np.arange(n_vertices)).any():
-        source.warn("F007.smpl-symmetry")
-        return None
-    used.append("vert_sym_idxs")
-    return indices
-
-
-def _model_keypoints(
-    source: Source, archive: Archive, mesh: Mesh, used: list[str]
-) -> Keypoints | None:
-    """Return the static face landmarks as keypoints."""
-    if not (archive.has("lmk_faces_idx") and archive.has("lmk_bary_coords")):
-        return None
-    faces = archive.array("lmk_faces_idx", ("L",)).values()
-    shares = archive.array("lmk_bary_coords", (len(faces), 3)).values()
-    weights = finite(archive, "lmk_bary_coords", shares)
-    if not are_indices(faces, mesh.n_triangles):
-        source.warn("F007.smpl-landmarks")
-        return None
-    used += ["lmk_faces_idx", "lmk_bary_coords"]
-    return Keypoints(
-        names=tuple(f"landmark {number}" for number in range(len(faces))),
-        joints=np.full(len(faces), -1, dtype=np.int32),
-        vertices=mesh.triangles[faces.astype(np.int64)],
-        weights=weights,
-    )
-
-
-_STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STAR
-
-
-def _coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> JointRegressor:
-    """Return SUPR's regressor: rows are coordinates of joints, the last column is a constant."""
-    rows, columns, numbers = matrix.entries()
-    weights = finite(archive, "J_regressor", numbers, "joints", rows // 3)
-    last = matrix.shape[1] - 1
-    constant = columns == last
-    bias = np.bincount(rows[constant], weights[constant], minlength=3 * n_joints)
-    rows, columns, weights = rows[~constant], columns[~constant], weights[~constant]
-    return JointRegressor(
-        n_joints,
-        (rows // 3).astype(np.int32),
-        (columns // 3).astype(np.int32),
-        weights,
-        axes=np.stack([rows % 3, columns % 3], axis=1).astype(np.int32),
-        bias=bias.astype(np.float64, copy=False).reshape(-1, 3),
-    )
-
-
-def _quaternion_correctives(
-    archive: Archive, n_vertices: int, n_joints: int
-) -> tuple[Correctives, str] | None:
-    """Return correctives that quaternions drive, and the model's title; None for SMPL's.
-
-    STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR has
-    four for each joint.
-    """
-    array = archive.array("posedirs")
-    kinds = {
-        4 * (n_joints - 1) + 1: (QuaternionFeature(n_joints, False, _STAR_SHAPE), "STAR"),
-        4 * n_joints: (QuaternionFeature(n_joints, True), "SUPR"),
-    }
-    count = array.shape[-1] if len(array.shape) == 3 else 0
-    if array.shape != (n_vertices, 3, count) or count not in kinds or n_joints < 2:
-        return None
-
-    def load() -> np.ndarray:
-        rows = np.ascontiguousarray(np.moveaxis(array.values(), 2, 0), np.float64)
-        return finite(archive, "posedirs", rows)
-
-    feature, title = kinds[count]
-    return Correctives(Deferred((count, n_vertices, 3), np.float64, load), feature), title
