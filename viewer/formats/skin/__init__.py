@@ -37,7 +37,6 @@ from viewer.formats.skin.checks import (
     checked_triangles,
     even_counts,
     invert_bindings,
-    unbound_skin,
 )
 from viewer.formats.skin.sections import Sections, read_sections
 from viewer.formats.skin.tables import KEYWORDS
@@ -147,7 +146,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     if sections.starts is None or sections.bindings is None:
         missing = "skinweights" if sections.starts is None else "bindings"
         present = "bindings" if sections.starts is None else "skinweights"
-        skin = None if sections.starts is None else unbound_skin(sections)
+        skin = None if sections.starts is None else _unbound_skin(sections)
         source.refuse(
             "B001.skin-section",
             sections.offsets[present],
@@ -164,6 +163,16 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     if not source.diagnostics.errors:  # after errors, warnings about weights are redundant
         check_weights(source, skin)
     return skin
+
+
+def _unbound_skin(sections: Sections) -> Skin:
+    """Return the skin of a file without bindings, with the joints bound at their rest positions."""
+    assert sections.starts is not None  # checked by the caller
+    fits = sections.joints >= 0
+    joints = np.where(fits, sections.joints, 0).astype(np.int32)
+    count = int(joints.max(initial=0)) + 1
+    weights = np.where(fits, sections.weights, 0.0)
+    return Skin(sections.starts, joints, weights, np.tile(np.eye(4), (count, 1, 1)))
 
 
 def write(figure: Figure, path: str | Path) -> list[Diagnostic]:

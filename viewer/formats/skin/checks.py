@@ -15,7 +15,7 @@ from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.skin import Skin, has_influence, weight_sums
 
 # Tolerance of the format for sums of weights; larger deviations from 1 cause a warning.
-WEIGHT_TOLERANCE = 0.01
+_WEIGHT_TOLERANCE = 0.01
 _SINGULAR = 1e-12  # minimum determinant relative to the product of the column lengths
 _NEARLY_SINGULAR = 1e6  # maximum condition number
 _FAR = 1e6  # multiple of the median distance beyond which a vertex is stray
@@ -81,14 +81,30 @@ def _fit_weights(sections: Sections, count: int) -> None:
     sections.weights = sections.weights[: starts[-1]]
 
 
-def unbound_skin(sections: Sections) -> Skin:
-    """Return the skin of a file without bindings, with the joints bound at their rest positions."""
-    assert sections.starts is not None  # checked by the caller
-    fits = sections.joints >= 0
-    joints = np.where(fits, sections.joints, 0).astype(np.int32)
-    count = int(joints.max(initial=0)) + 1
-    weights = np.where(fits, sections.weights, 0.0)
-    return Skin(sections.starts, joints, weights, np.tile(np.eye(4), (count, 1, 1)))
+def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> Ints:
+    """Return all triangles, (T, 3); refuse indices of nonexistent vertices."""
+    first, tables = 0, []
+    for run in sections.triangles:
+        rows = run.triangles
+        if len(rows) and (rows.min() < 0 or rows.max() >= n_vertices):
+            fits = (rows >= 0) & (rows < n_vertices)
+            wrong = ~fits & (rows != LOST)
+            if wrong.any():
+                row, corner = np.argwhere(wrong)[0].tolist()
+                source.refuse(
+                    "F002.skin-corner-range",
+                    run.offset_of(row),
+                    int(wrong.sum()),
+                    "triangles",
+                    np.flatnonzero(wrong.any(axis=1)) + first,
+                    triangle=row + first,
+                    limit=n_vertices,
+                    found=int(rows[row, corner]),
+                )
+            rows = neutral_corners(rows, fits)
+        tables.append(rows)
+        first += len(rows)
+    return tables[0] if len(tables) == 1 else np.concatenate(tables)
 
 
 def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
@@ -117,32 +133,6 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
             vertex=vertex,
             distance=float(distance[vertex]),
         )
-
-
-def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> Ints:
-    """Return all triangles, (T, 3); refuse indices of nonexistent vertices."""
-    first, tables = 0, []
-    for run in sections.triangles:
-        rows = run.triangles
-        if len(rows) and (rows.min() < 0 or rows.max() >= n_vertices):
-            fits = (rows >= 0) & (rows < n_vertices)
-            wrong = ~fits & (rows != LOST)
-            if wrong.any():
-                row, corner = np.argwhere(wrong)[0].tolist()
-                source.refuse(
-                    "F002.skin-corner-range",
-                    run.offset_of(row),
-                    int(wrong.sum()),
-                    "triangles",
-                    np.flatnonzero(wrong.any(axis=1)) + first,
-                    triangle=row + first,
-                    limit=n_vertices,
-                    found=int(rows[row, corner]),
-                )
-            rows = neutral_corners(rows, fits)
-        tables.append(rows)
-        first += len(rows)
-    return tables[0] if len(tables) == 1 else np.concatenate(tables)
 
 
 def invert_bindings(source: Source, sections: Sections) -> Floats:
@@ -238,7 +228,7 @@ def check_weights(source: Source, skin: Skin) -> None:
         )
     sums = weight_sums(skin)
     errors = np.where(moved, np.abs(sums - 1.0), 0.0)
-    off = errors > WEIGHT_TOLERANCE
+    off = errors > _WEIGHT_TOLERANCE
     if off.any():
         worst = int(errors.argmax())
         source.warn(

@@ -1,9 +1,8 @@
-"""Parser for the sections of a ``.skin`` file; returns unchecked arrays."""
+"""Parser for the sections of a ``.skin`` file; ``checks.py`` checks the arrays that it returns."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Container
 from dataclasses import field
 
 import numpy as np
@@ -29,6 +28,9 @@ from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.material import Material, Texture
 
 _WIDTHS = {"positions": 3, "normals": 3, "texcoords": 2}
+# A file name may contain spaces: it extends to the end of the line.
+_FILE_NAME = re.compile(rb"[ \t\n\r\v\f]*([^\r\n{}]*)")
+_IDENTITY: Floats = np.eye(4, 3).ravel()  # four rows of three, as in the file
 _Word = re.Match[bytes]
 
 
@@ -114,7 +116,7 @@ def _read_section(source: Source, sections: Sections, word: _Word) -> int:
         check_declared(source, sections, name)
     sections.offsets[name] = word.start()
     if name == "material":
-        material, position = _read_material(source, word, KEYWORDS, sections.pictures)
+        material, position = _read_material(source, word, sections.pictures)
         sections.materials.append(material)
         return position
     count, position = read_count(source, name, word)
@@ -124,36 +126,19 @@ def _read_section(source: Source, sections: Sections, word: _Word) -> int:
     block = find_block(source, name, word, position)
     sections.counts[name] = count
     if name == "skinweights":
-        _read_weights(source, sections, block, count)
+        starts, joints, weights, offset_of = read_weights(source, block, count)
+        source.remember("weights", offset_of)
+        sections.starts, sections.joints, sections.weights = starts, joints, weights
     elif name == "triangles":
         run = _read_triangles(source, sections, block, count)
         sections.triangles.append(run)
         sections.n_triangles += len(run.triangles)
     else:
-        sections.tables[name] = _read_table(source, block, count)
+        sections.tables[name], offset_of = read_rows(source, block, count, _WIDTHS[name])
+        source.remember(name, offset_of)
     if not block.closed:
         source.warn("F006.last-brace", section=name)
     return block.end + block.closed
-
-
-def _read_table(source: Source, block: Block, count: int) -> Floats:
-    """Parse a table, with NaN for invalid values, and register its rows."""
-    rows, offset_of = read_rows(source, block, count, _WIDTHS[block.name])
-    source.remember(block.name, offset_of)
-    return rows
-
-
-def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> _TriangleRun:
-    first = sections.n_triangles
-    rows, offset_of = read_rows(source, block, count, 3, first, "triangle")
-    corners = whole_corners(source, rows, offset_of, first)
-    return _TriangleRun(corners, len(sections.materials) - 1, offset_of)
-
-
-def _read_weights(source: Source, sections: Sections, block: Block, count: int) -> None:
-    starts, joints, weights, offset_of = read_weights(source, block, count)
-    source.remember("weights", offset_of)
-    sections.starts, sections.joints, sections.weights = starts, joints, weights
 
 
 def check_declared(source: Source, sections: Sections, name: str) -> None:
@@ -169,29 +154,15 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
         source.refuse("F002.skin-declared", offset, section=name, expected=declared, found=found)
 
 
-def _skip(source: Source, word: _Word) -> int:
-    """Return the offset after an unknown section: after its numbers or its balanced block."""
-    depth = 0
-    position = word.start()
-    while (following := source.next_word(position)) is not None:
-        text = following.group()
-        if depth == 0 and position > word.start() and (text in KEYWORDS or text == b"}"):
-            return following.start()
-        depth += {b"{": 1, b"}": -1}.get(text, 0)
-        position = following.end()
-        if text == b"}" and depth == 0:
-            return position
-    if depth:
-        raise source.fault("F002.open", word.start(), word=word.group())
-    return position
-
-
-# A file name may contain spaces: it extends to the end of the line.
-_FILE_NAME = re.compile(rb"[ \t\n\r\v\f]*([^\r\n{}]*)")
+def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> _TriangleRun:
+    first = sections.n_triangles
+    rows, offset_of = read_rows(source, block, count, 3, first, "triangle")
+    corners = whole_corners(source, rows, offset_of, first)
+    return _TriangleRun(corners, len(sections.materials) - 1, offset_of)
 
 
 def _read_material(
-    source: Source, header: _Word, keywords: Container[bytes], pictures: dict[str, Bytes | None]
+    source: Source, header: _Word, pictures: dict[str, Bytes | None]
 ) -> tuple[Material, int]:
     """Read one material.
 
@@ -201,8 +172,6 @@ def _read_material(
         The file.
     header : Word
         The word ``material``.
-    keywords : container of bytes
-        Keywords of sections, which cannot be part of a name.
     pictures : dict
         Images loaded so far, by name; the image of this material is added.
 
@@ -218,7 +187,7 @@ def _read_material(
     FormatError
         If a brace is missing.
     """
-    name, brace = _name(source, header, keywords)
+    name, brace = _material_name(source, header)
     texture: str | None = None
     named = header.start()
     position = brace.end()
@@ -242,11 +211,11 @@ def _read_material(
     return Material(name, Texture(texture, pictures[texture])), word.end()
 
 
-def _name(source: Source, header: _Word, keywords: Container[bytes]) -> tuple[str, _Word]:
-    """Return the words up to the opening brace, and that brace."""
+def _material_name(source: Source, header: _Word) -> tuple[str, _Word]:
+    """Return the words up to the opening brace, which are no keywords, and that brace."""
     words: list[bytes] = []
     word = source.next_word(header.end())
-    while word is not None and word.group() not in (b"{", b"}") and word.group() not in keywords:
+    while word is not None and word.group() not in (b"{", b"}") and word.group() not in KEYWORDS:
         words.append(word.group())
         word = source.next_word(word.end())
     if word is None or word.group() != b"{":
@@ -271,9 +240,6 @@ def _skip_item(source: Source, word: _Word) -> int:
     if depth:
         raise source.fault("F002.open", word.start(), word=word.group())
     return position
-
-
-_NEUTRAL: Floats = np.eye(4, 3).ravel()  # identity as four rows of three, as in the file
 
 
 def _read_bindings(source: Source, count: int, position: int) -> tuple[Floats, int]:
@@ -324,8 +290,8 @@ def _read_matrix(source: Source, index: int, word: _Word) -> tuple[Floats, int]:
         places = np.full(len(words.bad), index)
         item = Phrase("matrix", index=index)
         refuse_words(source, words, words.bad, lambda _: item, "bindings", places)
-        return _NEUTRAL, block.end + 1
-    if len(values) != len(_NEUTRAL):
+        return _IDENTITY, block.end + 1
+    if len(values) != len(_IDENTITY):
         source.refuse(
             "F002.width",
             word.start(),
@@ -333,8 +299,25 @@ def _read_matrix(source: Source, index: int, word: _Word) -> tuple[Floats, int]:
             "bindings",
             [index],
             item=Phrase("matrix", index=index),
-            expected=len(_NEUTRAL),
+            expected=len(_IDENTITY),
             found=len(values),
         )
-        return _NEUTRAL, block.end + 1
+        return _IDENTITY, block.end + 1
     return values, block.end + 1
+
+
+def _skip(source: Source, word: _Word) -> int:
+    """Return the offset after an unknown section: after its numbers or its balanced block."""
+    depth = 0
+    position = word.start()
+    while (following := source.next_word(position)) is not None:
+        text = following.group()
+        if depth == 0 and position > word.start() and (text in KEYWORDS or text == b"}"):
+            return following.start()
+        depth += {b"{": 1, b"}": -1}.get(text, 0)
+        position = following.end()
+        if text == b"}" and depth == 0:
+            return position
+    if depth:
+        raise source.fault("F002.open", word.start(), word=word.group())
+    return position

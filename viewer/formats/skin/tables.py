@@ -1,4 +1,9 @@
-"""Blocks of numbers in a ``.skin`` file."""
+"""Blocks of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
+
+A valid block is parsed as a whole. Otherwise every word is examined: each error is recorded and the
+value replaced by NaN. Line breaks have no meaning in the format, but most files have one vertex or
+triangle per line. In this case, a line of the wrong length does not affect the others.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +28,14 @@ KEYWORDS = frozenset(
     (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")
 )
 """Keywords of sections."""
-_INT32 = 2.0**31
+LOST = -(2**31)
+"""Placeholder for a corner that is not an integer."""
+_INT32 = 2.0**31  # numbers below it, and at least its negative, fit into an int32
+_PARTS: dict[str, Part] = {"positions": "positions", "triangles": "triangles"}
 _Word = re.Match[bytes]
+_Places = NDArray[np.int64]
+OffsetOf = Callable[[int], int]
+"""Returns the offset of the element with an index; slow, for errors only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,53 +95,6 @@ def read_count(source: Source, name: str, word: _Word) -> tuple[int, int]:
             "F002.skin-too-many", found.start(), section=name, found=int(value), size=left
         )
     return int(value), found.end()
-
-
-def words_of(source: Source, block: Block) -> Words:
-    """Return the words of a block, which must not contain the keyword of another section.
-
-    Raises
-    ------
-    FormatError
-        If the block is not closed before another section begins.
-    """
-    from viewer.formats._text.words import read_words
-
-    words = read_words(source.data, block.start, block.end)
-    for index in words.bad.tolist():
-        word = words.word(index)
-        if word in KEYWORDS or b"{" in word:
-            raise unclosed(source, block, int(words.offsets[index]), word)
-    return words
-
-
-def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
-    """Return the error for a block interrupted by ``found``, or by the end of the file if None."""
-    line = source.line(block.header)
-    return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
-
-
-def to_whole(values: Floats) -> tuple[Ints, int]:
-    """Return numbers as int32, and the index of the first number that conversion changed, or -1."""
-    whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
-    differs = whole != values
-    whole.flags.writeable = False  # a read-only array need not be copied
-    return whole, int(differs.argmax()) if differs.any() else -1
-
-
-# Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
-#
-# A valid block is parsed as a whole. Otherwise every word is examined: each error is recorded and
-# the value replaced by NaN. Line breaks have no meaning in the format, but most files have one
-# vertex or triangle per line. In this case, a line of the wrong length does not affect the
-# others.
-
-LOST = -(2**31)
-"""Placeholder for a corner that is not an integer."""
-_Places = NDArray[np.int64]
-OffsetOf = Callable[[int], int]
-"""Returns the offset of the element with an index; slow, for errors only."""
-_PARTS: dict[str, Part] = {"positions": "positions", "triangles": "triangles"}
 
 
 def read_rows(
@@ -252,6 +216,30 @@ def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -
     )
 
 
+def words_of(source: Source, block: Block) -> Words:
+    """Return the words of a block, which must not contain the keyword of another section.
+
+    Raises
+    ------
+    FormatError
+        If the block is not closed before another section begins.
+    """
+    from viewer.formats._text.words import read_words
+
+    words = read_words(source.data, block.start, block.end)
+    for index in words.bad.tolist():
+        word = words.word(index)
+        if word in KEYWORDS or b"{" in word:
+            raise unclosed(source, block, int(words.offsets[index]), word)
+    return words
+
+
+def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
+    """Return the error for a block interrupted by ``found``, or by the end of the file if None."""
+    line = source.line(block.header)
+    return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
+
+
 def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
     """Return triangles as integers, ``LOST`` for corners that are not integers: (T, 3).
 
@@ -284,3 +272,11 @@ def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int)
             found=float(rows[row][wrong[row]][0]),
         )
     return np.where(wrong, LOST, corners).astype(np.int32)
+
+
+def to_whole(values: Floats) -> tuple[Ints, int]:
+    """Return numbers as int32, and the index of the first number that conversion changed, or -1."""
+    whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
+    differs = whole != values
+    whole.flags.writeable = False  # a read-only array need not be copied
+    return whole, int(differs.argmax()) if differs.any() else -1

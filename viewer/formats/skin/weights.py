@@ -1,4 +1,4 @@
-"""The ``skinweights`` section of a ``.skin`` file.
+"""Reader and writer of the ``skinweights`` section of a ``.skin`` file.
 
 It has a count for each vertex, followed by as many pairs of joint and weight. Valid numbers are
 parsed together; otherwise every word is examined, and an unreadable vertex gets no influence.
@@ -24,6 +24,10 @@ from viewer.rig.skin import Skin
 if TYPE_CHECKING:
     from viewer.formats._text.words import Words
 
+_LEAP = 16  # number of vertices that each step of the Python loop skips
+_SMALL = 1 << 29  # maximum count of numbers for which three times the count fits into an int32
+_AT_ONCE = 2048  # number of vertices that are formatted together
+_SEPARATORS = (b" ", b"\n  ")
 _Places = NDArray[np.int64]
 Influences = tuple[Ints, Ints, Floats, OffsetOf]
 
@@ -58,6 +62,39 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
     heads = _find_heads(values, count) if bad < 0 else None
     found = None if heads is None else _whole_influences(source, block, values, heads)
     return _faulty_influences(source, block, count) if found is None else found
+
+
+def _find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
+    """Return the positions of the vertices' counts, (V,); None if they do not fill the block.
+
+    Each count determines the position of the next, so they form a linked list. Composing the map
+    from each position to the next with itself four times lets each step of the loop skip 16
+    vertices.
+    """
+    size = len(values)
+    if count == 0:
+        return None if size else np.zeros(0, np.int32)
+    # There are two extra positions, the end of the block and one beyond it; both map to the second.
+    kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
+    after = np.full(size + 2, size + 1, dtype=kind)
+    counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)
+    is_count = counts == values
+    counts *= 2
+    counts += np.arange(1, size + 1, dtype=kind)
+    is_count &= counts <= size
+    np.copyto(after[:size], counts, where=is_count)
+    leap = after
+    for _ in range(_LEAP.bit_length() - 1):
+        leap = leap[leap]
+    anchors = [0]
+    for _ in range((count - 1) // _LEAP):
+        anchors.append(int(leap[anchors[-1]]))
+    columns = [np.array(anchors, dtype=kind)]
+    for _ in range(_LEAP - 1):
+        columns.append(after[columns[-1]])
+    heads = np.stack(columns, axis=1).ravel()[:count]
+    fills = heads[-1] < size and after[heads[-1]] == size
+    return heads if fills else None
 
 
 def _whole_influences(
@@ -180,7 +217,10 @@ def _faulty_pairs(
 def _no_influences(
     source: Source, block: Block, words: Words, known: Floats, count: int
 ) -> FormatError:
-    """Return the error for the first wrong count, found by following the counts one by one."""
+    """Return the error for the first wrong count, found by following the counts one by one.
+
+    If all of them are counts, there are too few or too many numbers for the declared vertices.
+    """
     numbers = known.tolist()
     heads: list[int] = []
     position = 0
@@ -195,12 +235,6 @@ def _no_influences(
                 found=words.word(position),
             )
         position += 1 + 2 * int(length)
-    return _count_fault(source, block, words, count, heads)
-
-
-def _count_fault(
-    source: Source, block: Block, words: Words, count: int, heads: list[int]
-) -> FormatError:
     if not block.closed:
         return source.fault(
             "F002.skin-weights-end",
@@ -226,58 +260,17 @@ def _count_fault(
     )
 
 
-_LEAP = 16  # number of vertices that each step of the Python loop skips
-_SMALL = 1 << 29  # maximum count of numbers for which three times the count fits into an int32
-
-
-def _find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
-    """Return the positions of the vertices' counts, (V,); None if they do not fill the block.
-
-    Each count determines the position of the next, so they form a linked list. Composing the map
-    from each position to the next with itself four times lets each step of the loop skip 16
-    vertices.
-    """
-    size = len(values)
-    if count == 0:
-        return None if size else np.zeros(0, np.int32)
-    # There are two extra positions, the end of the block and one beyond it; both map to the second.
-    kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
-    after = np.full(size + 2, size + 1, dtype=kind)
-    counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)
-    is_count = counts == values
-    counts *= 2
-    counts += np.arange(1, size + 1, dtype=kind)
-    is_count &= counts <= size
-    np.copyto(after[:size], counts, where=is_count)
-    leap = after
-    for _ in range(_LEAP.bit_length() - 1):
-        leap = leap[leap]
-    anchors = [0]
-    for _ in range((count - 1) // _LEAP):
-        anchors.append(int(leap[anchors[-1]]))
-    columns = [np.array(anchors, dtype=kind)]
-    for _ in range(_LEAP - 1):
-        columns.append(after[columns[-1]])
-    heads = np.stack(columns, axis=1).ravel()[:count]
-    fills = heads[-1] < size and after[heads[-1]] == size
-    return heads if fills else None
-
-
-_AT_ONCE = 2048  # number of vertices that are formatted together
-_SEPARATORS = (b" ", b"\n  ")
-
-
 def weights_lines(skin: Skin) -> Iterator[bytes]:
     """Yield the lines of the section in parts: a count, and pairs of a joint and a weight."""
     for first in range(0, skin.n_vertices, _AT_ONCE):
         starts = skin.starts[first : first + _AT_ONCE + 1]
         used = slice(int(starts[0]), int(starts[-1]))
-        text = _text(starts - starts[0], skin.joints[used], skin.weights[used])
+        text = _lines_text(starts - starts[0], skin.joints[used], skin.weights[used])
         # The separator of lines ends with the indentation of the next line.
         yield b"  " + text[:-2]
 
 
-def _text(starts: Ints, joints: Ints, weights: Floats) -> bytes:
+def _lines_text(starts: Ints, joints: Ints, weights: Floats) -> bytes:
     """Return lines of a count followed by pairs of a joint and a weight."""
     counts = np.diff(starts)
     heads = 2 * starts[:-1] + np.arange(len(counts))
