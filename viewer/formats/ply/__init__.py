@@ -44,7 +44,7 @@ from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
 from viewer.rig.srgb import decode_srgb
 
-Indices = NDArray[np.integer]
+_Indices = NDArray[np.integer]
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _COLORS = ("red", "green", "blue", "alpha")
 _TEXTURE = "texturefile"
@@ -114,7 +114,7 @@ def read(source: Source) -> Figure:
     )
 
 
-def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None:
+def _remember(source: Source, tables: dict[str, Table], owners: _Indices) -> None:
     """Register the offsets of vertices and triangles in a text file."""
     if (vertices := tables["vertex"].offset_of) is not None:
         source.remember("positions", vertices)
@@ -173,7 +173,7 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
 
 def _faces(
     source: Source, tables: dict[str, Table], n_vertices: int
-) -> tuple[Indices, Indices, Floats | None]:
+) -> tuple[_Indices, _Indices, Floats | None]:
     """Return corner counts of the faces, all corners, and their texture coordinates if any."""
     faces = tables.get("face")
     nothing = np.zeros(0, np.int64)
@@ -199,8 +199,8 @@ def _faces(
 
 
 def _corners(
-    source: Source, faces: Table, counts: Indices, values: NDArray[Any], n_vertices: int
-) -> Indices:
+    source: Source, faces: Table, counts: _Indices, values: NDArray[Any], n_vertices: int
+) -> _Indices:
     """Return the vertices of all faces; invalid ones are replaced by others of the same face."""
     # A single NaN makes the extremes NaN.
     if len(values) and values.min() >= 0 and values.max() < n_vertices:
@@ -232,7 +232,7 @@ def _corners(
     return first_known(corners, counts, owners)
 
 
-def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
+def _wedges(source: Source, faces: Table, counts: _Indices) -> Floats | None:
     """Return texture coordinates of corners, (C, 2), if every face has two numbers per corner."""
     if "texcoord" not in faces.lists:
         return None
@@ -258,7 +258,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
 
 
 def _uvs(
-    source: Source, vertices: Table, wedges: Floats | None, picks: Indices
+    source: Source, vertices: Table, wedges: Floats | None, picks: _Indices
 ) -> tuple[Floats | None, Ints | None]:
     """Return texture coordinates: distinct ones of corners, or the coordinates of vertices."""
     if wedges is not None and len(wedges):

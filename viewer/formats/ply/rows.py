@@ -1,4 +1,9 @@
-"""Parser for the rows after the header of a ``.ply``: text or binary, element after element."""
+"""Parser for the rows after the header of a ``.ply``: text or binary, element after element.
+
+In most files, all rows of an element have the same size. Their columns are then views of one array,
+and the positions of individual numbers are not needed. Otherwise a cursor for each row moves from
+one property to the next.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +27,46 @@ from viewer.formats._text.words import number_key
 from viewer.formats.ply.header import CORNERS, Element, Header, Property
 from viewer.progress import report_bytes
 
-_Indices = NDArray[np.integer]
 _PART = 1 << 17  # rows that are parsed together, to limit the memory of their values
+_PIECE = 1 << 18  # bytes per piece, whose temporary arrays stay in the processor's cache
 _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
+_LINE_END = re.compile(rb"[\r\n]")
+_WHOLE = 2.0**31  # numbers between it and its negative fit into an int32
+_Indices = NDArray[np.integer]
+_Places = NDArray[np.int64]
+_Numbers = NDArray[Any]
+_Columns = tuple[dict[str, _Numbers], dict[str, tuple[NDArray[np.int64], _Numbers]]]
+"""Properties by name, and lists by name. A list consists of the number of values of each row, and
+all values."""
+
+
+@dataclass(slots=True)
+class Table:
+    """One element's rows.
+
+    Attributes
+    ----------
+    element : Element
+        Declaration of the element in the header.
+    columns : dict of str to (N,)
+        Properties of the element that are not lists.
+    lists : dict of str to ((N,), (M,))
+        List properties: the number of values of each row, and the values of all rows.
+    offset_of : callable or None
+        Returns the offset of a row; slow, for errors only. None in a binary file.
+    is_first : bool
+        Whether it is the first element with its name; later ones are read and discarded.
+    """
+
+    element: Element
+    columns: dict[str, _Numbers] = field(default_factory=dict)
+    lists: dict[str, tuple[_Places, _Numbers]] = field(default_factory=dict)
+    offset_of: Callable[[int], int] | None = None
+    is_first: bool = True
+
+    def offset(self, row: int) -> int | None:
+        """Return the offset of a row in the file; None in a binary file, which has no lines."""
+        return None if self.offset_of is None else self.offset_of(row)
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
@@ -35,8 +77,8 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     FormatError
         If there are fewer numbers than the header declares, or words that are not numbers.
     """
-    body: _Text | _BinaryRows
-    body = _BinaryRows(source, header) if header.order else _Text(source, header)
+    body: _TextRows | _BinaryRows
+    body = _BinaryRows(source, header) if header.order else _TextRows(source, header)
     tables: dict[str, Table] = {}
     for element in header.elements:
         table = Table(element, is_first=element.name not in tables)
@@ -57,7 +99,7 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     return tables
 
 
-class _Text:
+class _TextRows:
     """Rows of a text file, one per line; words that are not numbers become NaN."""
 
     def __init__(self, source: Source, header: Header) -> None:
@@ -386,17 +428,6 @@ class _BinaryRows:
         )
 
 
-# Rows of a ``.ply`` that all have the same size, as in most files.
-#
-# Their columns are views of one array, so positions of individual numbers are not needed.
-
-_WHOLE = 2.0**31
-_Numbers = NDArray[Any]
-_Columns = tuple[dict[str, _Numbers], dict[str, tuple[NDArray[np.int64], _Numbers]]]
-"""Properties by name, and lists by name. A list consists of the number of values of each row, and
-all values."""
-
-
 def _even_text(element: Element, block: _Numbers) -> _Columns | None:
     """Split rows of numbers into the columns of an element, (N, C).
 
@@ -473,46 +504,10 @@ def _equal_counts(count: int, size: int) -> NDArray[np.int64]:
     return np.broadcast_to(np.int64(size), (count,))
 
 
-_Places = NDArray[np.int64]
-
-
-@dataclass(slots=True)
-class Table:
-    """One element's rows.
-
-    Attributes
-    ----------
-    element : Element
-        Declaration of the element in the header.
-    columns : dict of str to (N,)
-        Properties of the element that are not lists.
-    lists : dict of str to ((N,), (M,))
-        List properties: the number of values of each row, and the values of all rows.
-    offset_of : callable or None
-        Returns the offset of a row; slow, for errors only. None in a binary file.
-    is_first : bool
-        Whether it is the first element with its name; later ones are read and discarded.
-    """
-
-    element: Element
-    columns: dict[str, _Numbers] = field(default_factory=dict)
-    lists: dict[str, tuple[_Places, _Numbers]] = field(default_factory=dict)
-    offset_of: Callable[[int], int] | None = None
-    is_first: bool = True
-
-    def offset(self, row: int) -> int | None:
-        """Return the offset of a row in the file; None in a binary file, which has no lines."""
-        return None if self.offset_of is None else self.offset_of(row)
-
-
 def _list_places(starts: _Places, counts: _Places, step: int) -> _Places:
     """Return the positions of all values of lists that begin at ``starts``."""
     total = np.cumsum(counts) - counts
     return np.repeat(starts - total * step, counts) + np.arange(counts.sum()) * step
-
-
-_PIECE = 1 << 18  # bytes per piece, whose temporary arrays stay in the processor's cache
-_LINE_END = re.compile(rb"[\r\n]")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
