@@ -8,20 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Part, Phrase
 from viewer.formats._mesh.polygons import first_known, triangles_of
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, parse_words, to_number, word_begins
-from viewer.formats._text.words import Words, refuse_words
-from viewer.formats.obj.lines import Lines, NumberRows, Places, Rows, rows_of
+from viewer.formats.obj.lines import Lines, Places, Rows, rows_of
 from viewer.rig.arrays import Bools, Floats
 
 _CORNER_KINDS = ("v", "vt", "vn")
 """Keywords of the elements that the three numbers of a corner index."""
 FEWEST = 3
 """Corners of a face."""
-_Corners = NDArray[np.integer]
 _SLASH = ord("/")
+_LOST = -(2**40)
+"""Represents an unknown vertex; no file has this many vertices."""
+_Corners = NDArray[np.integer]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,8 +137,14 @@ def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
     return [0, 1, 2] if (gaps > 1).all() else None
 
 
-def _number_begins(rows: Rows) -> Places:
-    return word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
+def _in_columns(values: Floats, columns: list[int], count: int) -> _Corners | None:
+    """Arrange the numbers of corners in some of three columns; the others are 0."""
+    whole = _whole(values)
+    if whole is None or len(whole) != len(columns) * count:
+        return None
+    table = np.zeros((count, 3), dtype=np.int32)
+    table[:, columns] = whole.reshape(count, -1)
+    return table
 
 
 def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
@@ -175,21 +181,8 @@ def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
     return fits, n_numbers, has_gap
 
 
-def _whole(values: Floats) -> _Corners | None:
-    """Return numbers as integers; None if one has a fraction, or is too large for an index."""
-    # The function for invalid faces reads large numbers again.
-    whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
-    return whole if (whole == values).all() else None
-
-
-def _in_columns(values: Floats, columns: list[int], count: int) -> _Corners | None:
-    """Arrange the numbers of corners in some of three columns; the others are 0."""
-    whole = _whole(values)
-    if whole is None or len(whole) != len(columns) * count:
-        return None
-    table = np.zeros((count, 3), dtype=np.int32)
-    table[:, columns] = whole.reshape(count, -1)
-    return table
+def _number_begins(rows: Rows) -> Places:
+    return word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
 
 
 def _spread(values: Floats, counts: Places, gaps: Bools) -> _Corners | None:
@@ -207,70 +200,11 @@ def _spread(values: Floats, counts: Places, gaps: Bools) -> _Corners | None:
     return table
 
 
-_LOST = -(2**40)
-"""Represents an unknown vertex; no file has this many vertices."""
-
-
-def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
-    """Parse the numbers after a keyword; see ``number_rows``.
-
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors.
-    lines : Lines
-        Lines of the file.
-    keyword : str
-        v, vt or vn.
-    width : int
-        Minimum number of values in a line.
-    first : int
-        Number of earlier lines with this keyword.
-
-    Returns
-    -------
-    table, counts, values, rows
-        As for ``number_rows``, with NaN for words that are not numbers and in rows that are too
-        short.
-    """
-    rows = rows_of(lines, keyword)
-    begins = word_begins(rows.letters)
-    values = parse_words(rows.body, 0, len(rows.body))
-    firsts = np.searchsorted(begins, rows.starts)
-    counts = np.diff(firsts)
-    owners = np.repeat(np.arange(len(counts)), counts)
-    words = Words(source.data, values, rows.origins[owners] + begins - rows.starts[owners], owners)
-    part: Part = "positions" if keyword == "v" else ""
-    bad = words.bad
-    is_used = bad - firsts[owners[bad]] < width
-    parts: tuple[Part, Part] = (part, "")  # only these numbers are checked
-    for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
-        owned = owners[bad[chosen]] + first
-        refuse_words(
-            source,
-            words,
-            bad[chosen],
-            lambda word: Phrase(f"obj-{keyword}", index=int(owners[word]) + first),
-            whose,
-            owned,
-        )
-    short = np.flatnonzero(counts < width)
-    if len(short):
-        row = int(short[0])
-        source.refuse(
-            "F002.width",
-            int(rows.origins[row]) - 1,
-            len(short),
-            part,
-            short + first,
-            item=Phrase(f"obj-{keyword}", index=row + first),
-            expected=width,
-            found=int(counts[row]),
-        )
-    table = np.full((len(counts), width), np.nan)
-    long = counts >= width
-    table[long] = values[firsts[:-1][long, None] + np.arange(width)]
-    return table, counts, values, rows
+def _whole(values: Floats) -> _Corners | None:
+    """Return numbers as integers; None if one has a fraction, or is too large for an index."""
+    # The function for invalid faces reads large numbers again.
+    whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
+    return whole if (whole == values).all() else None
 
 
 def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
@@ -322,14 +256,6 @@ def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     return FaceRows(counts[kept], written[kept[owners]] - 1, rows.origins[kept] - 1, tuple(faults))
 
 
-def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
-    found = source.next_word(offset)
-    word = b"" if found is None else found.group()
-    if any(to_number(number) == 0.0 for number in word.split(b"/")):
-        return CornerFault("F002.obj-zero", offset, {}, faces)
-    return CornerFault("F002.obj-corner", offset, {"found": word}, faces)
-
-
 def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
     """Return the numbers of every corner, 0 if missing, (C, 3), and a mask of invalid corners."""
     values = parse_words(rows.body.replace(b"/", b" "), 0, len(rows.body))
@@ -348,6 +274,14 @@ def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
     whole = np.clip(np.nan_to_num(numbers), -(2.0**40), 2.0**40).astype(np.int64)
     lost = ~fits | (whole != numbers).any(axis=1) | (whole[:, 0] == 0)
     return whole, lost
+
+
+def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
+    found = source.next_word(offset)
+    word = b"" if found is None else found.group()
+    if any(to_number(number) == 0.0 for number in word.split(b"/")):
+        return CornerFault("F002.obj-zero", offset, {}, faces)
+    return CornerFault("F002.obj-corner", offset, {"found": word}, faces)
 
 
 def checked_corners(

@@ -13,21 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import Part, Phrase
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_numbers, word_begins
+from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
+from viewer.formats._text.words import Words, refuse_words
 from viewer.rig.arrays import Bools, Floats
 
-Places = NDArray[np.int64]
-Letters = NDArray[np.uint8]
 KEYWORDS = ("v", "vt", "vn", "f")
 """Keywords of the lines that contain numbers."""
 _PIECE = 1 << 18  # bytes per piece
+_PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _CONTINUES = re.compile(rb"\\(?:\r*\n|\r+)\Z")
 _COMMENT = re.compile(rb"#[^\r\n]*")
 _OPEN_END = re.compile(rb"(?<=\d)/+(?=\s)")  # as in 1/2/ or 1//, which some programs write
 _OPEN_ENDS = b"/ ", b"/\n", b"/\r", b"/\t"
-_PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
+Places = NDArray[np.int64]
+Letters = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,10 @@ class Rows:
         return int(self.origins[row] + place - self.starts[row])
 
 
+NumberRows = tuple[Floats, Places, Floats, Rows]
+"""Results of ``number_rows``."""
+
+
 def pieces(source: Source) -> Iterator[Lines]:
     """Yield the whole file, piece by piece, with offsets relative to the file."""
     start = 0
@@ -143,6 +149,107 @@ def _is_blank(letters: Letters) -> Bools:
     return (letters == 32) | (letters - np.uint8(9) < 5)
 
 
+def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
+    """Parse the numbers after a keyword.
+
+    Parameters
+    ----------
+    lines : Lines
+        Some lines of a file.
+    keyword : str
+        v, vt or vn.
+    width : int
+        Minimum number of values in a line.
+
+    Returns
+    -------
+    table : (n, width)
+        The first numbers of each line.
+    counts : (n,)
+        Number of values in each line.
+    values : (N,)
+        All values, one line after the other.
+    rows : Rows
+        The text from which they were parsed.
+
+    None is returned instead if a line has too few numbers, or a word is not a number.
+    """
+    rows = rows_of(lines, keyword)
+    begins = word_begins(rows.letters)
+    values, bad = parse_numbers(rows.body, 0, len(rows.body), is_kept=False)
+    if bad >= 0:
+        return None
+    firsts = np.searchsorted(begins, rows.starts)
+    counts = np.diff(firsts)
+    if (counts < width).any():
+        return None
+    if (counts == width).all():
+        return values.reshape(-1, width), counts, values, rows
+    return values[firsts[:-1, None] + np.arange(width)], counts, values, rows
+
+
+def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
+    """Parse the numbers after a keyword; see ``number_rows``.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records the errors.
+    lines : Lines
+        Lines of the file.
+    keyword : str
+        v, vt or vn.
+    width : int
+        Minimum number of values in a line.
+    first : int
+        Number of earlier lines with this keyword.
+
+    Returns
+    -------
+    table, counts, values, rows
+        As for ``number_rows``, with NaN for words that are not numbers and in rows that are too
+        short.
+    """
+    rows = rows_of(lines, keyword)
+    begins = word_begins(rows.letters)
+    values = parse_words(rows.body, 0, len(rows.body))
+    firsts = np.searchsorted(begins, rows.starts)
+    counts = np.diff(firsts)
+    owners = np.repeat(np.arange(len(counts)), counts)
+    words = Words(source.data, values, rows.origins[owners] + begins - rows.starts[owners], owners)
+    part: Part = "positions" if keyword == "v" else ""
+    bad = words.bad
+    is_used = bad - firsts[owners[bad]] < width
+    parts: tuple[Part, Part] = (part, "")  # only these numbers are checked
+    for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
+        owned = owners[bad[chosen]] + first
+        refuse_words(
+            source,
+            words,
+            bad[chosen],
+            lambda word: Phrase(f"obj-{keyword}", index=int(owners[word]) + first),
+            whose,
+            owned,
+        )
+    short = np.flatnonzero(counts < width)
+    if len(short):
+        row = int(short[0])
+        source.refuse(
+            "F002.width",
+            int(rows.origins[row]) - 1,
+            len(short),
+            part,
+            short + first,
+            item=Phrase(f"obj-{keyword}", index=row + first),
+            expected=width,
+            found=int(counts[row]),
+        )
+    table = np.full((len(counts), width), np.nan)
+    long = counts >= width
+    table[long] = values[firsts[:-1][long, None] + np.arange(width)]
+    return table, counts, values, rows
+
+
 def rows_of(lines: Lines, keyword: str) -> Rows:
     """Return the text after a keyword in all lines that have it."""
     chosen = lines.of[keyword]
@@ -191,45 +298,3 @@ def without_comments(text: bytes) -> bytes:
 
 def _blanks(found: re.Match[bytes]) -> bytes:
     return b" " * len(found.group())
-
-
-NumberRows = tuple[Floats, Places, Floats, Rows]
-
-
-def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
-    """Parse the numbers after a keyword.
-
-    Parameters
-    ----------
-    lines : Lines
-        Some lines of a file.
-    keyword : str
-        v, vt or vn.
-    width : int
-        Minimum number of values in a line.
-
-    Returns
-    -------
-    table : (n, width)
-        The first numbers of each line.
-    counts : (n,)
-        Number of values in each line.
-    values : (N,)
-        All values, one line after the other.
-    rows : Rows
-        The text from which they were parsed.
-
-    None is returned instead if a line has too few numbers, or a word is not a number.
-    """
-    rows = rows_of(lines, keyword)
-    begins = word_begins(rows.letters)
-    values, bad = parse_numbers(rows.body, 0, len(rows.body), is_kept=False)
-    if bad >= 0:
-        return None
-    firsts = np.searchsorted(begins, rows.starts)
-    counts = np.diff(firsts)
-    if (counts < width).any():
-        return None
-    if (counts == width).all():
-        return values.reshape(-1, width), counts, values, rows
-    return values[firsts[:-1, None] + np.arange(width)], counts, values, rows

@@ -14,7 +14,7 @@ tinyobjloader write it). An option is a word that begins with ``-`` and its valu
 ``-s`` offset and scale the image, ``-clamp`` clamps it at its edges, ``-bm`` scales a normal map,
 ``-imfchan`` selects a channel. ``map_Ka`` is used if there is no ``map_Kd``. A bump map is drawn if
 its image contains normals; heights, specular and reflection maps and the rest of the extension are
-not drawn. Programs differ in details, see ``_REPLACING``, ``_name_here`` and ``image_kinds``.
+not drawn. Programs differ in details, see ``_REPLACING``, ``_name_here`` and ``_is_normal_map``.
 """
 
 from __future__ import annotations
@@ -35,8 +35,6 @@ from viewer.formats._text.numbers import is_number, to_number
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture
 
-_Load = Callable[[Source, str, int], Bytes | None]
-"""Function from library, file and offset to the pixels of an image."""
 _COLORS = {b"kd": "diffuse", b"ke": "emissive"}
 _NUMBERS = {b"pr": "roughness", b"pm": "metallic", b"d": "opacity", b"tr": "transparency"}
 _MAPS = {
@@ -55,10 +53,53 @@ _NOT_DRAWN = (
     *(b"map_ps", b"ps", b"pc", b"pcr", b"aniso", b"anisor", b"map_pc", b"map_pcr"),
     *(b"map_orm", b"map_rma"),
 )
+# Number of values after each option; -o, -s and -t have one to three.
+_OPTIONS = {
+    "-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1,
+    "-imfchan": 1, "-type": 1, "-cc": 1,
+}  # fmt: skip
+_VECTORS = {"-o": 0.0, "-s": 1.0, "-t": 0.0}
+_CHANNELS = {"r": 0, "g": 1, "b": 2, "m": 3, "l": 0, "z": 0}
+
 _REPLACING = b"Blender", b"3ds Max"
 """Programs, named in a comment, whose maps replace values, which then have their defaults."""
 _HEAD = 300  # number of bytes that are searched for that comment
 _ROUNDING = 1e-3  # tolerance by which values may exceed 1
+
+# Kinds of images are told from a sample of their pixels.
+_SAMPLES = 128  # maximum number of rows and columns that are sampled
+_ERROR = 0.2  # tolerance of a normal's length, for 8-bit and compressed images
+_MOST = 0.95  # minimum fraction of pixels that fulfil a criterion
+_SOLID = 16, 239  # opacities below and above are treated as 0 and 1
+
+_Load = Callable[[Source, str, int], Bytes | None]
+"""Function from library, file and offset to the pixels of an image."""
+
+
+@dataclass(frozen=True, slots=True)
+class _MapOptions:
+    """A map's image and its placement.
+
+    Attributes
+    ----------
+    file : str
+        File name of the image; empty if there is none.
+    scale, offset : (u, v)
+        Image coordinates are texture coordinates times scale plus offset.
+    clamps : bool
+        Whether the image is clamped at its edges rather than repeated.
+    channel : int
+        Column of the pixels for single-channel maps.
+    strength : float
+        Multiplier for bumps.
+    """
+
+    file: str
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    clamps: bool = False
+    channel: int = 0
+    strength: float = 1.0
 
 
 @dataclass(slots=True)
@@ -130,6 +171,52 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     return found
 
 
+def _name_here(folder: Path, written: str) -> str | None:
+    """Return the name under which a referenced file exists in a folder, None if it does not.
+
+    The name without quotes and its last component are tried in turn, ignoring case as Windows does,
+    since many programs write the path that the file had when it was exported.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the library.
+    written : str
+        Name as written, possibly with backslashes.
+    """
+    name = written.strip("\"'").replace("\\", "/")
+    for tried in (name, name.rsplit("/", 1)[-1]):
+        path = referenced_path(folder, tried) if tried else None
+        if path is not None and _is_file(path):
+            return tried
+        found = None if path is None else _in_any_case(folder, tried)
+        if found is not None:
+            return found
+    return None
+
+
+def _in_any_case(folder: Path, name: str) -> str | None:
+    """Return the only file whose path differs from a name only by case."""
+    here, parts = folder, []
+    for part in PurePosixPath(name).parts:
+        try:
+            same = [each.name for each in here.iterdir() if each.name.lower() == part.lower()]
+        except (OSError, ValueError):
+            return None
+        if len(same) != 1:
+            return None
+        parts.append(same[0])
+        here = here / same[0]
+    return "/".join(parts) if _is_file(here) else None
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # the name is too long for a file
+        return False
+
+
 def _read(library: Source, known: dict[str, _Statements], load: _Load) -> None:
     """Record the statements of each material; of several with one name, the first is used."""
     now: _Statements | None = None
@@ -174,6 +261,59 @@ def _found_here(library: Source, text: bytes, position: int, moved: set[str]) ->
     return replace(options, file=file)
 
 
+def _map_options(text: str) -> _MapOptions:
+    """Return the options and the file of a map; the file's name may contain spaces.
+
+    >>> _map_options("-s 2 3 1 -clamp on -bm 0.5 two words.png")  # doctest: +NORMALIZE_WHITESPACE
+    _MapOptions(file='two words.png', scale=(2.0, 3.0), offset=(0.0, 0.0), clamps=True,
+    channel=0, strength=0.5)
+    """
+    found: dict[str, list[str]] = {}
+    rest = text
+    while rest.startswith("-"):
+        option, behind = _first_word(rest)
+        option = option.lower()
+        if option not in _VECTORS and option not in _OPTIONS:
+            # This is a file whose name begins with "-".
+            return _MapOptions(text)
+        rest = behind
+        values = found[option] = []
+        for _ in range(3 if option in _VECTORS else _OPTIONS[option]):
+            value, behind = _first_word(rest)
+            if option in _VECTORS and not is_number(value.encode("utf-8", "surrogateescape")):
+                break
+            values.append(value)
+            rest = behind
+    return _MapOptions(
+        rest,
+        scale=_vector(found, "-s"),
+        offset=_vector(found, "-o"),
+        clamps=found.get("-clamp", [""])[0].lower() == "on",
+        channel=_CHANNELS.get(found.get("-imfchan", [""])[0].lower(), 0),
+        strength=_number(found.get("-bm", ["1"])[0], 1.0),
+    )
+
+
+def _first_word(text: str) -> tuple[str, str]:
+    """Return the text up to the first blank, and what follows the blanks; both may be empty."""
+    word, behind = [*text.split(None, 1), "", ""][:2]
+    return word, behind
+
+
+def _vector(found: dict[str, list[str]], option: str) -> tuple[float, float]:
+    """Return the first two values of an option; omitted values have their defaults."""
+    default = _VECTORS[option]
+    values = [_number(word, default) for word in found.get(option, [])[:2]]
+    u, v = [*values, default, default][:2]
+    return u, v
+
+
+def _number(word: str, default: float) -> float:
+    text = word.encode("utf-8", "surrogateescape")
+    value = to_number(text)
+    return default if value is None else value
+
+
 def _holds_normals(library: Source, file: str, position: int, load: _Load) -> bool:
     """Return whether the image of a bump map exists and contains normals."""
     path = referenced_path(library.path.parent, file)
@@ -181,6 +321,18 @@ def _holds_normals(library: Source, file: str, position: int, load: _Load) -> bo
         return False
     image = load(library, file, position)
     return image is not None and _is_normal_map(image)
+
+
+def _is_normal_map(image: Bytes) -> bool:
+    """Return whether an image, (H, W, 4) uint8, contains unit normals in tangent space.
+
+    Blender, Substance and others write normal maps as ``map_Bump``, which is meant for heights.
+    """
+    normals = _sampled(image)[..., :3].reshape(-1, 3) / 127.5 - 1.0
+    is_unit = np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _ERROR
+    # Heights are grey: their vectors point along (1, 1, 1).
+    is_outward = normals[:, 2] > np.maximum(normals[:, 0], normals[:, 1])
+    return bool((is_unit & is_outward).mean() > _MOST)
 
 
 def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
@@ -318,112 +470,6 @@ def _with_opacity(base: Texture | None, cut: Texture) -> Texture:
     return replace(base, image=np.dstack([base.image[..., :3], opacity[np.ix_(rows, columns)]]))
 
 
-# Number of values after each option; -o, -s and -t have one to three.
-_OPTIONS = {
-    "-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1,
-    "-imfchan": 1, "-type": 1, "-cc": 1,
-}  # fmt: skip
-_VECTORS = {"-o": 0.0, "-s": 1.0, "-t": 0.0}
-_CHANNELS = {"r": 0, "g": 1, "b": 2, "m": 3, "l": 0, "z": 0}
-
-
-@dataclass(frozen=True, slots=True)
-class _MapOptions:
-    """A map's image and its placement.
-
-    Attributes
-    ----------
-    file : str
-        File name of the image; empty if there is none.
-    scale, offset : (u, v)
-        Image coordinates are texture coordinates times scale plus offset.
-    clamps : bool
-        Whether the image is clamped at its edges rather than repeated.
-    channel : int
-        Column of the pixels for single-channel maps.
-    strength : float
-        Multiplier for bumps.
-    """
-
-    file: str
-    scale: tuple[float, float] = (1.0, 1.0)
-    offset: tuple[float, float] = (0.0, 0.0)
-    clamps: bool = False
-    channel: int = 0
-    strength: float = 1.0
-
-
-def _map_options(text: str) -> _MapOptions:
-    """Return the options and the file of a map; the file's name may contain spaces.
-
-    >>> _map_options("-s 2 3 1 -clamp on -bm 0.5 two words.png")  # doctest: +NORMALIZE_WHITESPACE
-    _MapOptions(file='two words.png', scale=(2.0, 3.0), offset=(0.0, 0.0), clamps=True,
-    channel=0, strength=0.5)
-    """
-    found: dict[str, list[str]] = {}
-    rest = text
-    while rest.startswith("-"):
-        option, behind = _first_word(rest)
-        option = option.lower()
-        if option not in _VECTORS and option not in _OPTIONS:
-            # This is a file whose name begins with "-".
-            return _MapOptions(text)
-        rest = behind
-        values = found[option] = []
-        for _ in range(3 if option in _VECTORS else _OPTIONS[option]):
-            value, behind = _first_word(rest)
-            if option in _VECTORS and not is_number(value.encode("utf-8", "surrogateescape")):
-                break
-            values.append(value)
-            rest = behind
-    return _MapOptions(
-        rest,
-        scale=_vector(found, "-s"),
-        offset=_vector(found, "-o"),
-        clamps=found.get("-clamp", [""])[0].lower() == "on",
-        channel=_CHANNELS.get(found.get("-imfchan", [""])[0].lower(), 0),
-        strength=_number(found.get("-bm", ["1"])[0], 1.0),
-    )
-
-
-def _first_word(text: str) -> tuple[str, str]:
-    """Return the text up to the first blank, and what follows the blanks; both may be empty."""
-    word, behind = [*text.split(None, 1), "", ""][:2]
-    return word, behind
-
-
-def _vector(found: dict[str, list[str]], option: str) -> tuple[float, float]:
-    """Return the first two values of an option; omitted values have their defaults."""
-    default = _VECTORS[option]
-    values = [_number(word, default) for word in found.get(option, [])[:2]]
-    u, v = [*values, default, default][:2]
-    return u, v
-
-
-def _number(word: str, default: float) -> float:
-    text = word.encode("utf-8", "surrogateescape")
-    value = to_number(text)
-    return default if value is None else value
-
-
-_SAMPLES = 128  # maximum number of rows and columns that are sampled
-_ERROR = 0.2  # tolerance of a normal's length, for 8-bit and compressed images
-_MOST = 0.95  # minimum fraction of pixels that fulfil a criterion
-_SOLID = 16, 239  # opacities below and above are treated as 0 and 1
-
-
-def _is_normal_map(image: Bytes) -> bool:
-    """Return whether an image, (H, W, 4) uint8, contains unit normals in tangent space.
-
-    Blender, Substance and others write normal maps as ``map_Bump``, which is meant for heights.
-    """
-    normals = _sampled(image)[..., :3].reshape(-1, 3) / 127.5 - 1.0
-    is_unit = np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _ERROR
-    # Heights are grey: their vectors point along (1, 1, 1).
-    is_outward = normals[:, 2] > np.maximum(normals[:, 0], normals[:, 1])
-    return bool((is_unit & is_outward).mean() > _MOST)
-
-
 def _is_cut_out(opacity: Bytes) -> bool:
     """Return whether opacities, (H, W) uint8, are nearly all 0 or 1, as for leaves and hair."""
     values = _sampled(opacity)
@@ -434,49 +480,3 @@ def _sampled(image: Bytes) -> Bytes:
     """Return evenly spaced rows and columns of an image."""
     rows, columns = (max(side // _SAMPLES, 1) for side in image.shape[:2])
     return image[::rows, ::columns]
-
-
-def _name_here(folder: Path, written: str) -> str | None:
-    """Return the name under which a referenced file exists in a folder, None if it does not.
-
-    The name without quotes and its last component are tried in turn, ignoring case as Windows does,
-    since many programs write the path that the file had when it was exported.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the library.
-    written : str
-        Name as written, possibly with backslashes.
-    """
-    name = written.strip("\"'").replace("\\", "/")
-    for tried in (name, name.rsplit("/", 1)[-1]):
-        path = referenced_path(folder, tried) if tried else None
-        if path is not None and _is_file(path):
-            return tried
-        found = None if path is None else _in_any_case(folder, tried)
-        if found is not None:
-            return found
-    return None
-
-
-def _in_any_case(folder: Path, name: str) -> str | None:
-    """Return the only file whose path differs from a name only by case."""
-    here, parts = folder, []
-    for part in PurePosixPath(name).parts:
-        try:
-            same = [each.name for each in here.iterdir() if each.name.lower() == part.lower()]
-        except (OSError, ValueError):
-            return None
-        if len(same) != 1:
-            return None
-        parts.append(same[0])
-        here = here / same[0]
-    return "/".join(parts) if _is_file(here) else None
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # the name is too long for a file
-        return False
