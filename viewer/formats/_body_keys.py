@@ -9,8 +9,6 @@ from viewer.formats._archive.values import Archive, Value, describe, texts_in
 from viewer.phrases import printable
 from viewer.rig.bodies.smpl_family import gender_of, model_title
 
-__all__ = ["GENDERS", "MODELS", "RATES", "gender_in", "model_in", "scale_in"]
-
 GENDERS = ("gender", "genders")
 MODELS = ("surface_model_type", "model_type", "body_model", "smpl_type", "model")
 RATES = (

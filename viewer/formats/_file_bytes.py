@@ -11,18 +11,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.interrupts import raising
 
-__all__ = [
-    "FOLDER",
-    "MAX_SIZE",
-    "kind_of",
-    "no_file",
-    "read_bytes",
-    "read_head",
-    "read_part",
-    "read_pipe",
-    "unreadable",
-]
-
 MAX_SIZE = 2 << 30
 """Default size limit for files, bytes."""
 

@@ -19,8 +19,6 @@ from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import person_label
 
-__all__ = ["frame_spans", "gap_notes", "invalid_rows", "no_frames"]
-
 
 def invalid_rows(*tables: Floats | None) -> Bools:
     """Return a mask of the rows, (N,), in which any of several (N, ...) tables has NaN.

@@ -18,8 +18,6 @@ from pathlib import Path
 
 from viewer.diagnostics import Phrase
 
-__all__ = ["referenced_path", "refused_text"]
-
 _DRIVE = re.compile(r"[A-Za-z]:")
 
 

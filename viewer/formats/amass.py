@@ -31,8 +31,6 @@ from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
 
-__all__ = ["has_frames", "read"]
-
 _POSES = ("poses", "pose", "fullpose", "smpl_poses")
 _ROOTS = ("root_orient", "global_orient")
 _TRANSLATIONS = ("trans", "transl", "smpl_trans")

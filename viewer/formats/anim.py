@@ -39,8 +39,6 @@ from viewer.rig.motion.clip import (
 )
 from viewer.rig.number_text import number_text
 
-__all__ = ["read", "write"]
-
 _MODES: dict[bytes, Extrapolation] = {mode.encode(): mode for mode in EXTRAPOLATIONS}
 _RULES: dict[bytes, Tangent] = {rule.encode(): rule for rule in TANGENT_RULES}
 _WORDS_PER_KEY = 4

@@ -22,8 +22,6 @@ from viewer.formats.skin.tables import find_block, read_count, read_rows, to_who
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.morph_target import MorphTarget
 
-__all__ = ["read"]
-
 _WIDTH = 4  # index, x, y, z
 _SECTIONS = (b"positions", b"normals")
 

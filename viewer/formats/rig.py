@@ -19,8 +19,6 @@ from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
 
-__all__ = ["NamedFiles", "read"]
-
 _WORD = re.compile(rb'[{}]|"[^"\r\n]*"|[^{}\s]+')
 
 Words = list[re.Match[bytes]]

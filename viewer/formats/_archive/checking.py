@@ -16,9 +16,6 @@ from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["archive_of", "are_indices", "corners_of", "finite", "finite_or_nan", "within_reach"]
-
-
 _ROWS = {
     "positions": "row-vertex",
     "weights": "row-vertex",

@@ -34,8 +34,6 @@ from viewer.formats._source import InvalidValueError, Source
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
-__all__ = ["open_npy", "open_npz"]
-
 _MAX_AXES = 32
 _CHUNK = 1 << 16  # bytes per piece, which stay in the cache between inflating and copying
 _LONGEST_HEADER = 1 << 16

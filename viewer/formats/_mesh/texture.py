@@ -9,8 +9,6 @@ from viewer.formats._source import Source
 from viewer.media.image import decode_picture
 from viewer.rig.arrays import Bytes
 
-__all__ = ["load_image", "read_picture"]
-
 
 def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | None:
     """Return a texture's pixels, or None with a warning that states its resolved path.

@@ -1,8 +1,8 @@
-"""State of the pickle machine: the bytes, a stack with marks, the memo, and a budget.
+"""The pickle machine: its state, its opcodes, and the arrays in pickles of joblib.
 
-A pickle is a program for a stack machine. The opcodes are implemented in ``steps.py``; this module
-contains the state that they share. Nothing is recursive, no length is trusted before the bytes are
-known to exist, and the budget limits time and memory for any sequence of opcodes.
+A pickle is a program for a stack machine. Its state is the bytes, a stack with marks, the memo and
+a budget. Nothing is recursive, no length is trusted before the bytes are known to exist, and the
+budget limits time and memory for any sequence of opcodes.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ ROLES = {
     ("torch._utils", "_rebuild_parameter"): "torch-parameter",
     ("torch.storage", "_load_from_bytes"): "torch-bytes",
 }
-"""Roles of torch's names; "torch-bytes" is a separate file, see ``_torch/legacy.py``."""
+"""Roles of torch's names; "torch-bytes" is a separate file, see ``_torch.py``."""
 
 CALLS: dict[str, Callable[[tuple[object, ...]], object]] = {
     "torch-tensor": _tensor,

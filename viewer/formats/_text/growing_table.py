@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["GrowingTable"]
-
 _GROWTH = 1.1  # growth factor of the capacity; new rows take memory even before they are used
 
 

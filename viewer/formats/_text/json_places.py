@@ -11,19 +11,6 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 
-__all__ = [
-    "MOST_DIGITS",
-    "Keys",
-    "constant_place",
-    "deepest_place",
-    "line_at",
-    "long_number_place",
-    "nearest_place",
-    "nesting_place",
-    "repeated_key",
-    "value_place",
-]
-
 MOST_DIGITS = 4300
 """Largest number of digits of an integer that Python converts."""
 

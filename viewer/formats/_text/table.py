@@ -13,8 +13,6 @@ from viewer.formats._text.numbers import parse_numbers
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
-__all__ = ["read_numbers", "read_table"]
-
 Places = NDArray[np.int64]
 
 

@@ -14,8 +14,6 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_infinite, is_too_large, parse_words, word_begins
 from viewer.rig.arrays import Floats
 
-__all__ = ["Words", "number_key", "read_words", "refuse_words"]
-
 Places = NDArray[np.int64]
 
 _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
