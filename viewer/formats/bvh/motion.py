@@ -1,4 +1,8 @@
-"""Parser for the MOTION of a BVH file: frame time and one row of numbers per frame."""
+"""Parser for the MOTION of a BVH file: frame time, rows of numbers, and the joints that they move.
+
+A frame is a row with one number per channel, usually on its own line; line ends only matter if the
+numbers do not fit. Angles are degrees. A joint's rotation channels multiply from left to right.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +23,12 @@ from viewer.formats.bvh.hierarchy import BvhJoint, called
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.quaternion import align_signs
 
-_Places = NDArray[np.int64]
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _LINE = re.compile(rb"[^\r\n]+")
+_ROUNDING = 1e-4  # positions of 0 in files with few decimals, relative to the longest OFFSET
+_CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
+_Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +48,28 @@ class _Motion:
     values: Floats
     frame_time: bytes | None
     has_frames: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Joints, without End Sites, and the columns of a frame that move them."""
+
+    names: tuple[str, ...]
+    parents: list[int]
+    offsets: Floats  # (J, 3)
+    columns: list[list[tuple[int, int]]]  # code and column of each channel, per joint
+    ends: list[tuple[int, list[float]]]  # joint and offset of each End Site
+    n_channels: int
+
+    @property
+    def moves(self) -> list[tuple[int, int, int]]:
+        """Joint, axis and column of each position channel."""
+        return [
+            (joint, code, column)
+            for joint, row in enumerate(self.columns)
+            for code, column in row
+            if code < 3
+        ]
 
 
 def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
@@ -93,10 +121,6 @@ def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int
     return declared, time, start
 
 
-def _rest(n_channels: int, time: bytes | None) -> _Motion:
-    return _Motion(np.zeros((1, n_channels)), time, has_frames=False)
-
-
 def _count(source: Source, match: re.Match[bytes]) -> int:
     value = to_number(match[1])
     if value is None or value < 0 or value != int(value):
@@ -109,6 +133,10 @@ def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
     if value is None or value < 0.0:
         raise source.fault("F002.bvh-seconds", match.start(1), found=match[1] or None)
     return match[1]
+
+
+def _rest(n_channels: int, time: bytes | None) -> _Motion:
+    return _Motion(np.zeros((1, n_channels)), time, has_frames=False)
 
 
 def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
@@ -133,18 +161,6 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
     if whole == 0:
         source.warn("F007.bvh-empty", start)
     return values[: whole * width].reshape(whole, width)
-
-
-def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int | None) -> None:
-    """Refuse a word that is not a number, unless it follows the last frame."""
-    offset = source.word_offset(start, bad)
-    match = source.next_word(offset)
-    word = b"" if match is None else match.group()
-    if declared is not None and bad >= declared * width:
-        source.warn("F006.bvh-after", offset, found=word)
-        return
-    frame = Phrase("bvh-frame", frame=bad // width)
-    raise source.fault(number_key(word), offset, item=frame, found=word)
 
 
 def _held_frames(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
@@ -213,6 +229,18 @@ def _refuse_sizes(source: Source, offsets: _Places, sizes: _Places, width: int) 
         )
 
 
+def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int | None) -> None:
+    """Refuse a word that is not a number, unless it follows the last frame."""
+    offset = source.word_offset(start, bad)
+    match = source.next_word(offset)
+    word = b"" if match is None else match.group()
+    if declared is not None and bad >= declared * width:
+        source.warn("F006.bvh-after", offset, found=word)
+        return
+    frame = Phrase("bvh-frame", frame=bad // width)
+    raise source.fault(number_key(word), offset, item=frame, found=word)
+
+
 def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
     """Refuse a file with one frame per line if a row other than the last has a wrong length."""
     lines = [
@@ -245,33 +273,6 @@ def _warn_of_difference(
     if whole == 0 and (declared or rest):
         raise source.fault("F002.bvh-no-frame", source.end, expected=expected, rest=part)
     source.warn("F007.bvh-frames", source.end, expected=expected, found=whole, rest=part)
-
-
-# Positions of 0 in files with few decimals, as a fraction of the longest OFFSET.
-_ROUNDING = 1e-4
-_CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Joints, without End Sites, and the columns of a frame that move them."""
-
-    names: tuple[str, ...]
-    parents: list[int]
-    offsets: Floats  # (J, 3)
-    columns: list[list[tuple[int, int]]]  # code and column of each channel, per joint
-    ends: list[tuple[int, list[float]]]  # joint and offset of each End Site
-    n_channels: int
-
-    @property
-    def moves(self) -> list[tuple[int, int, int]]:
-        """Joint, axis and column of each position channel."""
-        return [
-            (joint, code, column)
-            for joint, row in enumerate(self.columns)
-            for code, column in row
-            if code < 3
-        ]
 
 
 def table_of(source: Source, joints: list[BvhJoint]) -> Table:
