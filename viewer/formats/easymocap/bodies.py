@@ -8,6 +8,7 @@ the mean hand; those of SMPL+H include it.
 from __future__ import annotations
 
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
 from typing import Any
@@ -16,12 +17,15 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import within_text
+from viewer.formats.easymocap.files import FrameFiles
 from viewer.formats.easymocap.json_frames import (
     RecordError,
     has_numbers,
     limit_of,
+    load_people,
     row_of,
     take_row,
     width_of,
@@ -31,11 +35,14 @@ from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
 
+COEFFICIENTS = ("shapes", "expression")
+"""Keys of a record that later records of the same person may omit."""
 _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]
 _FACE = _SMPLX.names[22:25]
 _VPOSER = 32
 _SHAPES = 10  # shape components that precede the expression components in the legacy code
+_LOOKED_AT = 8  # number of frames that determine the usual numbers of values
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +160,59 @@ def with_coefficients(
     return replace(layout, widths=(*layout.widths, *more))
 
 
+def usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
+    """Return the most frequent number of ``poses``, and the largest numbers of coefficients.
+
+    They are those of a few frames spread over the recording. The first record alone must not decide
+    for all others, because it may be unusual.
+
+    Parameters
+    ----------
+    files : FrameFiles
+        Files of the recording.
+    max_size : int
+        Maximum size of a file in bytes.
+
+    Returns
+    -------
+    mapping of str to int
+        Number of values of a record by key; empty if there are no valid bodies.
+    """
+    found = [dict(layout.widths) for layout in _layouts(files, max_size)]
+    if not found:
+        return {}
+    # The first of several equally frequent numbers is used.
+    ((usual, _),) = Counter(widths["poses"] for widths in found).most_common(1)
+    alike = [widths for widths in found if widths["poses"] == usual]
+    most = {key: max(widths.get(key, 0) for widths in alike) for key in COEFFICIENTS}
+    return {"poses": usual} | most
+
+
+def _layouts(files: FrameFiles, max_size: int) -> list[BodyLayout]:
+    """Return the layouts of all valid records in some frames."""
+    last = len(files.frames) - 1
+    chosen = np.unique(np.linspace(0, last, min(last + 1, _LOOKED_AT)).round().astype(int))
+    found: list[BodyLayout] = []
+    for folder in files.folders if files.frames else ():
+        for index in chosen.tolist() if folder.has_bodies else ():
+            name = folder.names.get(files.frames[index])
+            if name is None:
+                continue
+            try:
+                people = load_people(str(folder.path / name), max_size)
+            except FormatError:  # reported when the frame is read
+                continue
+            found += [*filter(None, map(_layout, people))]
+    return found
+
+
+def _layout(record: object) -> BodyLayout | None:
+    try:
+        return body_layout(record) if isinstance(record, dict) else None
+    except RecordError:  # reported when the frame is read
+        return None
+
+
 RowFault = tuple[int, str, RecordError]
 """An invalid record: its row, the name of the invalid part, and the problem."""
 _Remark = tuple[str, str, str]
@@ -183,13 +243,6 @@ class Rows:
         frames = frames if keep is None else frames[keep]
         rows[frames] = np.arange(len(frames))
         return Timing(rate, rows, first_frame, holds=False)
-
-
-def _completed(key: str, values: list[Any], count: int) -> list[Any]:
-    """Return coefficients with zeros for those that a record lacks; raise ValueError for others."""
-    if key not in COEFFICIENTS or not 0 < len(values) < count:
-        raise ValueError(key)
-    return [*values, *([0.0] * (count - len(values)))]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -385,13 +438,16 @@ class BodyRows(Rows):
         )
 
 
+def _completed(key: str, values: list[Any], count: int) -> list[Any]:
+    """Return coefficients with zeros for those that a record lacks; raise ValueError for others."""
+    if key not in COEFFICIENTS or not 0 < len(values) < count:
+        raise ValueError(key)
+    return [*values, *([0.0] * (count - len(values)))]
+
+
 def _constant(rows: Floats | None) -> Floats | None:
     """Return a single row if all rows are equal."""
     return rows[:1] if rows is not None and (rows == rows[:1]).all() else rows
-
-
-COEFFICIENTS = ("shapes", "expression")
-"""Keys of a record that later records of the same person may omit."""
 
 
 def hold(rows: Floats, is_given: Bools, known: Floats | None) -> Floats:

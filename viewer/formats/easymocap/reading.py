@@ -1,10 +1,13 @@
-"""Sequential reader of frame files, in growing parts, with gaps for invalid frames."""
+"""Sequential reader of frame files, in growing parts, with gaps for invalid frames.
+
+``keypoints3d`` of a record has rows of x, y, z and confidence, or of x, y, z with full confidence;
+hands and face may have separate keys. A confidence of 0 means "not detected".
+"""
 
 from __future__ import annotations
 
 import os
 from array import array
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import field
 from itertools import chain, count
@@ -26,6 +29,7 @@ from viewer.formats.easymocap.bodies import (
     RowFault,
     Rows,
     body_layout,
+    usual_widths,
     with_coefficients,
 )
 from viewer.formats.easymocap.files import FrameFiles, FrameFolder
@@ -47,7 +51,12 @@ from viewer.rig.motion.body_motion import BodyMotion
 
 # Numbers of frames of the first parts; all later parts have the last size.
 _SIZES = (64, 256, 1024, 4096)
-_MOST_WARNINGS = 20
+_MOST_WARNINGS = 20  # maximum number of reported records
+_POINTS = "keypoints3d"
+_BESIDE = ("handl3d", "handr3d", "face3d")
+_MOST_POINTS = 1 << 16  # maximum number of keypoints of one person
+_FOUR, _THREE = {4}, {3}  # widths of the rows of a record
+_Parts = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +100,7 @@ class Reading:
     files: FrameFiles
     options: Options
     body_layout: BodyLayout | None = None
-    point_layout: tuple[PointLayout, Parts] | None = None
+    point_layout: tuple[PointLayout, _Parts] | None = None
     first_fault: Diagnostic | None = None
     _numbers: set[int] = field(default_factory=set)
     _names: dict[str, int] = field(default_factory=dict)
@@ -108,7 +117,7 @@ class Reading:
         """Yield the frames up to the first with a person, then parts of growing size."""
         frames, n_frames = self.files.frames, self.files.n_frames
         self._prefixes = [f"{folder.path}{os.sep}" for folder in self.files.folders]
-        self._usual = _usual_widths(self.files, self.options.max_size)
+        self._usual = usual_widths(self.files, self.options.max_size)
         sizes = iter(_SIZES)
         part, size, n_read = _Part(), 0, 0
         for frame, stop in zip(frames, [*frames[1:], n_frames], strict=True):
@@ -193,7 +202,7 @@ class Reading:
     ) -> None:
         path, place = origin
         has_body = folder.has_bodies and "poses" in record
-        has_points = folder.has_points and _KEY in record
+        has_points = folder.has_points and _POINTS in record
         try:
             if has_points:
                 self._add_points(part, person, record, frame, origin)
@@ -203,7 +212,7 @@ class Reading:
                 raise RecordError("", _lacks(record, folder))
         except RecordError as problem:
             self._fault_of(path, place, problem, person_label(person), problem.key)
-        if has_body and _KEY in record and not has_points:
+        if has_body and _POINTS in record and not has_points:
             self.note("F007.record-points", path)
         elif has_points and "poses" in record and not has_body:
             self.note("F007.record-poses", path)
@@ -331,128 +340,10 @@ class Reading:
 
 
 def _lacks(record: dict[str, Any], folder: FrameFolder) -> Phrase:
-    wanted = ("poses",) * folder.has_bodies + (_KEY,) * folder.has_points
+    wanted = ("poses",) * folder.has_bodies + (_POINTS,) * folder.has_points
     if not record:
         return Phrase("record-no-keys", expected=wanted)
     return Phrase("record-lacks", expected=wanted, keys=list(record))
-
-
-# Usual numbers of values in a recording, determined from a few frames spread over it.
-#
-# The first record alone must not decide for all others, because it may be unusual.
-
-_LOOKED_AT = 8  # number of frames
-
-
-def _usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
-    """Return the most frequent number of ``poses``, and the largest numbers of coefficients.
-
-    Parameters
-    ----------
-    files : FrameFiles
-        Files of the recording.
-    max_size : int
-        Maximum size of a file in bytes.
-
-    Returns
-    -------
-    mapping of str to int
-        Number of values of a record by key; empty if there are no valid bodies.
-    """
-    found = [dict(layout.widths) for layout in _layouts(files, max_size)]
-    if not found:
-        return {}
-    # The first of several equally frequent numbers is used.
-    ((usual, _),) = Counter(widths["poses"] for widths in found).most_common(1)
-    alike = [widths for widths in found if widths["poses"] == usual]
-    most = {key: max(widths.get(key, 0) for widths in alike) for key in COEFFICIENTS}
-    return {"poses": usual} | most
-
-
-def _layouts(files: FrameFiles, max_size: int) -> list[BodyLayout]:
-    """Return the layouts of all valid records in some frames."""
-    last = len(files.frames) - 1
-    chosen = np.unique(np.linspace(0, last, min(last + 1, _LOOKED_AT)).round().astype(int))
-    found: list[BodyLayout] = []
-    for folder in files.folders if files.frames else ():
-        for index in chosen.tolist() if folder.has_bodies else ():
-            name = folder.names.get(files.frames[index])
-            if name is None:
-                continue
-            try:
-                people = load_people(str(folder.path / name), max_size)
-            except FormatError:  # reported when the frame is read
-                continue
-            found += [*filter(None, map(_layout, people))]
-    return found
-
-
-def _layout(record: object) -> BodyLayout | None:
-    try:
-        return body_layout(record) if isinstance(record, dict) else None
-    except RecordError:  # reported when the frame is read
-        return None
-
-
-# Keypoints of EasyMocap records, collected per person.
-#
-# ``keypoints3d`` has rows of x, y, z and confidence, or of x, y, z with full confidence; hands
-# and face may have separate keys. A confidence of 0 means "not detected".
-
-_KEY = "keypoints3d"
-_BESIDE = ("handl3d", "handr3d", "face3d")
-_MOST = 1 << 16  # maximum number of keypoints of one person
-_FOUR, _THREE = {4}, {3}
-Parts = tuple[tuple[str, int], ...]
-
-
-def _point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, Parts]:
-    """Return the layout of a record's keypoints, and its keys with their numbers of points.
-
-    Parameters
-    ----------
-    record : dict
-        Record of one person.
-    title : str
-        Name of the layout, used if ``keypoints3d`` has its number of points.
-
-    Raises
-    ------
-    RecordError
-        If the value of a key is not a list of rows.
-    """
-    parts = [(key, _count(record, key)) for key in (_KEY, *_BESIDE) if key in record]
-    counts = [count for _, count in parts]
-    body = keypoint_layout(counts[0], title if title in TITLES.get(counts[0], ()) else "")
-    if len(parts) == 1:
-        return body, tuple(parts)
-    beside = {key: keypoint_layout(count) for key, count in parts[1:]}
-    for key, side in (("handl3d", 0), ("handr3d", 1)):
-        if key in beside and len(beside[key].names) == 21:
-            beside[key] = _one_hand(side)
-    joined = joined_layout("", [body, *beside.values()])
-    whole = keypoint_layout(len(joined.names))
-    # Body, hands and face in the standard order form a layout with its own name.
-    named = whole if whole.names == joined.names else None
-    text = " + ".join([body.title, *beside])
-    return named or PointLayout(text, joined.names, joined.limbs, joined.sides), tuple(parts)
-
-
-def _one_hand(side: int) -> PointLayout:
-    both = keypoint_layout(42)
-    first, stop = 21 * side, 21 * side + 21
-    inside = (both.limbs >= first).all(axis=1) & (both.limbs < stop).all(axis=1)
-    limbs = both.limbs[inside] - first
-    return PointLayout("hand", both.names[first:stop], limbs, both.sides[first:stop])
-
-
-def _count(record: dict[str, Any], key: str) -> int:
-    rows = record[key]
-    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-        raise RecordError(key, Phrase("record-rows", found=describe(rows)))
-    if len(rows) > _MOST:
-        raise RecordError(key, Phrase("record-most-points", most=_MOST, found=len(rows)))
-    return len(rows)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -470,7 +361,7 @@ class _PointRows(Rows):
     """
 
     layout: PointLayout
-    parts: Parts
+    parts: _Parts
     buffer: array[float] = field(default_factory=lambda: array("d"))
 
     def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
@@ -499,7 +390,7 @@ class _PointRows(Rows):
             If every keypoint is invalid.
         """
         if _is_odd(self._rows()).all():
-            raise RecordError(_KEY, Phrase("record-no-rows"))
+            raise RecordError(_POINTS, Phrase("record-no-rows"))
 
     def _take(self, rows: Any, key: str, count: int) -> None:
         try:
@@ -526,7 +417,7 @@ class _PointRows(Rows):
         is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
         points[is_odd | is_unseen] = 0.0
         faults = [
-            (int(row), "", RecordError(_KEY, Phrase("record-unseen", n=int(is_odd[row].sum()))))
+            (int(row), "", RecordError(_POINTS, Phrase("record-unseen", n=int(is_odd[row].sum()))))
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
         points.flags.writeable = False  # a read-only array is not copied again
@@ -542,3 +433,52 @@ def _is_odd(points: Floats) -> Bools:
     confidence = points[..., 3]
     is_good = (np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)
     return ~is_good & (confidence != 0.0)
+
+
+def _point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, _Parts]:
+    """Return the layout of a record's keypoints, and its keys with their numbers of points.
+
+    Parameters
+    ----------
+    record : dict
+        Record of one person.
+    title : str
+        Name of the layout, used if ``keypoints3d`` has its number of points.
+
+    Raises
+    ------
+    RecordError
+        If the value of a key is not a list of rows.
+    """
+    parts = [(key, _count(record, key)) for key in (_POINTS, *_BESIDE) if key in record]
+    counts = [count for _, count in parts]
+    body = keypoint_layout(counts[0], title if title in TITLES.get(counts[0], ()) else "")
+    if len(parts) == 1:
+        return body, tuple(parts)
+    beside = {key: keypoint_layout(count) for key, count in parts[1:]}
+    for key, side in (("handl3d", 0), ("handr3d", 1)):
+        if key in beside and len(beside[key].names) == 21:
+            beside[key] = _one_hand(side)
+    joined = joined_layout("", [body, *beside.values()])
+    whole = keypoint_layout(len(joined.names))
+    # Body, hands and face in the standard order form a layout with its own name.
+    named = whole if whole.names == joined.names else None
+    text = " + ".join([body.title, *beside])
+    return named or PointLayout(text, joined.names, joined.limbs, joined.sides), tuple(parts)
+
+
+def _one_hand(side: int) -> PointLayout:
+    both = keypoint_layout(42)
+    first, stop = 21 * side, 21 * side + 21
+    inside = (both.limbs >= first).all(axis=1) & (both.limbs < stop).all(axis=1)
+    limbs = both.limbs[inside] - first
+    return PointLayout("hand", both.names[first:stop], limbs, both.sides[first:stop])
+
+
+def _count(record: dict[str, Any], key: str) -> int:
+    rows = record[key]
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        raise RecordError(key, Phrase("record-rows", found=describe(rows)))
+    if len(rows) > _MOST_POINTS:
+        raise RecordError(key, Phrase("record-most-points", most=_MOST_POINTS, found=len(rows)))
+    return len(rows)
