@@ -43,6 +43,14 @@ _MAGIC = (
     (b"\x93NUMPY", "a numpy array"),
 )
 _LOOK = 4096  # number of bytes that identify a file
+_LONG = 1 << 24  # bytes; reading shorter files as a whole takes little memory
+_BLOCK = 1 << 20  # bytes per part in which line endings are counted
+_MARKED = 8  # number of bytes with a mark at the start
+_TAIL = 4096  # number of bytes of which each read at the end removes the marks
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
+# Files with these first bytes are binary and may end with any byte.
+_ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 
 
 class Source:
@@ -390,15 +398,24 @@ def _indices(places: ArrayLike) -> Ints:
     return np.unique(np.asarray(places, dtype=np.int32))
 
 
-_LONG = 1 << 24  # bytes; reading shorter files as a whole takes little memory
-_MARKED = 8  # number of bytes with a mark at the start
-_TAIL = 4096  # number of bytes of which each read at the end removes the marks
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
+class InvalidValueError(Exception):
+    """An invalid value; the caller adds the file and the line.
 
-# Files with these first bytes are binary and may end with any byte.
-_ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
-_BLOCK = 1 << 20  # bytes per part in which line endings are counted
+    Attributes
+    ----------
+    problem : Phrase
+        ``expected …, found …``.
+    """
+
+    def __init__(self, problem: Phrase) -> None:
+        self.problem = problem
+        super().__init__(str(problem))
+
+
+def remark_on(key: str, fault: Diagnostic) -> Diagnostic:
+    """Return a note at the location of an error, which its message includes as ``problem``."""
+    problem = replace(fault, path=None, line=None)
+    return Diagnostic(key, fault.path, fault.line, values={"problem": problem})
 
 
 def without_marks(data: bytes) -> bytes:
@@ -502,23 +519,3 @@ def _lone_returns(block: bytes) -> int:
     is_return = np.concatenate([letters == ord("\r"), [False]])
     begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T
     return int((ends - begins)[letters[ends + 1] != ord("\n")].sum())
-
-
-class InvalidValueError(Exception):
-    """An invalid value; the caller adds the file and the line.
-
-    Attributes
-    ----------
-    problem : Phrase
-        ``expected …, found …``.
-    """
-
-    def __init__(self, problem: Phrase) -> None:
-        self.problem = problem
-        super().__init__(str(problem))
-
-
-def remark_on(key: str, fault: Diagnostic) -> Diagnostic:
-    """Return a note at the location of an error, which its message includes as ``problem``."""
-    problem = replace(fault, path=None, line=None)
-    return Diagnostic(key, fault.path, fault.line, values={"problem": problem})

@@ -37,11 +37,7 @@ from viewer.rig.arrays import Deferred
 _MAX_AXES = 32
 _CHUNK = 1 << 16  # bytes per piece, which stay in the cache between inflating and copying
 _LONGEST_HEADER = 1 << 16
-_LEAD = {
-    b"\1\0": "<H",
-    b"\2\0": "<I",
-    b"\3\0": "<I",
-}  # struct format of the header length, by version
+_LEAD = {b"\1\0": "<H", b"\2\0": "<I", b"\3\0": "<I"}  # format of the header's length, by version
 _RECORD = re.compile(rb"'descr'\s*:\s*[\[(]")
 _ITEM = re.compile(
     rb"'(?P<key>descr|fortran_order|shape)'\s*:\s*"

@@ -18,16 +18,66 @@ from viewer.formats._source import Source
 from viewer.formats._text.json_places import MOST_DIGITS, deepest_place, long_number_place
 from viewer.phrases import printable
 
-_LARGE = 32 << 20  # bytes up to which pickles are read as a whole
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
-
 # Protocols 2 to 5 have a header; protocols 0 and 1 begin with the value that they build.
 _PICKLE = re.compile(
     rb"\x80[\x02-\x05]|\(d[pqSUVX(.]|\}[q(.]|\(lp[0-9]|\][q(.]"
     rb"|c(?:__builtin__|builtins|copy_reg|collections|numpy|scipy|chumpy|os|posix|nt)[\w.]*\r?\n"
 )
+_PICKLE_START = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
+# The header of zlib may consist of letters, but in a text no control characters follow them.
+_ZLIB = re.compile(rb"x[\x01\x5e\x9c\xda](?=[\s\S]*[\x00-\x08\x0e-\x1f\x80-\xff])")
+_KINDS: dict[str, re.Pattern[bytes]] = {
+    "zlib": _ZLIB,
+    "gzip": re.compile(rb"\x1f\x8b\x08"),
+    "bz2": re.compile(rb"BZh[1-9]1AY&SY"),
+    "xz": re.compile(rb"\xfd7zXZ\x00"),
+    "lzma": re.compile(rb"\x5d\x00\x00[\x00\x01-\xff]"),
+}
+_UNSUPPORTED = {"lz4": re.compile(rb"\x04\x22\x4d\x18"), "joblib 0.9": re.compile(rb"ZF0x")}
+_LARGE = 32 << 20  # bytes up to which pickles are read as a whole
+_SHORTEST = 12  # minimum size of a compressed pickle, bytes
+_PIECE = 1 << 20  # number of bytes unpacked at a time
+_DAMAGE = (zlib.error, lzma.LZMAError, OSError, EOFError, ValueError)
+
+
+class _Unpacker(Protocol):
+    """Common interface of the decompressors of bz2 and lzma."""
+
+    @property
+    def eof(self) -> bool: ...
+    @property
+    def needs_input(self) -> bool: ...
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
+
+
+class _Zlib:
+    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
+
+    def __init__(self, window: int) -> None:
+        self._inner = zlib.decompressobj(window)
+
+    @property
+    def eof(self) -> bool:
+        return self._inner.eof
+
+    @property
+    def needs_input(self) -> bool:
+        return not self._inner.unconsumed_tail
+
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes:
+        return self._inner.decompress(self._inner.unconsumed_tail + data, max(max_length, 0))
+
+
+_UNPACKERS: dict[str, Callable[[], _Unpacker]] = {
+    "zlib": lambda: _Zlib(zlib.MAX_WBITS),
+    "gzip": lambda: _Zlib(16 + zlib.MAX_WBITS),
+    "bz2": bz2.BZ2Decompressor,
+    "xz": lambda: lzma.LZMADecompressor(lzma.FORMAT_XZ),
+    "lzma": lambda: lzma.LZMADecompressor(lzma.FORMAT_ALONE),
+}
 
 
 def is_archive(head: bytes) -> bool:
@@ -37,6 +87,25 @@ def is_archive(head: bytes) -> bool:
     (True, False)
     """
     return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None or _is_compressed(head)
+
+
+def _is_compressed(head: bytes) -> bool:
+    r"""Return whether a file that begins with these bytes may be a compressed pickle.
+
+    >>> _is_compressed(zlib.compress(bytes([128, 4]) + b"}." * 20)), _is_compressed(b"x^2 + y^2")
+    (True, False)
+    """
+    if any(kind.match(head) for kind in _UNSUPPORTED.values()):
+        return True
+    method = next((name for name, kind in _KINDS.items() if kind.match(head)), None)
+    if method is None or len(head) < _SHORTEST:
+        return False
+    try:
+        begin = _UNPACKERS[method]().decompress(head, _SHORTEST)
+    except _DAMAGE:
+        return False
+    # A block longer than the head is unpacked when the file is opened.
+    return not begin or _PICKLE_START.match(begin) is not None
 
 
 def open_archive(source: Source) -> Archive:
@@ -154,79 +223,6 @@ def _open_objects(source: Source, offset: int) -> Archive | None:
     whole = run(machine)
     warn_of_rest(machine)
     return named_archive(source, "npy", len(data), whole) if has_names(whole) else None
-
-
-_SHORTEST = 12  # minimum size of a compressed pickle, bytes
-_PIECE = 1 << 20  # number of bytes unpacked at a time
-_PICKLE_START = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
-
-# The header of zlib may consist of letters, but in a text no control characters follow them.
-_ZLIB = re.compile(rb"x[\x01\x5e\x9c\xda](?=[\s\S]*[\x00-\x08\x0e-\x1f\x80-\xff])")
-_KINDS: dict[str, re.Pattern[bytes]] = {
-    "zlib": _ZLIB,
-    "gzip": re.compile(rb"\x1f\x8b\x08"),
-    "bz2": re.compile(rb"BZh[1-9]1AY&SY"),
-    "xz": re.compile(rb"\xfd7zXZ\x00"),
-    "lzma": re.compile(rb"\x5d\x00\x00[\x00\x01-\xff]"),
-}
-_UNSUPPORTED = {"lz4": re.compile(rb"\x04\x22\x4d\x18"), "joblib 0.9": re.compile(rb"ZF0x")}
-_DAMAGE = (zlib.error, lzma.LZMAError, OSError, EOFError, ValueError)
-
-
-class _Unpacker(Protocol):
-    """Common interface of the decompressors of bz2 and lzma."""
-
-    @property
-    def eof(self) -> bool: ...
-    @property
-    def needs_input(self) -> bool: ...
-    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
-
-
-class _Zlib:
-    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
-
-    def __init__(self, window: int) -> None:
-        self._inner = zlib.decompressobj(window)
-
-    @property
-    def eof(self) -> bool:
-        return self._inner.eof
-
-    @property
-    def needs_input(self) -> bool:
-        return not self._inner.unconsumed_tail
-
-    def decompress(self, data: bytes, max_length: int = -1) -> bytes:
-        return self._inner.decompress(self._inner.unconsumed_tail + data, max(max_length, 0))
-
-
-_UNPACKERS: dict[str, Callable[[], _Unpacker]] = {
-    "zlib": lambda: _Zlib(zlib.MAX_WBITS),
-    "gzip": lambda: _Zlib(16 + zlib.MAX_WBITS),
-    "bz2": bz2.BZ2Decompressor,
-    "xz": lambda: lzma.LZMADecompressor(lzma.FORMAT_XZ),
-    "lzma": lambda: lzma.LZMADecompressor(lzma.FORMAT_ALONE),
-}
-
-
-def _is_compressed(head: bytes) -> bool:
-    r"""Return whether a file that begins with these bytes may be a compressed pickle.
-
-    >>> _is_compressed(zlib.compress(bytes([128, 4]) + b"}." * 20)), _is_compressed(b"x^2 + y^2")
-    (True, False)
-    """
-    if any(kind.match(head) for kind in _UNSUPPORTED.values()):
-        return True
-    method = next((name for name, kind in _KINDS.items() if kind.match(head)), None)
-    if method is None or len(head) < _SHORTEST:
-        return False
-    try:
-        begin = _UNPACKERS[method]().decompress(head, _SHORTEST)
-    except _DAMAGE:
-        return False
-    # A block longer than the head is unpacked when the file is opened.
-    return not begin or _PICKLE_START.match(begin) is not None
 
 
 def unpacked(source: Source) -> bytes:

@@ -24,9 +24,15 @@ from viewer.formats._text.json_places import Keys, nearest_place
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
 
-_MAX_SIDE = 1 << 27  # maximum rows or columns of a sparse matrix; meshes have far fewer vertices
 _WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
 """Suffixes of the keys of phrases about arrays, by numpy's kind letters."""
+_DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
+_MAX_SIDE = 1 << 27  # maximum rows or columns of a sparse matrix; meshes have far fewer vertices
+_MAX_AXES = 32
+_LONGEST_TEXT = 1 << 20  # maximum number of characters in one element
+# Maximum size of an array; numpy has no larger ones, even if an axis is 0.
+_MAX_BYTES = 1 << 60
+_LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes without checking them
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,18 +364,6 @@ class Archive:
         return None if place is None else len(text[:place].encode())
 
 
-def texts_in(value: Value) -> list[str]:
-    """Return the strings in a value and its nested lists; empty if it has anything else."""
-    if isinstance(value, Deferred) and value.dtype.kind in "SU":
-        value = value.values().ravel().tolist()
-    if isinstance(value, bytes):
-        return [value.decode("utf-8", "replace")]
-    if isinstance(value, str):
-        return [value]
-    items = [texts_in(item) for item in value] if isinstance(value, list | tuple) else []
-    return [text for item in items for text in item] if all(items) else []
-
-
 def describe(value: Value) -> Phrase:
     """Return a description of a value for messages.
 
@@ -397,6 +391,18 @@ def _described_array(array: Deferred) -> Phrase:
     if array.dtype.kind not in "SU":
         return Phrase("found-array", shape=array.shape, dtype=array.dtype.name)
     return Phrase("found-texts", shape=array.shape) if array.shape else Phrase("found-text")
+
+
+def texts_in(value: Value) -> list[str]:
+    """Return the strings in a value and its nested lists; empty if it has anything else."""
+    if isinstance(value, Deferred) and value.dtype.kind in "SU":
+        value = value.values().ravel().tolist()
+    if isinstance(value, bytes):
+        return [value.decode("utf-8", "replace")]
+    if isinstance(value, str):
+        return [value]
+    items = [texts_in(item) for item in value] if isinstance(value, list | tuple) else []
+    return [text for item in items for text in item] if all(items) else []
 
 
 def _wanted(shape: Axes | None, kinds: str) -> Phrase:
@@ -453,13 +459,20 @@ def _is_missing(item: Any) -> bool:
     return item is None or (isinstance(item, list) and not item)
 
 
-_DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
-_LONGEST_TEXT = 1 << 20  # maximum number of characters in one element
-_MAX_AXES = 32
+def _widened(array: Deferred) -> Deferred:
+    """Return an array whose half floats become doubles before anything is computed with them.
 
-# Maximum size of an array; numpy has no larger ones, even if an axis is 0.
-_MAX_BYTES = 1 << 60
-_LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes without checking them
+    A half overflows at 65504: comparing it with a larger Python number, or adding two halves,
+    already causes a warning.
+    """
+    if array.dtype != np.float16:
+        return array
+    return Deferred(array.shape, np.float64, lambda: _in_double(array.values()))
+
+
+def _in_double(values: NDArray[Any]) -> NDArray[Any]:
+    """Return half floats as doubles, which is exact, and other values unchanged."""
+    return values.astype(np.float64) if values.dtype == np.float16 else values
 
 
 def array_dtype(code: str) -> np.dtype[Any] | None:
@@ -509,21 +522,3 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
         if last > _LAST_LETTER:
             raise InvalidValueError(Phrase("array-letter", found=last))
     return array
-
-
-# Conversion of the half floats in archives to doubles, before anything is computed with them.
-#
-# A half overflows at 65504: comparing it with a larger Python number, or adding two halves,
-# already causes a warning.
-
-
-def _widened(array: Deferred) -> Deferred:
-    """Return an array whose values are converted by ``_in_double``."""
-    if array.dtype != np.float16:
-        return array
-    return Deferred(array.shape, np.float64, lambda: _in_double(array.values()))
-
-
-def _in_double(values: NDArray[Any]) -> NDArray[Any]:
-    """Return half floats as doubles, which is exact, and other values unchanged."""
-    return values.astype(np.float64) if values.dtype == np.float16 else values

@@ -36,6 +36,11 @@ MAX_RATIO = 100
 """Largest ratio of unpacked to packed size; smooth motions reach 10 to 20."""
 SMALL = 64 << 20
 """Unpacked size in bytes below which any ratio is accepted, as arrays of zeros compress well."""
+_LONGEST_DIRECTORY = 2 << 20
+"""Maximum bytes of one read, and thus of a zip directory: about 30,000 members."""
+_CHUNK = 1 << 20
+_PAGE = 1 << 16  # number of bytes read at a time for small values
+_PIECE = 1 << 20  # number of bytes read at a time for arrays
 _ENCRYPTED = 0x41  # flag bits 0 and 6
 _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
 
@@ -106,11 +111,6 @@ def open_directory(source: Source) -> Iterator[ZipDirectory]:
         raise source.fault("F002.npz", reason=printable(problem, 100)) from None
 
 
-_LONGEST_DIRECTORY = 2 << 20
-"""Maximum bytes of one read, and thus of a zip directory: about 30,000 members."""
-_CHUNK = 1 << 20
-
-
 class _Reader(io.BufferedReader):
     """A file with a size limit for each read, as zipfile trusts the declared directory size."""
 
@@ -175,10 +175,6 @@ class StoredFile:
 
 def _reason(problem: Exception) -> object:
     return getattr(problem, "strerror", None) or problem
-
-
-_PAGE = 1 << 16  # number of bytes read at a time for small values
-_PIECE = 1 << 20  # number of bytes read at a time for arrays
 
 
 class FileWindow:

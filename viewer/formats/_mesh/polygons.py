@@ -1,4 +1,7 @@
-"""Triangulation of polygons: fans if they are convex, otherwise ear clipping."""
+"""What readers of polygon meshes share: triangles, invalid corners, normals, comments about units.
+
+Convex polygons become fans; others are triangulated by ear clipping.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,13 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.units import UNIT_NAMES
 
-Picks = NDArray[np.integer]
-
 # Maximum for ear clipping, which would take seconds for larger polygons; they become fans.
 _MOST_CORNERS = 400
 _CHUNK = 4_000_000  # (corner, corner) pairs per batch
 _PART = 1 << 15  # polygons per batch, which limits the memory of temporary arrays
+_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
+_SIZES = {3: "triangle", 4: "quad"}
+Picks = NDArray[np.integer]
 
 
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
@@ -60,12 +64,6 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
             targets = (starts[rows] - 2 * rows)[:, None] + np.arange(size - 2)
             picks[targets] = np.take_along_axis(places[:, None], local, axis=2)
     return picks, owners
-
-
-def picked(corners: Picks, picks: Picks) -> Picks:
-    """Return the values of polygon corners at the corners of triangles: (C,) to (T, 3)."""
-    # If there are as many corners of triangles as of polygons, all polygons are triangles.
-    return corners.reshape(-1, 3) if len(corners) == picks.size else corners[picks]
 
 
 def _cut(points: Floats) -> Picks:
@@ -156,6 +154,12 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
+def picked(corners: Picks, picks: Picks) -> Picks:
+    """Return the values of polygon corners at the corners of triangles: (C,) to (T, 3)."""
+    # If there are as many corners of triangles as of polygons, all polygons are triangles.
+    return corners.reshape(-1, 3) if len(corners) == picks.size else corners[picks]
+
+
 def triangles_of(counts: Picks, faces: Picks) -> Picks:
     """Return the triangles that ``triangulate`` creates from some polygons.
 
@@ -195,10 +199,6 @@ def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
     # Values are assigned in reverse order, so that the first valid corner remains.
     first[owners[known[::-1]]] = corners[known[::-1]]
     return np.where(corners < 0, first[owners], corners)
-
-
-_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
-_SIZES = {3: "triangle", 4: "quad"}
 
 
 def filled_normals(

@@ -1,4 +1,13 @@
-"""Checked arrays of results: finite, of the expected shape, within limits."""
+"""Checked arrays of results: finite, of the expected shape, within limits.
+
+Rotations of a body have any of these forms, distinguished by the shapes of their arrays::
+
+    rotation vectors  (N, J, 3)     (N, 3 J)
+    matrices          (N, J, 3, 3)  (N, 9 J)
+    6D                (N, J, 6)     (N, 6 J)   two columns of a matrix, one after the other
+
+A single frame may lack the axis of frames.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +26,11 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
 
 Frames = np.ndarray[Any, np.dtype[np.int64]]
-
 # Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
 _MOST_ROWS = 2_000_000
 _PERSON = re.compile(r"-?[0-9]{1,9}")
 _SMALLEST = 1e-3  # minimum determinant; a rotation has 1, a missing rotation 0
+_TITLES = {3: "rotation vectors", 6: "6D rotations", 9: "matrices"}  # by numbers per rotation
 
 
 class RowBudget:
@@ -41,6 +50,20 @@ class RowBudget:
         self._left -= max(count, 1)
         if self._left < 0:
             raise self._archive.source.fault("F002.video-rows", most=self._most)
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """Layout of rotations in an array: frames, joints, and numbers per rotation."""
+
+    n_frames: int
+    n_joints: int
+    size: int
+
+    @property
+    def title(self) -> str:
+        """Name of the form."""
+        return _TITLES[self.size]
 
 
 def has(archive: Archive | None, *keys: str) -> bool:
@@ -86,6 +109,80 @@ def first_rows(source: Source, frames: ArrayLike) -> tuple[Frames, Ints]:
     if len(found) < len(numbers):
         source.warn("F007.video-same-frame", n=len(numbers) - len(found))
     return found, first.astype(np.int32)
+
+
+def numbers(archive: Archive, key: str, count: int) -> Floats:
+    """Return a fixed count of numbers, in an array of any shape or a list."""
+    values = finite(archive, key, archive.array(key).values().reshape(-1))
+    if len(values) != count:
+        raise archive.fault("F002.video-count", item=key, expected=count, found=len(values))
+    return values
+
+
+def sole(archive: Archive, key: str) -> float:
+    """Return a single number, which may be an array with one element."""
+    return float(numbers(archive, key, 1)[0])
+
+
+def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
+    """Return K for focal lengths (N,), (N, 2) or a single one, and image centres (N, 2), pixels."""
+    lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
+    centers = np.atleast_2d(center)
+    count = max(len(lengths), len(centers))
+    matrix = np.zeros((count, 3, 3))
+    matrix[:, 0, 0] = lengths if lengths.ndim == 1 else lengths[:, 0]
+    matrix[:, 1, 1] = lengths if lengths.ndim == 1 else lengths[:, 1]
+    matrix[:, :2, 2] = centers
+    matrix[:, 2, 2] = 1.0
+    return matrix
+
+
+def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
+    """Return the form of an array; None if it does not have one of these numbers of joints.
+
+    Parameters
+    ----------
+    archive : Archive
+        Archive that contains the array.
+    key : str
+        Its key.
+    joints : tuple of int
+        Possible numbers of joints.
+    """
+    return shape_form(archive.shape(key), joints)
+
+
+def shape_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
+    """Return the form of an array of a shape; see ``form_of``."""
+    sizes: tuple[int, ...] = ()
+    lead: tuple[int, ...] = ()
+    if shape[-2:] == (3, 3) and (len(shape) != 2 or joints == (1,)):
+        lead, sizes = shape[:-2], (9,)
+    elif len(shape) >= 2 and shape[-1] in (3, 6) and math.prod(shape[:-1]) > 0:
+        lead, sizes = shape[:-1], (shape[-1],)
+    for size in sizes:
+        for frames, count in ((lead[:-1], lead[-1:]), (lead, ())):
+            n_joints = math.prod(count)
+            if len(frames) <= 1 and n_joints in joints:
+                return Form(math.prod(frames), n_joints, size)
+    return _flat_form(shape, joints)
+
+
+def _flat_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
+    for size in _TITLES if 1 <= len(shape) <= 2 else ():
+        if shape[-1] % size == 0 and shape[-1] // size in joints:
+            return Form(math.prod(shape[:-1]), shape[-1] // size, size)
+    return None
+
+
+def rotation_vectors(archive: Archive, key: str, form: Form) -> Floats:
+    """Return the rotations as rotation vectors: (N, J, 3)."""
+    found = rows(archive, key, archive.shape(key))
+    count = form.n_frames, form.n_joints
+    if form.size == 9:
+        return vectors_of(archive, key, found.reshape(*count, 3, 3))
+    found = found.reshape(*count, form.size)
+    return six(archive, key, found) if form.size == 6 else np.asarray(found)
 
 
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
@@ -139,104 +236,3 @@ def _unit(archive: Archive, key: str, vectors: Floats) -> Floats:
         worst = float(lengths[is_short].min())
         archive.leave_gap("F002.video-rotation", item=key, found=worst)
     return np.where(is_short, np.nan, vectors / np.where(is_short, 1.0, lengths))
-
-
-def numbers(archive: Archive, key: str, count: int) -> Floats:
-    """Return a fixed count of numbers, in an array of any shape or a list."""
-    values = finite(archive, key, archive.array(key).values().reshape(-1))
-    if len(values) != count:
-        raise archive.fault("F002.video-count", item=key, expected=count, found=len(values))
-    return values
-
-
-def sole(archive: Archive, key: str) -> float:
-    """Return a single number, which may be an array with one element."""
-    return float(numbers(archive, key, 1)[0])
-
-
-def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
-    """Return K for focal lengths (N,), (N, 2) or a single one, and image centres (N, 2), pixels."""
-    lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
-    centers = np.atleast_2d(center)
-    count = max(len(lengths), len(centers))
-    matrix = np.zeros((count, 3, 3))
-    matrix[:, 0, 0] = lengths if lengths.ndim == 1 else lengths[:, 0]
-    matrix[:, 1, 1] = lengths if lengths.ndim == 1 else lengths[:, 1]
-    matrix[:, :2, 2] = centers
-    matrix[:, 2, 2] = 1.0
-    return matrix
-
-
-# Rotations of a body in any of the usual forms, distinguished by the shapes of their arrays.
-#
-# ::
-#
-#     rotation vectors  (N, J, 3)     (N, 3 J)
-#     matrices          (N, J, 3, 3)  (N, 9 J)
-#     6D                (N, J, 6)     (N, 6 J)   two columns of a matrix, one after the other
-#
-# A single frame may lack the axis of frames.
-
-_TITLES = {3: "rotation vectors", 6: "6D rotations", 9: "matrices"}
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """Layout of rotations in an array: frames, joints, and numbers per rotation."""
-
-    n_frames: int
-    n_joints: int
-    size: int
-
-    @property
-    def title(self) -> str:
-        """Name of the form."""
-        return _TITLES[self.size]
-
-
-def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
-    """Return the form of an array; None if it does not have one of these numbers of joints.
-
-    Parameters
-    ----------
-    archive : Archive
-        Archive that contains the array.
-    key : str
-        Its key.
-    joints : tuple of int
-        Possible numbers of joints.
-    """
-    return shape_form(archive.shape(key), joints)
-
-
-def shape_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
-    """Return the form of an array of a shape; see ``form_of``."""
-    sizes: tuple[int, ...] = ()
-    lead: tuple[int, ...] = ()
-    if shape[-2:] == (3, 3) and (len(shape) != 2 or joints == (1,)):
-        lead, sizes = shape[:-2], (9,)
-    elif len(shape) >= 2 and shape[-1] in (3, 6) and math.prod(shape[:-1]) > 0:
-        lead, sizes = shape[:-1], (shape[-1],)
-    for size in sizes:
-        for frames, count in ((lead[:-1], lead[-1:]), (lead, ())):
-            n_joints = math.prod(count)
-            if len(frames) <= 1 and n_joints in joints:
-                return Form(math.prod(frames), n_joints, size)
-    return _flat_form(shape, joints)
-
-
-def _flat_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
-    for size in _TITLES if 1 <= len(shape) <= 2 else ():
-        if shape[-1] % size == 0 and shape[-1] // size in joints:
-            return Form(math.prod(shape[:-1]), shape[-1] // size, size)
-    return None
-
-
-def rotation_vectors(archive: Archive, key: str, form: Form) -> Floats:
-    """Return the rotations as rotation vectors: (N, J, 3)."""
-    found = rows(archive, key, archive.shape(key))
-    count = form.n_frames, form.n_joints
-    if form.size == 9:
-        return vectors_of(archive, key, found.reshape(*count, 3, 3))
-    found = found.reshape(*count, form.size)
-    return six(archive, key, found) if form.size == 6 else np.asarray(found)
