@@ -28,7 +28,6 @@ from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.errors import UnsupportedFormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST, is_infinite, is_number, to_number
-from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
@@ -355,6 +354,9 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     OutputError
         If the file cannot be written.
     """
+    # Imported here, so that reading a skeleton does not import what only writers need.
+    from viewer.media.saving import save_text
+
     if figure.skeleton is None:
         raise _unsupported("F002.skel-none", figure=figure.name)
     _check_dofs(figure.skeleton)
@@ -391,6 +393,8 @@ def _check_numbers(skeleton: Skeleton) -> None:
 
 
 def _check_names(skeleton: Skeleton) -> None:
+    from viewer.media.saving import as_words
+
     ancestors: list[int] = []
     for joint, parent in enumerate(skeleton.parents):
         while ancestors and ancestors[-1] != parent:

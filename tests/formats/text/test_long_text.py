@@ -8,7 +8,6 @@ import pytest
 
 from viewer.errors import FormatError
 from viewer.formats import Source, _source, read
-from viewer.formats import _source as long_text
 from viewer.formats._source import LongText, count_line_ends, line_parts, without_marks
 from viewer.formats.obj import lines
 
@@ -29,7 +28,7 @@ TEXTS = [
 
 @pytest.fixture(autouse=True)
 def _short_is_long(monkeypatch):
-    monkeypatch.setattr(long_text, "_LONG", 0)
+    monkeypatch.setattr(_source, "_LONG", 0)
 
 
 def stored(folder, data: bytes) -> LongText:
@@ -57,7 +56,7 @@ def test_parts_of_whole_lines_make_up_the_text(tmp_path, data, length):
 @pytest.mark.parametrize("block", [1, 2, 3, 5, 1000])
 @pytest.mark.parametrize("data", TEXTS)
 def test_line_ends_are_counted_across_blocks(tmp_path, monkeypatch, data, block):
-    monkeypatch.setattr(long_text, "_BLOCK", block)
+    monkeypatch.setattr(_source, "_BLOCK", block)
     wanted, text = without_marks(data), stored(tmp_path, data)
     for start in range(len(wanted) + 1):
         for end in range(start, len(wanted) + 1):
