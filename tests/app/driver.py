@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 import viewer
 from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.app.headless import HeadlessApp
 from viewer.diagnostics.template import in_window
 from viewer.rendering.camera import facing_camera, fit

@@ -10,7 +10,7 @@ from app.captured import dots, people
 from imgui_bundle import imgui
 
 from viewer.app.core import reasons
-from viewer.app.shown_panels import ShownPanels
+from viewer.app.layout import ShownPanels
 from viewer.app.window import awaits_tooltip
 from viewer.rig.scene import Scene
 

@@ -14,7 +14,7 @@ from PIL import Image
 import viewer.app
 from viewer.app.closing import Closing
 from viewer.app.features import KEYS
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.app.keys import Keyboard
 
 OPTION_KEYS = {"w": "wireframe", "n": "normals", "t": "texture", "g": "grid"}

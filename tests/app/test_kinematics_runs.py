@@ -6,8 +6,8 @@ import pytest
 
 from viewer.app.actors.following import start_following
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.posing.tool_actions import choose_tool
-from viewer.app.weights.actions import pin_vertex, show_scalar
+from viewer.app.posing.toolbar import choose_tool
+from viewer.app.weights.weights_panel import pin_vertex, show_scalar
 from viewer.rig import kinematics
 
 

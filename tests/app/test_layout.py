@@ -9,8 +9,7 @@ from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 
 from viewer.app.features import PANELS
-from viewer.app.layout import Layout
-from viewer.app.shown_panels import ShownPanels, set_open
+from viewer.app.layout import Layout, ShownPanels, set_open
 
 
 def resize(hand, *size):
@@ -214,7 +213,7 @@ def test_closed_panels_are_remembered(tmp_path, monkeypatch):
 
 
 def test_scaled_widgets_still_work(hand):
-    from viewer.app.theme import change_scale
+    from viewer.app.core.theme import change_scale
 
     x0, y0, x1, y1 = hand.state.item_rects["Reset (R)"]
     change_scale(1.0, 2.0)

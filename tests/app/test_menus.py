@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 import viewer.models
 from viewer.app.features import KEYS, MOUSE, PANELS
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.models import load_model_folder, save_model_folder
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 from formats.capture_files import body, write_frames
 
-from viewer.app.curves.clip_actions import ask_for_clip, new_clip
+from viewer.app.curves.editing import ask_for_clip, new_clip
+from viewer.app.files.files import Files
 from viewer.app.files.motion_export import ask_for_motion
-from viewer.app.files.state import Files
-from viewer.app.recording.record_dialog import ask_where
-from viewer.app.recording.state import KINDS, RecordSettings
+from viewer.app.recording.record_dialog import KINDS, RecordSettings, ask_where
 
 
 @pytest.fixture

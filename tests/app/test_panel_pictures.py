@@ -15,15 +15,13 @@ from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
 from viewer.app.core.jobs import FrameJob
-from viewer.app.curves.clip_actions import new_clip
+from viewer.app.curves.editing import new_clip
 from viewer.app.files.file_choice import FileDialog
-from viewer.app.files.state import Files
-from viewer.app.layout import Layout
-from viewer.app.linting.actions import check_rig
-from viewer.app.linting.state import Linting
-from viewer.app.posing.state import Posing
-from viewer.app.shown_panels import ShownPanels
-from viewer.app.weights.actions import pin_vertex
+from viewer.app.files.files import Files
+from viewer.app.layout import Layout, ShownPanels
+from viewer.app.linting.lint_panel import Linting, check_rig
+from viewer.app.posing.posing import Posing
+from viewer.app.weights.weights_panel import pin_vertex
 
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)

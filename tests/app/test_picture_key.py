@@ -10,7 +10,7 @@ import pytest
 from app.driver import make_state
 
 import viewer
-from viewer.app.picture_key import PictureKeys
+from viewer.app.pace import PictureKeys
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.motion.clip_edit import clip_from_pose
@@ -200,8 +200,8 @@ def test_restored_values_have_an_equal_key(state):
 def test_unchanged_scene_is_not_copied(state, monkeypatch):
     keys = PictureKeys()
     before = keys.key(state, SIZE)
-    monkeypatch.setattr("viewer.app.picture_key.copy.deepcopy", None)
-    monkeypatch.setattr("viewer.app.picture_key.NumberKey", None)
+    monkeypatch.setattr("viewer.app.pace.copy.deepcopy", None)
+    monkeypatch.setattr("viewer.app.pace.NumberKey", None)
     monkeypatch.setattr("viewer.rig.pose.NumberKey", None)
     assert keys.key(state, SIZE) == before
 

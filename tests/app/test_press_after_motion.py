@@ -13,8 +13,8 @@ from app.posing_rigs import around, joint_seen
 
 from viewer.app.core.view_frame import view_frame
 from viewer.app.posing.gizmo import handle_at
+from viewer.app.posing.posing import Posing
 from viewer.app.posing.rotate_tool import RADIUS
-from viewer.app.posing.state import Posing
 
 
 @pytest.fixture(params=[True, False], ids=["trickled", "at once"])

@@ -17,7 +17,7 @@ from imgui_bundle import imgui
 from PIL import Image
 
 from viewer.app import menus
-from viewer.app.posing import pose_actions
+from viewer.app.posing import posing as pose_actions
 
 KEYS = [
     *"rskwntgfhzyoamcvedqx",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app import theme
+from viewer.app.core import theme
 from viewer.app.curves import plot as plotted_keys
 from viewer.app.manual import Manual
 from viewer.rendering.overlay.typeface import interface_font

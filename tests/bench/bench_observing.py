@@ -12,7 +12,7 @@ from measure import interleaved, median_ratio, report
 import viewer
 from viewer.app.core.state import AppState
 from viewer.app.headless import HeadlessApp
-from viewer.app.picture_key import PictureKeys
+from viewer.app.pace import PictureKeys
 from viewer.loading import bundled_body
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions

@@ -15,16 +15,15 @@ from viewer.app.core.jobs import Job
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, explain, same_line_if_room
-from viewer.app.curves.clip_actions import ask_for_clip
+from viewer.app.curves.editing import ask_for_clip
+from viewer.app.files.files import Files
 from viewer.app.files.motion_export import ask_for_motion
-from viewer.app.files.state import Files
 from viewer.app.playback.animations import choose_animation
-from viewer.app.posing.pose_actions import ask_for_pose, pose_of_file
+from viewer.app.posing.posing import ask_for_pose, pose_of_file
 from viewer.app.retargeting.drive_changes import shown_drive
-from viewer.app.retargeting.match_actions import ask_where_to_save
-from viewer.app.rigging.results import shown_result
-from viewer.app.rigging.results_section import ask_where_to_save_rig
-from viewer.app.rigging.state import Rigging
+from viewer.app.retargeting.joint_match_panel import ask_where_to_save
+from viewer.app.rigging.results import ask_where_to_save_rig, shown_result
+from viewer.app.rigging.rigging import Rigging
 from viewer.data_classes import dataclass
 from viewer.formats import opened_text
 from viewer.phrases import printable

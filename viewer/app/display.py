@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 import warnings
 from typing import Any
 
-from viewer.app.display_loss import stop_watching, watch_display
 from viewer.errors import RenderError, ViewerError
+from viewer.media.unfinished import remove_unfinished
 from viewer.rendering.gpu.context import explain_failure, offer_of, offer_text
-
-__all__ = ["NoDisplay", "find_display", "import_glfw", "window_error"]
 
 
 class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
@@ -70,7 +69,7 @@ def find_display() -> None:
             raise NoDisplay("no display found (DISPLAY is not set)")
         if not os.environ.get("DISPLAY"):
             raise NoDisplay("no X display found (DISPLAY is not set; Wayland needs XWayland)")
-        watch_display()
+        _watch_display()
     glfw = import_glfw()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -81,3 +80,108 @@ def find_display() -> None:
         message = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
         display = os.environ.get("DISPLAY", "")
         raise NoDisplay(f"no display found (DISPLAY={display}: {message})")
+
+
+# Errors of the X server: other programs' vanished windows, and the loss of the connection.
+#
+# Xlib exits the process in both cases, with its own message and exit code 1. It has one handler
+# for each, which a program can replace.
+#
+# A request about a window that no longer exists is an error. GLFW answers programs that drag
+# files onto the window, and that paste from it; if such a program ends before it is answered, the
+# answer is lost, and nothing else is wrong. So those errors are ignored, and all others are left
+# to Xlib.
+#
+# The handler of a lost connection must not return: OpenGL drivers would use replies that the X
+# server never sent, and crash. So it does all of the clean-up.
+
+_LIBRARY = "libX11.so.6"  # the library that GLFW loads, which shares the handlers
+
+
+class _ErrorEvent(ctypes.Structure):
+    """XErrorEvent of Xlib.h."""
+
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("resource", ctypes.c_ulong),
+        ("serial", ctypes.c_ulong),
+        ("error", ctypes.c_ubyte),
+        ("request", ctypes.c_ubyte),
+        ("minor", ctypes.c_ubyte),
+    )
+
+
+_LossHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+_ErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(_ErrorEvent))
+_BAD_WINDOW = 3
+
+# Requests of GLFW about the window of another program, by their numbers in Xproto.h.
+_TO_OTHERS = {2, 18, 20, 24, 25}
+"""ChangeWindowAttributes, ChangeProperty, GetProperty, ConvertSelection and SendEvent."""
+
+
+def _watch_display() -> None:
+    """Install the handlers of lost windows and of a lost connection.
+
+    Called before GLFW starts, because the connection may be lost while a window is created. Further
+    calls have no effect.
+    """
+    global _library
+    if _library is None:
+        _library = _open_library()
+        if _library is not None:
+            _before[:] = (
+                _library.XSetIOErrorHandler(_loss_handler),
+                _library.XSetErrorHandler(_error_handler),
+            )
+
+
+def stop_watching() -> None:
+    """Restore Xlib's previous handlers."""
+    global _library
+    if _library is not None:
+        _library.XSetIOErrorHandler(_before[0])
+        _library.XSetErrorHandler(_before[1])
+        _library = None
+
+
+def _pass_over(display: Any, event: Any) -> int:
+    """Ignore an answer to a window that is gone; leave any other error to the previous handler."""
+    found = event.contents
+    if found.error == _BAD_WINDOW and found.request in _TO_OTHERS:
+        return 0
+    return int(_before[1](display, event))
+
+
+def _leave(_: Any) -> int:
+    """Remove partial files, print the reason, and exit."""
+    try:
+        remove_unfinished()
+        display = os.environ.get("DISPLAY", "")
+        text = f"lost the display: the X server closed the connection (DISPLAY={display})"
+        if sys.stderr is not None:
+            sys.stderr.write(f"viewer: {text}\n")
+            sys.stderr.flush()
+    finally:
+        os._exit(RenderError.exit_code)
+
+
+def _open_library() -> ctypes.CDLL | None:
+    try:
+        library = ctypes.CDLL(_LIBRARY)
+    except OSError:  # GLFW is linked without Xlib
+        return None
+    library.XSetIOErrorHandler.argtypes = [_LossHandler]
+    library.XSetIOErrorHandler.restype = _LossHandler
+    library.XSetErrorHandler.argtypes = [_ErrorHandler]
+    library.XSetErrorHandler.restype = _ErrorHandler
+    return library
+
+
+# Xlib has one handler of each kind per process and may call it at any time, so both must stay
+# alive.
+_loss_handler = _LossHandler(_leave)
+_before: list[Any] = []
+_error_handler = _ErrorHandler(_pass_over)
+_library: ctypes.CDLL | None = None

@@ -36,6 +36,22 @@ _UNDO = "core.undo_actions"
 _STEP = "playback.actions.step"
 _ANIMATION = "playback.animations.step_animation"
 
+_MOVED = {
+    "cancel": "keys",
+    "palette.palette_window": "palette",
+    "playback.actions": "playback.timeline_panel",
+    "posing.pose_actions": "posing.posing",
+    "posing.tool_actions": "posing.toolbar",
+    "view.camera_actions": "view.camera_panel",
+    "view.display_actions": "view.display_panel",
+    "weights.actions": "weights.weights_panel",
+    "window_actions": "keys",
+}
+"""Present modules of actions that ``KEYS`` calls by older names.
+
+Preferences store an action of ``KEYS`` by its name, so the name stays when the function moves.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Panel:
@@ -135,7 +151,8 @@ class Action:
 def _function(path: str) -> Callable[..., object]:
     """Return a function of ``viewer.app``, imported on first use."""
     module, _, name = path.rpartition(".")
-    found: Callable[..., object] = getattr(import_module(f"viewer.app.{module}"), name)
+    place = _MOVED.get(module, module)
+    found: Callable[..., object] = getattr(import_module(f"viewer.app.{place}"), name)
     return found
 
 
@@ -244,15 +261,15 @@ KEYS = (
 )
 """Keys in the order in which they are listed."""
 
-_WANT = "window_actions.want"
+_WANT = "keys.want"
 _ROOM = "core.reasons.no_job_room"
-_MATCH = "retargeting.match_actions"
+_MATCH = "retargeting.joint_match_panel"
 _NO_EDIT = "retargeting.drive_changes.no_edit"
 
 ACTIONS = (
     Action("Open the bundled figure", _WANT, ("open bundled",)),
     Action("Open the bundled body", _WANT, ("open body",)),
-    Action("Save pose…", "posing.pose_actions.ask_for_pose", why="core.reasons.no_pose"),
+    Action("Save pose…", "posing.posing.ask_for_pose", why="core.reasons.no_pose"),
     Action("Export…", "menus.ask_for_export", why=_ROOM),
     Action(
         "Export motion…",
@@ -260,32 +277,32 @@ ACTIONS = (
         why="core.reasons.nothing_to_export",
     ),
     Action("Record pictures or video…", "recording.record_dialog.open_record_dialog", why=_ROOM),
-    Action("Check the rig", "linting.actions.check_rig", why=_ROOM),
-    Action("New clip", "curves.clip_actions.new_clip", why="core.reasons.no_new_clip"),
+    Action("Check the rig", "linting.lint_panel.check_rig", why=_ROOM),
+    Action("New clip", "curves.editing.new_clip", why="core.reasons.no_new_clip"),
     Action(
         "Key the pose at the current time",
-        "posing.tool_actions.key_pose_now",
-        why="posing.tool_actions.no_keys",
+        "posing.toolbar.key_pose_now",
+        why="posing.toolbar.no_keys",
     ),
-    Action("Reset the pose of this actor", "posing.pose_actions.reset_actor"),
-    Action("Reset shape", "posing.pose_actions.reset_shape"),
-    Action("Random shape", "posing.pose_actions.random_shape"),
+    Action("Reset the pose of this actor", "posing.posing.reset_actor"),
+    Action("Reset shape", "posing.posing.reset_shape"),
+    Action("Random shape", "posing.posing.random_shape"),
     Action("Match joints automatically", f"{_MATCH}.match_automatically", why=_NO_EDIT),
     Action("Load joint map…", f"{_MATCH}.ask_for_map", why=_NO_EDIT),
     Action("Save joint map…", f"{_MATCH}.ask_where_to_save", why="core.reasons.no_drive"),
     Action("Show all parts", "actors.parts_panel.show_all_parts", why="core.reasons.no_parts"),
     Action("Feet on the ground", "retargeting.drive_changes.toggle_feet", why=_NO_EDIT),
     Action("Springs", "actors.actors_panel.toggle_springs", why="actors.actors_panel.no_springs"),
-    Action("Reset lights", "view.display_actions.reset_lights"),
-    Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
+    Action("Reset lights", "view.display_panel.reset_lights"),
+    Action("Axis gizmo", "view.display_panel.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),
-    Action("Pick vertices", "weights.actions.toggle_picking", why="core.reasons.no_mesh"),
+    Action("Pick vertices", "weights.weights_panel.toggle_picking", why="core.reasons.no_mesh"),
     Action(
         "Inspect vertex under cursor",
-        "weights.actions.toggle_vertex_info",
+        "weights.weights_panel.toggle_vertex_info",
         why="core.reasons.no_mesh",
     ),
-    Action("Reset layout", "shown_panels.reset_layout"),
+    Action("Reset layout", "layout.reset_layout"),
 )
 """Actions of menus and panels that have no key."""
 

@@ -17,44 +17,37 @@ from viewer.app.closing import (
     may_replace_scene,
     request_quit,
 )
-from viewer.app.context.context_menu import answer_right_click, draw_context_menu
+from viewer.app.context_menu import answer_right_click, draw_context_menu
+from viewer.app.core.camera_moves import keep_fitting
 from viewer.app.core.edited_animations import Animations, keep_edited
-from viewer.app.core.fitting import keep_fitting
-from viewer.app.core.job_steps import advance_job
 from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of
 from viewer.app.files.file_dialog import draw_file_dialog
-from viewer.app.files.loader import Loader
+from viewer.app.files.files import Files, Loader, Stream
 from viewer.app.files.recent import remember
-from viewer.app.files.state import Files
-from viewer.app.files.stream import Stream
-from viewer.app.held import is_held, stops_time
 from viewer.app.interface import draw_interface
 from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
-from viewer.app.mouse import drop_motion_before_press, handle_mouse
+from viewer.app.mouse import drop_motion_before_press, handle_mouse, is_held, stops_time
 from viewer.app.overlays import draw_hints
-from viewer.app.pace import Pace, Step
-from viewer.app.palette.palette_window import draw_palette
-from viewer.app.picture_key import PictureKeys
+from viewer.app.pace import Pace, PictureKeys, Step
+from viewer.app.palette import draw_palette
 from viewer.app.posing.gizmo import draw_gizmo
-from viewer.app.posing.shape_guard import drop_unreadable_shapes
+from viewer.app.posing.shape_panel import drop_unreadable_shapes
 from viewer.app.preferences.applying import follow_preferences
-from viewer.app.preferences.state import Preferences
-from viewer.app.recording.preview import Preview
-from viewer.app.recording.record_dialog import draw_record_dialog
+from viewer.app.preferences.preferences import Preferences
+from viewer.app.recording.record_dialog import Preview, draw_record_dialog
 from viewer.app.recording.recording_steps import start_recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
-from viewer.app.screenshot import save_screenshot
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
 from viewer.app.view.hovering import draw_hovered_name, hover_joint
 from viewer.app.view.outlines import OutlineLayer
 from viewer.app.view.picks import answer_picks
-from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
+from viewer.app.weights.vertex_panel import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
-from viewer.formats import FORMATS
+from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, MotionSettings, bundled_body, bundled_files
 from viewer.loading.additions import add_to_actor
 from viewer.loading.capturing import Builder
@@ -67,8 +60,6 @@ from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
-
-__all__ = ["Frame"]
 
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
 """Suffixes of poses and textures, which are applied to the open figure."""
@@ -151,7 +142,7 @@ class Frame:
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
-        if advance_job(state):
+        if _advance_job(state):
             state.of(Closing).withdraw()  # the user may want to export again
         # Edits are recorded before the clock poses the scene, which is not an edit.
         state.history.observe(state.scene, state.options, is_held(state))
@@ -370,7 +361,7 @@ class Frame:
         if "open body" in state.wants:
             self.open([bundled_body()])
         if "screenshot" in state.wants:
-            save_screenshot(state, self.scene_picture)
+            _save_screenshot(state, self.scene_picture)
         if "quit" in state.wants:
             request_quit(state)
         start_recording(state, self.renderer)
@@ -398,3 +389,48 @@ class Frame:
         for item in (self.target, self._preview, self.outlines, self.renderer):
             if item is not None:
                 item.release()
+
+
+def _save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
+    """Save an image of the scene under an unused name in the current folder.
+
+    Parameters
+    ----------
+    state : AppState
+        State that receives a message.
+    picture : callable
+        Returns the image, (H, W, 4) uint8; may raise ViewerError.
+    """
+    try:
+        path = free_path(Path.cwd(), state.scene.title, ".png")
+        save_image(path, picture())
+        state.say(f"Saved {printable(path, 200)}")
+        if "##legend" in state.item_rects:  # drawn over the image, not into it
+            state.say('Saved without the legend: turn on "Legend in pictures" in the Weights panel')
+    except ViewerError as problem:
+        state.error = str(problem)
+    except OSError as problem:
+        state.error = f"the current folder: {problem.strerror}"
+
+
+def _advance_job(state: AppState) -> bool:
+    """Perform the next step of the running job, and report how it ended.
+
+    Returns
+    -------
+    bool
+        Whether it failed in this frame.
+    """
+    job = state.job
+    if job is None:
+        return False
+    job.step()
+    if not job.is_done:
+        return False
+    state.job = None
+    # A cancelled export may have been finished all the same.
+    if job.is_cancelled and not job.output:
+        return False
+    state.say(*job.lines)
+    state.error = job.error or state.error
+    return bool(job.error)

@@ -9,10 +9,10 @@ from contextlib import ExitStack
 from imgui_bundle import imgui, implot
 
 from viewer.app.core.state import AppState
-from viewer.app.files.state import Files
+from viewer.app.core.theme import add_system_fonts, apply_theme, lacks_letters
+from viewer.app.files.files import Files
 from viewer.app.frame import Frame
-from viewer.app.preferences.state import Appearance
-from viewer.app.theme import add_system_fonts, apply_theme, lacks_letters
+from viewer.app.preferences.preferences import Appearance
 from viewer.diagnostics.template import in_window
 from viewer.rendering.gpu.context import Graphics
 from viewer.rendering.gpu.target import Target

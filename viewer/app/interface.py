@@ -6,24 +6,25 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.core.ink import ERROR, ink
 from viewer.app.core.messages import Message, message_line
 from viewer.app.core.reasons import no_panel
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import (
-    begin_window,
-    button,
-    checkbox,
-    explain,
-    same_line_if_room,
-)
+from viewer.app.core.theme import ERROR, ink
+from viewer.app.core.widgets import begin_window, button, checkbox, explain, same_line_if_room
 from viewer.app.features import PANELS, Panel, panel_module
-from viewer.app.layout import Layout, bring_to_front, draw_dock, keep_fronts
+from viewer.app.layout import (
+    Layout,
+    ShownPanels,
+    bring_to_front,
+    draw_dock,
+    is_open,
+    keep_fronts,
+    set_open,
+)
 from viewer.app.manual import draw_manual
 from viewer.app.menus import draw_menus
 from viewer.app.overlays import draw_overlays
 from viewer.app.preferences.preferences_window import draw_preferences
-from viewer.app.shown_panels import ShownPanels, is_open, set_open
 from viewer.phrases import printable
 
 

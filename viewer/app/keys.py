@@ -7,16 +7,21 @@ from dataclasses import field
 
 from imgui_bundle import imgui
 
-from viewer.app.closing import question_of
+from viewer.app.closing import Closing, keep_open, question_of
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS, Shortcut
-from viewer.app.files.state import Files
-from viewer.app.palette.palette_window import Palette
+from viewer.app.files.files import Files
+from viewer.app.linting.lint_panel import Linting
+from viewer.app.manual import Manual
+from viewer.app.palette import Palette
+from viewer.app.posing.toolbar import cancel_drag
 from viewer.app.preferences.key_map import chords_of
-from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
+from viewer.app.preferences.preferences import CAPTURED, Appearance, Preferences
+from viewer.app.preferences.preferences_window import close_preferences
+from viewer.app.recording.record_dialog import RecordingState
+from viewer.app.rigging.tools import drop_rig_tool
+from viewer.app.weights.weights_panel import Weights, unpin
 from viewer.data_classes import dataclass
-
-__all__ = ["Keyboard", "handle_keys"]
 
 _REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # these repeat while held
 _NAVIGATION = {  # these navigate an open menu or list, and choose from it
@@ -132,3 +137,72 @@ def _close_menus() -> bool:
         return False
     imgui.internal.close_popup_to_level(0, True)
     return True
+
+
+def cancel(state: AppState) -> None:
+    """Close the topmost message, dialog or key list; otherwise clear the selection."""
+    files = state.of(Files)
+    recording = state.of(RecordingState)
+    keyboard = state.of(Keyboard)
+    linting = state.of(Linting)
+    manual = state.of(Manual)
+    if cancel_drag(state):
+        return
+    if state.error:
+        state.error = ""
+    elif files.dialog is not None:
+        files.dialog = None
+    elif question_of(state) is not None:
+        keep_open(state)
+    elif state.messages.is_open:
+        state.messages.is_open = False
+    elif state.of(Appearance).is_open:
+        close_preferences(state)
+    elif manual.topic:
+        manual.topic = ""
+    elif files.loader is not None:
+        files.loader.cancel()
+        files.loader = None
+        state.say_status("Opening cancelled")
+    elif state.job is not None and not state.job.is_cancelled:
+        state.job.cancel()
+        state.of(Closing).withdraw()
+        state.say_status("Cancelled")
+    elif recording.settings is not None:
+        recording.settings = None
+    elif files.stream is not None:
+        files.stream.cancel()
+        files.stream = None
+        state.say_status("Reading cancelled; the frames read so far are kept")
+    elif keyboard.is_listed:
+        keyboard.is_listed = False
+    elif drop_rig_tool(state):
+        state.say_status("Template tool off")
+    elif linting.chosen >= 0:
+        linting.chosen = -1
+    elif state.of(Weights).pinned is not None:
+        unpin(state)
+        state.say_status("Vertex unpinned")
+    else:
+        state.deselect()
+
+
+def toggle_panels(state: AppState) -> None:
+    """Show or hide menus and panels."""
+    state.panels_visible = not state.panels_visible
+
+
+def toggle_keys(state: AppState) -> None:
+    """Show or hide the list of keys."""
+    keyboard = state.of(Keyboard)
+    keyboard.is_listed = not keyboard.is_listed
+
+
+def toggle_messages(state: AppState) -> None:
+    """Open or close the window "Messages"."""
+    state.messages.is_open = not state.messages.is_open
+
+
+def want(state: AppState, what: str) -> None:
+    """Request an action that the window runs after the frame."""
+    state.wants.add(what)

@@ -1,4 +1,4 @@
-"""Default arrangement of the panels: proportions of the dock, which follow the window's size."""
+"""Open and closed panels: most are open by default, some are opened on demand."""
 
 from __future__ import annotations
 
@@ -9,22 +9,66 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
-from viewer.app.shown_panels import ShownPanels, is_open, set_open, show_panel
 from viewer.data_classes import dataclass
 
-__all__ = [
-    "Layout",
-    "Sizes",
-    "bring_to_front",
-    "default_sizes",
-    "draw_dock",
-    "keep_fronts",
-    "toggle_panel",
-]
+
+@dataclass(slots=True)
+class ShownPanels:
+    """Panels whose state differs from the default.
+
+    Attributes
+    ----------
+    closed : set of str
+        Panels open by default that were closed.
+    opened : set of str
+        On-demand panels that were opened.
+    wants_reset : bool
+        Whether the default layout is to be restored.
+    fronts : list of str
+        Titles of panels to bring to the front of their tabs once they are drawn.
+    """
+
+    closed: set[str] = field(default_factory=set)
+    opened: set[str] = field(default_factory=set)
+    wants_reset: bool = False
+    fronts: list[str] = field(default_factory=list)
+
+
+def is_open(state: AppState, name: str) -> bool:
+    """Return whether a panel is open; it is drawn only if it has something to show."""
+    shown = state.of(ShownPanels)
+    if PANELS[name].on_demand:
+        return name in shown.opened
+    return name not in shown.closed
+
+
+def set_open(state: AppState, name: str, opened: bool) -> None:
+    """Open or close a panel."""
+    shown = state.of(ShownPanels)
+    on_demand = PANELS[name].on_demand
+    names = shown.opened if on_demand else shown.closed
+    if opened == on_demand:
+        names.add(name)
+    else:
+        names.discard(name)
+
+
+def show_panel(state: AppState, name: str) -> None:
+    """Open a panel, and bring it to the front of its tabs once it is drawn."""
+    set_open(state, name, True)
+    state.of(ShownPanels).fronts.append(PANELS[name].title)
+
+
+def reset_layout(state: AppState) -> None:
+    """Restore the initial arrangement of the panels."""
+    state.of(ShownPanels).wants_reset = True
+
 
 _DOCK = "viewer dock"
+
 # Minimum and maximum width of each side, in font sizes.
 _LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
+
 # Widths of the sides relative to the window's width.
 _LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
 _MOST = 0.5
@@ -34,7 +78,7 @@ _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 """Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
 
 
-class Sizes(NamedTuple):
+class _Sizes(NamedTuple):
     """Sizes of the default arrangement in window coordinates.
 
     Attributes
@@ -72,13 +116,13 @@ class Layout:
     """
 
     is_arranged: bool = False
-    sizes: Sizes | None = None
+    sizes: _Sizes | None = None
     nodes: dict[str, int] = field(default_factory=dict)
     fronts: list[str] = field(default_factory=list)
     found: tuple[object, ...] = ()
 
 
-def default_sizes(window: tuple[float, float], letter: float, lines: float, plots: bool) -> Sizes:
+def _default_sizes(window: tuple[float, float], letter: float, lines: float, plots: bool) -> _Sizes:
     """Return the sizes of panels for a window; the view keeps at least half of its width.
 
     Parameters
@@ -105,10 +149,10 @@ def default_sizes(window: tuple[float, float], letter: float, lines: float, plot
     rows = 3 if height >= _THREE_ROWS * letter else 2
     if (_LEFT[0] + _RIGHT[0]) * letter > _MOST * width:
         column = _between(_COLUMN_PART * width, _COLUMN, letter)
-        return Sizes(0.0, min(column, _MOST * width), bottom, 2)
+        return _Sizes(0.0, min(column, _MOST * width), bottom, 2)
     left = _between(_LEFT_PART * width, _LEFT, letter)
     right = _between(_RIGHT_PART * width, _RIGHT, letter)
-    return Sizes(left, min(right, _MOST * width - left), bottom, rows)
+    return _Sizes(left, min(right, _MOST * width - left), bottom, rows)
 
 
 def _between(width: float, limits: tuple[float, float], letter: float) -> float:
@@ -138,7 +182,7 @@ def draw_dock(state: AppState) -> int:
     return dock
 
 
-def _wanted(state: AppState) -> Sizes:
+def _wanted(state: AppState) -> _Sizes:
     size, style = imgui.get_main_viewport().size, imgui.get_style()
     letter = imgui.get_font_size()
     tracks = sum(actor.clip is not None for actor in state.scene.actors)
@@ -146,15 +190,15 @@ def _wanted(state: AppState) -> Sizes:
     rows = 3.0 * imgui.get_frame_height_with_spacing() + 2.0 * style.window_padding.y
     rows += (tracks + 1.5) * imgui.get_text_line_height_with_spacing()
     plots = any(_is_in_front(PANELS[name].title) for name in ("curves", "joint_match"))
-    return default_sizes((size.x, size.y), letter, rows / letter, plots)
+    return _default_sizes((size.x, size.y), letter, rows / letter, plots)
 
 
-def _shape(sizes: Sizes) -> tuple[bool, int]:
+def _shape(sizes: _Sizes) -> tuple[bool, int]:
     """Return a key that differs between arrangements with different dock nodes."""
     return sizes.left > 0.0, sizes.rows
 
 
-def _build(layout: Layout, dock: int, sizes: Sizes) -> None:
+def _build(layout: Layout, dock: int, sizes: _Sizes) -> None:
     """Rebuild the arrangement of all panels."""
     builder, viewport = imgui.internal, imgui.get_main_viewport()
     width, height = max(viewport.size.x, 1.0), max(viewport.size.y, 1.0)
@@ -179,7 +223,7 @@ def _build(layout: Layout, dock: int, sizes: Sizes) -> None:
     layout.fronts = list(firsts.values())
 
 
-def _rows(right: int, sizes: Sizes) -> dict[str, int]:
+def _rows(right: int, sizes: _Sizes) -> dict[str, int]:
     """Split the right side into rows; return the node of each dock."""
     builder = imgui.internal
     fraction = 0.5 if not sizes.left else 0.42 if sizes.rows == 2 else 0.6
@@ -193,7 +237,7 @@ def _rows(right: int, sizes: Sizes) -> dict[str, int]:
     return {"right 1": upper, "right 2": split.id_at_opposite_dir, "right 3": split.id_at_dir}
 
 
-def _rebuild(layout: Layout, dock: int, sizes: Sizes) -> None:
+def _rebuild(layout: Layout, dock: int, sizes: _Sizes) -> None:
     """Rebuild the arrangement, and keep the front tabs in front."""
     front = _in_front()
     _build(layout, dock, sizes)
@@ -234,7 +278,7 @@ def _is_in_front(title: str) -> bool:
     return bool(window.dock_node.selected_tab_id == window.tab_id)
 
 
-def _resize(layout: Layout, sizes: Sizes) -> None:
+def _resize(layout: Layout, sizes: _Sizes) -> None:
     """Resize the sides and the bottom."""
     for name, node in layout.nodes.items():
         found = imgui.internal.dock_builder_get_node(node)

@@ -8,8 +8,8 @@ from itertools import groupby
 
 from imgui_bundle import imgui
 
-from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import ink
 from viewer.app.core.widgets import begin_menu, begin_window, menu_item, note_item
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError

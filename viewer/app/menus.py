@@ -18,19 +18,18 @@ from viewer.app.core.reasons import (
 from viewer.app.core.state import AppState
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
-from viewer.app.curves.clip_actions import new_clip
+from viewer.app.curves.editing import new_clip
 from viewer.app.features import PANELS
-from viewer.app.files.export_formats import N_ROWS, draw_pose_formats, pose_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.files import Files
 from viewer.app.files.model_menu import draw_model_menu
-from viewer.app.files.motion_export import ask_for_motion
-from viewer.app.files.state import Files
+from viewer.app.files.motion_export import N_ROWS, ask_for_motion, draw_pose_formats, pose_formats
 from viewer.app.keys import Keyboard
-from viewer.app.layout import toggle_panel
-from viewer.app.linting.actions import check_rig
+from viewer.app.layout import is_open, reset_layout, toggle_panel
+from viewer.app.linting.lint_panel import check_rig
 from viewer.app.manual import draw_manual_menu
-from viewer.app.palette.palette_window import toggle_palette
-from viewer.app.posing.pose_actions import (
+from viewer.app.palette import toggle_palette
+from viewer.app.posing.posing import (
     ask_for_pose,
     copy_numbers,
     copy_pose,
@@ -41,8 +40,7 @@ from viewer.app.posing.pose_actions import (
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.record_dialog import open_record_dialog
-from viewer.app.shown_panels import is_open, reset_layout
-from viewer.app.view.view_menu import draw_view_menu
+from viewer.app.view.display_panel import draw_view_menu
 from viewer.export import files_written
 from viewer.formats import file_stem, opened_text
 from viewer.phrases import printable

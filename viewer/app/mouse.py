@@ -6,13 +6,13 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import choose_joint, use_handles
+from viewer.app.posing.posing import Posing
+from viewer.app.rigging.rigging import Rigging
 from viewer.app.rigging.tools import holds_mouse
 from viewer.app.view.axis_gizmo import holds_gizmo
-from viewer.app.view.state import Picking
-from viewer.app.weights.state import Weights, wants_vertex
+from viewer.app.view.hovering import Picking
+from viewer.app.weights.weights_panel import Weights, wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
-
-__all__ = ["drop_motion_before_press", "handle_mouse"]
 
 _DEGREES_PER_POINT = 0.4
 _ZOOM_PER_NOTCH = 0.88
@@ -86,3 +86,31 @@ def _is_still(button: imgui.MouseButton_) -> bool:
     """Return whether the pointer has stayed in place since a button was pressed."""
     io = imgui.get_io()
     return bool(io.mouse_drag_max_distance_sqr[button] < io.mouse_drag_threshold**2)
+
+
+def is_held(state: AppState) -> bool:
+    """Return whether an edit is in progress: a widget or a handle is held."""
+    drag = state.of(Posing).drag
+    is_dragged = drag is not None and not drag.is_over
+    moves_template = state.of(Rigging).holds_mouse and imgui.is_mouse_down(imgui.MouseButton_.left)
+    return _is_widget_held() or is_dragged or moves_template
+
+
+def _is_widget_held() -> bool:
+    """Return whether a widget is held. A text field changes nothing until it loses the focus.
+
+    Tab goes from field to field without a frame in between, and each number is a separate edit.
+    """
+    active = imgui.internal.get_active_id()
+    # This state persists after typing: the same slider may be dragged afterwards.
+    is_text = imgui.internal.get_input_text_state(active) is not None
+    return active != 0 and not (is_text and imgui.get_io().want_text_input)
+
+
+def stops_time(state: AppState) -> bool:
+    """Return whether time must stop: a handle is held but has not been dragged yet.
+
+    A click must not pause playback, and a drag must start from an unchanged pose.
+    """
+    drag = state.of(Posing).drag
+    return drag is not None and not drag.has_moved

@@ -127,9 +127,9 @@ def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
 
 
 def _show_progress(opening: Opening[Found], shell: Shell) -> None:
+    from viewer.app.core.theme import set_theme
     from viewer.app.display import import_glfw
     from viewer.app.preferences.applying import chosen_theme
-    from viewer.app.theme import set_theme
     from viewer.interrupts import poll
 
     glfw = import_glfw()

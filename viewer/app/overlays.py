@@ -11,18 +11,16 @@ from typing import NamedTuple
 
 from imgui_bundle import imgui
 
-from viewer.app.cancel import cancel
-from viewer.app.core.ink import ink
-from viewer.app.core.key_names import KeyNames, key_name
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import Rect, begin_overlay, button, overlay_rect
+from viewer.app.core.theme import ink
+from viewer.app.core.widgets import KeyNames, Rect, begin_overlay, button, key_name, overlay_rect
 from viewer.app.features import KEYS, MOUSE
-from viewer.app.files.state import Files
-from viewer.app.keys import Keyboard
+from viewer.app.files.files import Files
+from viewer.app.keys import Keyboard, cancel
 from viewer.app.posing.toolbar import draw_toolbar
 from viewer.app.view.axis_gizmo import gizmo_rect
-from viewer.app.weights.hover_text import draw_hover_text
 from viewer.app.weights.legend import draw_legend
+from viewer.app.weights.vertex_panel import draw_hover_text
 from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
 from viewer.rig.scene import scene_unit

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from viewer.app.display import find_display, import_glfw
-from viewer.app.files.state import Files
-from viewer.app.shown_panels import ShownPanels
-from viewer.app.weights.state import Weights
+from viewer.app.files.files import Files
+from viewer.app.layout import ShownPanels
+from viewer.app.weights.weights_panel import Weights
 
 glfw = import_glfw()
 
@@ -21,7 +21,8 @@ from viewer.app.closing import (  # noqa: E402
 )
 from viewer.app.core.jobs import FrameJob  # noqa: E402
 from viewer.app.core.state import AppState  # noqa: E402
-from viewer.app.display_loss import stop_watching  # noqa: E402
+from viewer.app.core.theme import add_system_fonts  # noqa: E402
+from viewer.app.display import stop_watching  # noqa: E402
 from viewer.app.files.recent import (  # noqa: E402
     load_arranged,
     load_closed_panels,
@@ -33,12 +34,11 @@ from viewer.app.files.recent import (  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.layout import Layout  # noqa: E402
 from viewer.app.preferences.applying import start_with  # noqa: E402
-from viewer.app.preferences.state import load_preferences  # noqa: E402
+from viewer.app.preferences.preferences import load_preferences  # noqa: E402
 from viewer.app.shell import Shell, create_context, create_window  # noqa: E402
-from viewer.app.theme import add_system_fonts  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
-from viewer.app.weights.actions import start_heat_map  # noqa: E402
+from viewer.app.weights.weights_panel import start_heat_map  # noqa: E402
 from viewer.diagnostics.template import in_window  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402

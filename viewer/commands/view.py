@@ -164,7 +164,7 @@ def _title(arguments: argparse.Namespace) -> str:
 
 def _fill_in(arguments: argparse.Namespace) -> list[str]:
     """Set omitted options from the user's preferences; return messages about damaged ones."""
-    from viewer.app.preferences.state import load_preferences
+    from viewer.app.preferences.preferences import load_preferences
 
     problems: list[str] = []
     preferences = load_preferences(problems.append)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import viewer
-from viewer.app.context.context_menu import ContextMenu
+from viewer.app.context_menu import ContextMenu
 from viewer.app.core.reasons import no_panel
 from viewer.rig.scene import Actor, Scene
 

@@ -17,12 +17,12 @@ from rig.animated import animated_leg
 import viewer
 from viewer.app.closing import Closing, request_quit, unsaved_edits
 from viewer.app.core.undo_actions import redo, undo
+from viewer.app.files.files import Files
 from viewer.app.files.motion_export import save_motion
 from viewer.app.files.saving import save_in_background
-from viewer.app.files.state import Files
 from viewer.app.playback.animations import choose_animation
-from viewer.app.recording.state import RecordingState, RecordSettings
-from viewer.app.retargeting.match_actions import (
+from viewer.app.recording.record_dialog import RecordingState, RecordSettings
+from viewer.app.retargeting.joint_match_panel import (
     ask_where_to_save,
     match_automatically,
     match_joint,

@@ -9,9 +9,9 @@ from PIL import Image
 
 from viewer.app.closing import Closing, unsaved_edits
 from viewer.app.core.undo_actions import redo, undo
+from viewer.app.files.files import Files
 from viewer.app.files.motion_export import save_motion
-from viewer.app.files.state import Files
-from viewer.app.posing.pose_actions import (
+from viewer.app.posing.posing import (
     copy_numbers,
     mirror,
     paste_pose,

@@ -8,7 +8,7 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app.core.text_fields import read_number
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 
 
 def _typed(hand):

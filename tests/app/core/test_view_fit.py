@@ -15,8 +15,8 @@ import viewer
 from viewer.app.actors.following import start_following
 from viewer.app.core.view_frame import view_frame
 from viewer.app.curves.editing import place_key
-from viewer.app.files.state import Files
-from viewer.app.shown_panels import ShownPanels
+from viewer.app.files.files import Files
+from viewer.app.layout import ShownPanels
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.recorder import Recording

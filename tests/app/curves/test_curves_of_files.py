@@ -10,8 +10,8 @@ from imgui_bundle import imgui
 from numpy.testing import assert_array_equal
 
 import viewer
-from viewer.app.curves.state import Curves
-from viewer.app.files.state import Files
+from viewer.app.curves.editing import Curves
+from viewer.app.files.files import Files
 from viewer.formats import Source, read
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
@@ -68,7 +68,7 @@ def test_edited_clip_is_saved_and_read_back(curves, tmp_path):
 
 
 def test_opened_clip_is_never_replaced(curves, tmp_path):
-    from viewer.app.curves.clip_actions import save_clip
+    from viewer.app.curves.editing import save_clip
 
     save_clip(curves.state, tmp_path / "wave.anim")
     assert "input files are never overwritten" in curves.state.error

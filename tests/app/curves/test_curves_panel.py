@@ -11,8 +11,8 @@ from app.curves.plotted import ARM_X, _arm, _at, _center, _clip, _pick, _scale, 
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.app.curves.data import curves_of
+from viewer.app.curves.editing import Curves
 from viewer.app.curves.plot import unit_text, value_limits
-from viewer.app.curves.state import Curves
 from viewer.rig.motion.clip import evaluate
 
 

@@ -9,11 +9,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rig.animated import animated_leg
 
 from viewer.app.core.undo_actions import undo
-from viewer.app.curves.clip_actions import key_present_pose
 from viewer.app.curves.data import curves_of
-from viewer.app.curves.editing import add_key_at, delete_chosen, interpolate, place_key
-from viewer.app.curves.state import Curves
-from viewer.app.posing.tool_actions import no_keys
+from viewer.app.curves.editing import (
+    Curves,
+    add_key_at,
+    delete_chosen,
+    interpolate,
+    key_present_pose,
+    place_key,
+)
+from viewer.app.posing.toolbar import no_keys
 from viewer.loading import Contents, begin
 
 SIZE = (1180, 900)

@@ -13,16 +13,17 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.app.actors.following import start_following
 from viewer.app.core.undo_actions import undo
-from viewer.app.curves.clip_actions import key_present_pose, new_clip
 from viewer.app.curves.editing import (
+    Curves,
     add_key_at,
     change_tangent,
     delete_chosen,
     extrapolate,
+    key_present_pose,
+    new_clip,
     place_key,
     set_playback_range,
 )
-from viewer.app.curves.state import Curves
 from viewer.app.playback.timeline_panel import set_rate
 from viewer.rig.motion.clip import evaluate
 from viewer.rig.motion.follow import followed_point

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from viewer.app.files.export_formats import FOLDER, pose_formats
-from viewer.app.files.motion_export import motion_formats, unsuited_formats
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
+from viewer.app.files.motion_export import FOLDER, motion_formats, pose_formats, unsuited_formats
 
 
 def test_chosen_format_changes_the_suffix_of_the_name(hand):

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from viewer.app.files.saving import save_in_background
-from viewer.app.posing.pose_actions import save_export
+from viewer.app.posing.posing import save_export
 from viewer.export import obj
 from viewer.media.saving import save_text
 from viewer.progress import report

@@ -6,7 +6,7 @@ import pytest
 from app.tiny import write_rig
 
 from viewer.app.files.file_choice import FileDialog
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 
 
 @pytest.fixture

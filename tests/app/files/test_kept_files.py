@@ -18,7 +18,7 @@ from viewer.app.files.recent import (
     save_layout,
     state_folder,
 )
-from viewer.app.preferences.state import (
+from viewer.app.preferences.preferences import (
     Preferences,
     load_preferences,
     preferences_file,

@@ -14,14 +14,14 @@ from export.gltf.two_parts import two_parts
 
 import viewer
 from viewer.app.files import motion_export
-from viewer.app.files.export_formats import FOLDER
+from viewer.app.files.files import Files
 from viewer.app.files.motion_export import (
+    FOLDER,
     motion_files,
     motion_suffixes,
     save_motion,
     unsuited_formats,
 )
-from viewer.app.files.state import Files
 from viewer.formats import save_bytes
 from viewer.progress import report
 from viewer.rig.geometry.transform import translation_matrix

@@ -8,9 +8,9 @@ import threading
 import pytest
 from app.tiny import SKEL, skin_text, write_rig
 
-import viewer.app.files.loader
+import viewer.app.files.files
+from viewer.app.files.files import Files
 from viewer.app.files.recent import load_recent, remember, state_folder
-from viewer.app.files.state import Files
 from viewer.errors import RenderError
 from viewer.loading import load, read_files
 from viewer.progress import report
@@ -160,7 +160,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
         gate.wait(10)
         return read_files(paths)
 
-    monkeypatch.setattr(viewer.app.files.loader, "read_files", slow)
+    monkeypatch.setattr(viewer.app.files.files, "read_files", slow)
     scene = hand.state.scene
     hand.app.frame.open(list(rig))
     loader = hand.state.of(Files).loader
@@ -180,7 +180,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
 def test_escape_cancels_reading(hand, rig, monkeypatch):
     gate = threading.Event()
     monkeypatch.setattr(
-        viewer.app.files.loader,
+        viewer.app.files.files,
         "read_files",
         lambda paths, **_: (gate.wait(10), read_files(paths))[1],
     )
@@ -205,7 +205,7 @@ def test_progress_of_opening_is_shown_and_cancelling_ends_the_reading(hand, rig,
         finally:
             ended.set()
 
-    monkeypatch.setattr(viewer.app.files.loader, "read_files", slow)
+    monkeypatch.setattr(viewer.app.files.files, "read_files", slow)
     hand.app.frame.open(list(rig))
     loader = hand.state.of(Files).loader
     assert begun.wait(10)

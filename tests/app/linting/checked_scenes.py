@@ -8,7 +8,7 @@ import numpy as np
 from lint.planted import weighted
 from lint.sound import FRAMES, column, scene_of, standing
 
-from viewer.app.linting.state import Linting
+from viewer.app.linting.lint_panel import Linting
 from viewer.rendering.overlay.annotation import MARK_COLOR
 from viewer.rig.scene import Scene
 

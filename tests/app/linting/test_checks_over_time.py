@@ -9,8 +9,7 @@ from app.linting.checked_scenes import LIGHT, SIZE, codes, finish, jump, marked,
 from lint.sound import column, scene_of
 from rig.animated import animated_leg, bow, channel, clip_of
 
-from viewer.app.linting.actions import check_rig, start_check
-from viewer.app.linting.state import Linting
+from viewer.app.linting.lint_panel import Linting, check_rig, start_check
 from viewer.lint import lint_scene
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.scene import Actor

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
 from lint.test_rechecks import TEXTS
 
-from viewer.app.linting.state import Linting
+from viewer.app.linting.lint_panel import Linting
 from viewer.cli import run
 from viewer.loading import bundled_files
 from viewer.rig.motion.timing import Timing

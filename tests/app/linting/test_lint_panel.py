@@ -12,9 +12,9 @@ from imgui_bundle import imgui
 from lint.planted import weighted
 from lint.sound import RATE, column, keypoints, scene_of
 
+from viewer.app.layout import ShownPanels
+from viewer.app.linting.lint_panel import Linting
 from viewer.app.linting.marks import marks_of
-from viewer.app.linting.state import Linting
-from viewer.app.shown_panels import ShownPanels
 from viewer.lint import Places, describe, lint_scene
 from viewer.rendering.camera import camera_axes
 from viewer.rig.figure import Figure

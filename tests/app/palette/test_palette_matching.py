@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.app.palette.palette_window import ranked, score
+from viewer.app.palette import ranked, score
 
 NAMES = ["Wireframe", "Fit the view", "Front view", "Joint names", "Left_knee", "left_ankle"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app.palette.palette_window import Palette, entries
-from viewer.app.shown_panels import is_open
+from viewer.app.layout import is_open
+from viewer.app.palette import Palette, entries
 
 
 def opened(hand, text=""):

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 
 import viewer
 from viewer.app.core.undo_history import History
-from viewer.app.files.stream import keep_rate
+from viewer.app.files.files import keep_rate
 from viewer.app.playback.timeline_panel import foreign_rate, rate_of, set_rate
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.motion.clip import Channel, Clip

@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.app.core.clock import MODES
-from viewer.app.files.state import Files
-from viewer.app.files.stream import Stream
+from viewer.app.files.files import Files, Stream
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart

@@ -9,7 +9,7 @@ import pytest
 from formats.pig_text import write as write_pig
 from numpy.testing import assert_allclose
 
-from viewer.app.posing.state import Posing
+from viewer.app.posing.posing import Posing
 
 
 def rodrigues(vector):

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.app.closing import Closing
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.posed_joint import posed_joint
+from viewer.app.posing.posing import Posing
 from viewer.app.posing.rotate_tool import RADIUS
-from viewer.app.posing.state import Posing
 from viewer.rendering.camera import camera_axes
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.scene import Actor, Scene

@@ -9,8 +9,8 @@ import pytest
 from app.posing_rigs import around, joint_seen
 from app.test_panel_pictures import _compare, _is_like
 
+from viewer.app.posing.posing import Posing
 from viewer.app.posing.rotate_tool import RADIUS
-from viewer.app.posing.state import Posing
 from viewer.loading import bundled_files
 
 

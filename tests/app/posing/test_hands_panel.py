@@ -5,8 +5,8 @@ import pytest
 from family_models import family_figure
 from numpy.testing import assert_allclose
 
-from viewer.app.posing.state import Posing
-from viewer.app.shown_panels import ShownPanels
+from viewer.app.layout import ShownPanels
+from viewer.app.posing.posing import Posing
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, Scene

@@ -10,7 +10,7 @@ from app.posing_rigs import arm_figure
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.formats.pose import pose_text
 from viewer.rig.pose import joint_rotations, pose_key, rest_pose
@@ -347,7 +347,7 @@ def test_export_writes_the_posed_mesh(box, tmp_path, suffix):
 
 
 def test_open_files_are_never_overwritten(drive_body, tmp_path):
-    from viewer.app.posing.pose_actions import save_export, save_pose
+    from viewer.app.posing.posing import save_export, save_pose
 
     hand = drive_body()
     model = tmp_path / "open.npz"

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.app.posing.state import Posing
+from viewer.app.posing.posing import Posing
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.mesh import Mesh

@@ -8,9 +8,9 @@ from app.posing_rigs import SIZE, arm_figure, arm_scene, around, drag_along, joi
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose, assert_array_equal
 
+from viewer.app.posing.posing import Posing
 from viewer.app.posing.rotate_tool import RADIUS
-from viewer.app.posing.state import Posing
-from viewer.app.posing.tool_actions import no_chain, no_keys, no_orientation, no_tool
+from viewer.app.posing.toolbar import no_chain, no_keys, no_orientation, no_tool
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, Scene

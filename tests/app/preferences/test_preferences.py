@@ -8,12 +8,12 @@ from dataclasses import asdict, replace
 import pytest
 from imgui_bundle import imgui
 
-from viewer.app.core.key_names import key_name
+from viewer.app.core.widgets import key_name
 from viewer.app.features import KEYS
-from viewer.app.files.model_folder import set_model_folder
+from viewer.app.files.model_menu import set_model_folder
 from viewer.app.preferences import preferences_window
 from viewer.app.preferences.key_map import chord_name, conflicts, parse_chord
-from viewer.app.preferences.state import (
+from viewer.app.preferences.preferences import (
     Appearance,
     Preferences,
     load_preferences,

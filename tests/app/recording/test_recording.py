@@ -8,15 +8,15 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 from PIL import Image
 
-from viewer.app.files.state import Files
-from viewer.app.recording.recording_steps import RecordedMarks
-from viewer.app.recording.state import (
+from viewer.app.files.files import Files
+from viewer.app.recording.record_dialog import (
     RecordingState,
     RecordSettings,
     playback_frames,
     recorded_times,
 )
-from viewer.app.weights.actions import pin_vertex, unpin
+from viewer.app.recording.recording_steps import RecordedMarks
+from viewer.app.weights.weights_panel import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
 from viewer.rig.motion.clip import Channel, Clip

@@ -15,8 +15,7 @@ from rig.retargeting.walking import RATE, walk
 
 from viewer.app.core.reasons import no_undo
 from viewer.app.core.undo_actions import undo
-from viewer.app.files.state import Files
-from viewer.app.files.stream import Stream
+from viewer.app.files.files import Files, Stream
 from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
 from viewer.formats import Source, read

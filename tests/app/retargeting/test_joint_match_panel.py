@@ -13,16 +13,17 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_panel
 from viewer.app.core.undo_actions import redo, undo
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit
-from viewer.app.retargeting.joint_match_panel import JointMatch, shown_match
-from viewer.app.retargeting.match_actions import (
+from viewer.app.retargeting.joint_match_panel import (
+    JointMatch,
     ask_for_map,
     ask_where_to_save,
     is_automatic,
     match_automatically,
     match_joint,
+    shown_match,
 )
 from viewer.formats import Source
 from viewer.formats._joint_map import read_joint_map

@@ -8,7 +8,7 @@ from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE
 
 from viewer.app.rigging.placing import as_similarity, move_by_hand
-from viewer.app.rigging.sources import current_template
+from viewer.app.rigging.rigging import current_template
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.rigging.results import plays_motion, plays_trial
-from viewer.app.rigging.state import Rigging
+from viewer.app.rigging.rigging import Rigging
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.skinning import deform
 

@@ -22,8 +22,7 @@ from viewer.app.rigging.placing import (
     posed_template,
     similarity_now,
 )
-from viewer.app.rigging.sources import current_template, target_mesh
-from viewer.app.rigging.state import Rigging
+from viewer.app.rigging.rigging import Rigging, current_template, target_mesh
 from viewer.app.rigging.tools import RADIUS
 from viewer.app.rigging.work import align_template
 from viewer.rig.geometry.transform import apply_transform, translation_matrix

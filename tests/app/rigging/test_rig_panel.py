@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
-from viewer.app.rigging.sources import current_template
-from viewer.app.rigging.state import Rigging
+from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.skinning import deform

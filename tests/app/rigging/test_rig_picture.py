@@ -6,7 +6,7 @@ import pytest
 from app import rig_scene
 from app.test_panel_pictures import _compare, _shown
 
-from viewer.app.shown_panels import ShownPanels
+from viewer.app.layout import ShownPanels
 
 pytest.importorskip("scipy")
 pytestmark = pytest.mark.usefixtures("quick_fits")

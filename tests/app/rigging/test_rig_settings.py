@@ -19,10 +19,9 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 import viewer
 from viewer.app.closing import Closing, request_quit, unsaved_edits
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.app.rigging.placing import placing_now
-from viewer.app.rigging.sources import target_mesh, targets, template_texts, templates
-from viewer.app.rigging.state import Rigging
+from viewer.app.rigging.rigging import Rigging, target_mesh, targets, template_texts, templates
 from viewer.app.rigging.work import align_template, start_adding, start_reading
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.export import export

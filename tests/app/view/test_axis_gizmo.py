@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewer.app.view.axis_gizmo import AxisGizmo
-from viewer.app.view.camera_actions import fly_to
+from viewer.app.view.camera_panel import fly_to
 from viewer.app.view.flight import Flight
 from viewer.rendering.camera import VIEWS, camera_axes
 

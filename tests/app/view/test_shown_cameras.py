@@ -8,7 +8,7 @@ from formats.filmed_capture import write_filmed
 from numpy.testing import assert_allclose
 from rendering.moving import moving_camera
 
-from viewer.app.view.camera_actions import look_through
+from viewer.app.view.camera_panel import look_through
 from viewer.rendering.camera import eye
 
 

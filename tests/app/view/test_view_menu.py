@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.app.view.view_menu import JOINT_TOGGLES
-from viewer.app.weights.state import Weights
+from viewer.app.view.display_panel import JOINT_TOGGLES
+from viewer.app.weights.weights_panel import Weights
 
 KEYS = {"xray": ("b", ""), "joint_names": ("j", ""), "joint_axes": ("j", "shift")}
 

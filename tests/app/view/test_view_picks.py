@@ -12,9 +12,9 @@ from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.posing.state import Posing
+from viewer.app.posing.posing import Posing
 from viewer.app.view.picks import take_pick
-from viewer.app.weights.state import Weights
+from viewer.app.weights.weights_panel import Weights
 from viewer.rendering.picking import Pick
 from viewer.rig.annotations import BodyParts, ReducedMesh
 from viewer.rig.skinning import deform, joint_matrices

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from app.tiny import SKEL, skin_text
 
-from viewer.app.weights.actions import start_heat_map, toggle_weights
+from viewer.app.weights.weights_panel import start_heat_map, toggle_weights
 from viewer.rig.annotations import VertexField
 from viewer.rig.scalars import informative_quantity, joint_influences, most_influential
 from viewer.rig.scene import Actor

@@ -9,11 +9,9 @@ import pytest
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
-from viewer.app.shown_panels import ShownPanels
-from viewer.app.weights.actions import pin_vertex
-from viewer.app.weights.explanation_lines import influence_colors, vertex_annotation
-from viewer.app.weights.state import Weights
-from viewer.app.weights.vertex_panel import matrix_text
+from viewer.app.layout import ShownPanels
+from viewer.app.weights.vertex_panel import influence_colors, matrix_text, vertex_annotation
+from viewer.app.weights.weights_panel import Weights, pin_vertex
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
 from viewer.rig.inspection.explanation import explain, explanation_text

@@ -9,8 +9,8 @@ import pytest
 from imgui_bundle import imgui
 from numpy.testing import assert_array_equal
 
-from viewer.app.preferences.state import Appearance
-from viewer.app.weights.actions import no_view
+from viewer.app.preferences.preferences import Appearance
+from viewer.app.weights.weights_panel import no_view
 from viewer.rendering.colors import colormap
 from viewer.rig.annotations import VertexField
 from viewer.rig.scalars import SCALARS, compute, missing_part

@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
-from viewer.app.core.calibrated import look_through_view
+from viewer.app.core.camera_moves import look_through_view
 from viewer.app.core.fields import begin_field, drag_float, in_row
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (

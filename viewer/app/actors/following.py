@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewer.app.core.calibrated import follow_calibrated
+from viewer.app.core.camera_moves import follow_calibrated
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.phrases import printable

@@ -16,8 +16,8 @@ from pathlib import PurePath
 
 from imgui_bundle import imgui
 
-from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import WARNING, ink
 from viewer.phrases import printable
 
 _FLAGS = imgui.InputTextFlags_

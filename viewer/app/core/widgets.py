@@ -11,38 +11,15 @@ from dataclasses import field
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
-from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.rig.number_text import number_text
-
-__all__ = [
-    "Rect",
-    "begin_menu",
-    "begin_overlay",
-    "begin_window",
-    "button",
-    "checkbox",
-    "choice",
-    "count_slider",
-    "disabled",
-    "explain",
-    "menu_item",
-    "note_item",
-    "offer_files",
-    "overlay_rect",
-    "plain_zero",
-    "same_line_if_room",
-    "show_tooltip",
-    "slider",
-]
 
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 
 # Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
 _DISABLED = int(imgui.ItemFlags_.disabled)
 _HOVERED = int(imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled)
-
 Rect = tuple[float, float, float, float]
 """Left, upper, right and lower edge, in window coordinates."""
 
@@ -276,3 +253,39 @@ def plain_zero(value: float, text: str) -> float:
     spec = _NUMBER.search(text)
     shown = spec.group() % value if spec else ""
     return value if not shown.startswith("-") or number_text(float(shown)) != "0" else 0.0
+
+
+@dataclass(slots=True)
+class KeyNames:
+    """Keys changed by the user.
+
+    Attributes
+    ----------
+    changed : dict
+        Maps the label of a key in the table of keys to the name of the key that replaces it.
+    """
+
+    changed: dict[str, str] = field(default_factory=dict)
+
+
+def key_name(state: AppState, usual: str) -> str:
+    """Return the current name of a key, given its label in the table of keys.
+
+    If an action has several keys, the first is named.
+    """
+    return state.of(KeyNames).changed.get(usual, usual).partition(" or ")[0]
+
+
+def with_key(state: AppState, text: str, usual: str) -> str:
+    """Return the text of a button or tooltip, followed by the name of its key.
+
+    Parameters
+    ----------
+    state : AppState
+        Provides the names.
+    text : str
+        The text, which describes the key's effect.
+    usual : str
+        Label of the key in the table of keys.
+    """
+    return f"{text} ({key_name(state, usual)})"

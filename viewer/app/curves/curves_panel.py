@@ -17,13 +17,16 @@ from viewer.app.core.widgets import (
     plain_zero,
     same_line_if_room,
 )
-from viewer.app.curves.clip_actions import ask_for_clip, can_have_keys, key_present_pose, new_clip
 from viewer.app.curves.data import Curve, channel_of, curves_of
 from viewer.app.curves.editing import (
+    Curves,
     DofKeys,
     KeyedMotion,
+    KeyPlace,
     TransformKeys,
     add_key_at,
+    ask_for_clip,
+    can_have_keys,
     change_slope,
     change_tangent,
     delete_chosen,
@@ -31,11 +34,12 @@ from viewer.app.curves.editing import (
     extrapolate,
     focused_rows,
     interpolate,
+    key_present_pose,
     keyed_of,
+    new_clip,
     place_key,
 )
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
-from viewer.app.curves.state import Curves, KeyPlace
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
 from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel

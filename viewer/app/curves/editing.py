@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import channel_of, keyed_values
-from viewer.app.curves.state import Curves, KeyPlace
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.files import Files
+from viewer.app.files.saving import save_files
 from viewer.data_classes import dataclass
+from viewer.formats import FORMATS, file_stem, write
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Channel, Clip, Extrapolation, Tangent, slopes
 from viewer.rig.motion.clip_edit import (
     add_key,
+    clip_from_pose,
     delete_keys,
     key_pose,
     move_keys,
@@ -26,6 +31,7 @@ from viewer.rig.motion.clip_edit import (
     with_channel,
 )
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
+from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Motion
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.transform_keys.edit import (
@@ -356,3 +362,97 @@ def keyed_of(actor: Actor) -> KeyedMotion | None:
     if isinstance(clip, Clip):
         return DofKeys(clip, skeleton)
     return TransformKeys(clip, skeleton) if isinstance(clip, TransformClip) else None
+
+
+KeyPlace = tuple[int, int]
+"""Row of a curve and index of one of its keys."""
+
+
+@dataclass(slots=True)
+class Curves:
+    """State of the Curves panel; the edited clip belongs to the actor.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        Selected curves as rows of ``curves_of``, in the order of selection.
+    keys : frozenset of (row, key)
+        Selected keys.
+    filter : str
+        Text that the names of listed curves must contain.
+    wants_fit : bool
+        Whether the axes are fitted in the next frame.
+    wants_scroll : bool
+        Whether the list scrolls to the first selected curve in the next frame.
+    owner : (int, str, int)
+        Key of the actor, motion and number of curves for which ``rows`` are valid.
+    joint : int
+        Joint whose curves were last selected.
+    """
+
+    rows: tuple[int, ...] = ()
+    keys: frozenset[KeyPlace] = frozenset()
+    filter: str = ""
+    wants_fit: bool = True
+    wants_scroll: bool = False
+    owner: tuple[int, str, int] = (-1, "", 0)
+    joint: int = -1
+
+    def choose(self, rows: tuple[int, ...]) -> None:
+        """Select curves, and fit the axes to them."""
+        self.rows, self.keys, self.wants_fit = rows, frozenset(), True
+
+
+_SECONDS = 2.0  # duration of a new clip
+
+
+def can_have_keys(state: AppState) -> bool:
+    """Return whether the chosen actor can get a clip: it has joints and no motion yet."""
+    return state.actor.pose is not None and state.actor.clip is None
+
+
+def new_clip(state: AppState) -> None:
+    """Create a clip of the chosen actor's constant pose, with one key per DOF."""
+    actor = state.actor
+    if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
+        return
+    actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, actor.title, 0.0, _SECONDS)
+    state.say_status("New clip: this pose held for two seconds")
+
+
+def key_present_pose(state: AppState, only_changed: bool = False) -> None:
+    """Key the pose at the current time."""
+    actor, keyed = state.actor, keyed_of(state.actor)
+    if keyed is None or actor.pose is None:
+        return
+    time = state.clock.time - actor.offset
+    before = _n_keys(actor.clip)
+    actor.clip = keyed.posed(actor, time, only_changed)
+    added = _n_keys(actor.clip) - before
+    state.say_status(f"Pose keyed at {number_text(time, '.3f')} s: {added} new keys")
+
+
+def _n_keys(clip: Motion | None) -> int:
+    """Return the number of keys of a clip."""
+    if not isinstance(clip, Clip | TransformClip):
+        return 0
+    return sum(len(channel.times) for channel in clip.channels)
+
+
+def ask_for_clip(state: AppState) -> None:
+    """Ask where to save the chosen actor's clip."""
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_clip(state, paths[0]),
+        "save",
+        "Save clip: .anim",
+        FORMATS["anim"].suffixes,
+        f"{file_stem(state.actor.name)}_edited.anim",
+    )
+
+
+def save_clip(state: AppState, path: Path) -> None:
+    """Write the chosen actor's clip if it is keyed."""
+    clip = state.actor.clip
+    if isinstance(clip, Clip):
+        save_files(state, lambda: write(clip, path), [path], saved=clip)

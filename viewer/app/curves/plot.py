@@ -12,11 +12,13 @@ from typing import TypeAlias
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from viewer.app.core.ink import faint, ink
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import faint, ink
 from viewer.app.curves.data import Curve, sampled_points
 from viewer.app.curves.editing import (
+    Curves,
     KeyedMotion,
+    KeyPlace,
     add_key_at,
     change_slope,
     delete_chosen,
@@ -25,8 +27,7 @@ from viewer.app.curves.editing import (
     nearest_row,
     set_playback_range,
 )
-from viewer.app.curves.state import Curves, KeyPlace
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip

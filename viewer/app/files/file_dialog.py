@@ -14,7 +14,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import name_field, text_field
 from viewer.app.core.widgets import button, note_item
 from viewer.app.files.file_choice import FileDialog
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.formats import FORMATS
 from viewer.phrases import printable
 

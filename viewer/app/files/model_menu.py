@@ -11,15 +11,13 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, explain, menu_item, note_item
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.model_folder import set_model_folder
-from viewer.app.files.state import Files
-from viewer.models import found_models, load_model_folder
+from viewer.app.files.files import Files
+from viewer.errors import ViewerError
+from viewer.models import found_models, known_models, load_model_folder, save_model_folder
 from viewer.models.catalog import CATALOG, Publication
 from viewer.models.download import ADDABLE, add_model
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 from viewer.progress import receiving
-
-__all__ = ["draw_model_menu"]
 
 
 def draw_model_menu(state: AppState) -> list[Path]:
@@ -97,3 +95,15 @@ def _start_adding(state: AppState, kind: str) -> None:
         return [f"{title} was added: open it with File > Models > {kind} ({path.name})"]
 
     state.job = CountedJob(f"Downloading {title}", add, output="download")
+
+
+def set_model_folder(state: AppState, paths: list[Path]) -> None:
+    """Remember the first path as the folder of body models, and show how many it contains."""
+    try:
+        folder = save_model_folder(paths[0])
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    state.of(Files).model_folder = folder
+    count = len(known_models(folder))
+    state.say(f"{counted(count, 'body model')} in {printable(folder, 200)}")

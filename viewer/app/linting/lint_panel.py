@@ -2,36 +2,41 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.ink import ink
+from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
+from viewer.app.core.theme import ink
 from viewer.app.core.widgets import button, choice, explain, note_item, same_line_if_room, slider
-from viewer.app.linting.actions import (
-    choose_finding,
-    copy_findings,
-    copy_place,
-    file_place,
-    is_in_scene,
-    is_known_there,
-    is_stale,
-    start_check,
-    take_findings,
+from viewer.app.layout import show_panel
+from viewer.app.playback.animations import choose_animation
+from viewer.app.view.picks import take_pick
+from viewer.data_classes import dataclass
+from viewer.lint import (
+    SEVERITIES,
+    Finding,
+    LintOptions,
+    describe,
+    finding_text,
+    recheck,
+    summary,
+    worst_first,
 )
-from viewer.app.linting.state import Checked, Linting
-from viewer.lint import SEVERITIES, Finding, LintOptions
 from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
-from viewer.phrases import printable
+from viewer.loading import bundled_files
+from viewer.phrases import counted, printable
+from viewer.rendering.overlay.annotation import Marks
+from viewer.rendering.picking import Pick
 from viewer.rig.mesh import box_size
-from viewer.rig.scene import scene_unit
-
-__all__ = ["draw"]
+from viewer.rig.pose import pose_key
+from viewer.rig.scene import Actor, Scene, scene_unit
 
 _COLORS = {
     "error": (1.0, 0.42, 0.36, 1.0),
@@ -53,7 +58,7 @@ _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 def draw(state: AppState) -> None:
     """Draw the panel; when it is first shown, it starts a check."""
     view = state.of(Linting)
-    take_findings(state)
+    _take_findings(state)
     if not view.was_shown:
         view.was_shown = True
         start_check(state)
@@ -65,7 +70,7 @@ def draw(state: AppState) -> None:
         if view.running is None:
             imgui.text_wrapped("This scene has not been checked yet.")
         return
-    if is_stale(state):
+    if _is_stale(state):
         _draw_warning("The figure, pose or limits have changed since the check.")
     for note in known.notes:
         _draw_warning(note)
@@ -92,12 +97,12 @@ def _draw_buttons(state: AppState, known: Checked | None) -> None:
     why = "" if known is not None and known.findings else "there are no findings to copy"
     same_line_if_room("Copy text")
     if button(state, "Copy text", why):
-        copy_findings(state, as_json=False)
+        _copy_findings(state, as_json=False)
     if not why:
         explain("all findings, as the command viewer lint prints them")
     same_line_if_room("Copy JSON")
     if button(state, "Copy JSON", why):
-        copy_findings(state, as_json=True)
+        _copy_findings(state, as_json=True)
 
 
 def _draw_limits(state: AppState) -> None:
@@ -240,10 +245,10 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
     flags = imgui.SelectableFlags_.span_all_columns
     size = (0.0, sum(heights) + imgui.get_style().item_spacing.y)
     if imgui.selectable("##finding", index == state.of(Linting).chosen, flags, size)[0]:
-        if is_in_scene(state, finding):
-            choose_finding(state, index)
+        if _is_in_scene(state, finding):
+            _choose_finding(state, index)
         else:
-            copy_place(state, finding)
+            _copy_place(state, finding)
     note_item(state, f"finding {index}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
         _draw_tooltip(state, finding)
@@ -258,8 +263,8 @@ def _draw_tooltip(state: AppState, finding: Finding) -> None:
         imgui.push_text_wrap_pos(_TIP_WIDTH * imgui.get_font_size())
         imgui.text_colored(ink(_COLORS[finding.severity]), f"{finding.severity} {finding.code}")
         imgui.text_unformatted(finding.title)
-        if file_place(finding):
-            imgui.text_unformatted(file_place(finding))
+        if _file_place(finding):
+            imgui.text_unformatted(_file_place(finding))
         imgui.text_unformatted(printable(finding.message, 2000))
         imgui.text_unformatted(f"Remedy: {finding.hint}")
         imgui.text_disabled(_click_text(state, finding))
@@ -269,11 +274,11 @@ def _draw_tooltip(state: AppState, finding: Finding) -> None:
 
 def _click_text(state: AppState, finding: Finding) -> str:
     """Return the tooltip about the effect of a click on a finding."""
-    if is_known_there(state, finding):
+    if _is_known_there(state, finding):
         return "click to show it in the view; click again or press Esc to stop"
-    if is_in_scene(state, finding):
+    if _is_in_scene(state, finding):
         return "click to select the actor: its figure has changed since the check"
-    if not file_place(finding):
+    if not _file_place(finding):
         return "this finding has no location in the view"
     copied = "its path" if finding.line is None else "its path and line"
     if finding.pointer:
@@ -306,3 +311,280 @@ def _draw_severity(severity: str) -> None:
         draw_list.add_circle_filled((x, y - 0.4 * r), 0.6 * line, color)
         draw_list.add_line((x, y - 0.1 * r), (x, y + 0.5 * r), color, line)
     imgui.dummy((size, size))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Checked:
+    """Result of a check.
+
+    Attributes
+    ----------
+    source : Scene
+        The scene that the window shows.
+    scene : Scene
+        A copy of the scene, made when the check began.
+    options : LintOptions
+        Limits of the check.
+    findings : tuple of Finding
+        Findings, most severe first.
+    n_files : int
+        Number of files of the scene that were read again.
+    notes : tuple of str
+        Changes of these files since they were opened.
+    """
+
+    source: Scene
+    scene: Scene
+    options: LintOptions
+    findings: tuple[Finding, ...]
+    n_files: int = 0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(slots=True, eq=False)
+class _Running:
+    """A check that runs in a thread, which stores its result here."""
+
+    job: CountedJob | None = None
+    result: Checked | None = None
+
+
+@dataclass(slots=True)
+class Linting:
+    """State of the Lint panel.
+
+    Attributes
+    ----------
+    options : LintOptions
+        Limits of the next check.
+    checked : Checked or None
+        The last completed check.
+    running : Running or None
+        The check in progress.
+    was_shown : bool
+        Whether the panel has been shown before: showing it for the first time starts a check.
+    severities : set of str
+        Severities to list.
+    text : str
+        Text that listed findings must contain.
+    chosen : int
+        Index of the chosen finding, -1 for none.
+    wants_aim : bool
+        Whether the camera moves to the chosen finding once the scene is posed.
+    is_edited : bool
+        Whether a moving actor was posed by hand since the check.
+    seen : tuple
+        Time and poses of moving actors in the previous frame.
+    marks : Marks or None
+        Marks of the chosen finding.
+    marks_key : object
+        Key that identifies the marks.
+    marks_note : str
+        Note about parts of the finding that are not marked; empty if all are.
+    """
+
+    options: LintOptions = field(default_factory=LintOptions)
+    checked: Checked | None = None
+    running: _Running | None = None
+    was_shown: bool = False
+    severities: set[str] = field(default_factory=lambda: set(SEVERITIES))
+    text: str = ""
+    chosen: int = -1
+    wants_aim: bool = False
+    is_edited: bool = False
+    seen: tuple[object, ...] = ()
+    marks: Marks | None = None
+    marks_key: object = None
+    marks_note: str = ""
+
+    @property
+    def finding(self) -> Finding | None:
+        """The chosen finding."""
+        known = self.checked
+        if known is None or not 0 <= self.chosen < len(known.findings):
+            return None
+        return known.findings[self.chosen]
+
+
+_TITLE = "Checking the rig"
+
+
+def check_rig(state: AppState) -> None:
+    """Show the Lint panel and check the scene."""
+    show_panel(state, "lint")
+    state.of(Linting).was_shown = True
+    start_check(state)
+
+
+def start_check(state: AppState) -> None:
+    """Check the current scene in a thread, unless another job runs."""
+    if no_job_room(state):
+        return
+    source, options, running = state.scene, _options(state), _Running()
+    copy, paths = _copied(source), state.paths
+    settings, since = state.motion_settings, state.opened_at
+
+    def check(report: Report) -> list[str]:
+        # The bundled figure is also read from files.
+        files, is_likely = paths or bundled_files(), not paths
+        found = recheck(copy, files, options, settings, since, report, is_likely)
+        findings = tuple(worst_first(found.findings))
+        running.result = Checked(source, copy, options, findings, found.n_files, found.notes)
+        return [f"Checked: {summary(findings)}"]
+
+    running.job = state.job = CountedJob(_TITLE, check)
+    state.of(Linting).running = running
+
+
+def _options(state: AppState) -> LintOptions:
+    """Return the limits of the check, with the timeline's frame rate."""
+    return replace(state.of(Linting).options, frame_rate=state.clock.keyed_rate)
+
+
+def _copied(scene: Scene) -> Scene:
+    """Return a copy of the scene whose poses stay unchanged."""
+    return Scene([actor.copy() for actor in scene.actors], world_up=scene.up)
+
+
+def _take_findings(state: AppState) -> None:
+    """Show the findings of a finished check; findings about another scene are discarded."""
+    view = state.of(Linting)
+    running = view.running
+    if running is not None and running.job is not state.job:
+        view.running = None
+        # The result of a cancelled check, or of a scene that was replaced, is not shown.
+        was_cancelled = running.job is not None and running.job.is_cancelled
+        result = None if was_cancelled else running.result
+        if result is not None and result.source is state.scene:
+            view.checked, view.chosen = result, -1
+            view.is_edited, view.seen = False, _moving(state)
+    if view.checked is not None and view.checked.source is not state.scene:
+        view.checked, view.chosen = None, -1
+
+
+def _is_stale(state: AppState) -> bool:
+    """Return whether the scene or the limits have changed since the check.
+
+    Playback does not count as a change. Called once per frame.
+    """
+    view = state.of(Linting)
+    known = view.checked
+    if known is None:
+        return False
+    before, view.seen = view.seen, _moving(state)
+    if before[0] == view.seen[0] and before[1:] != view.seen[1:]:
+        view.is_edited = True
+    actors, old, options = state.scene.actors, known.scene.actors, _options(state)
+    if [actor.clip for actor in actors] != [actor.clip for actor in old]:
+        # Other animations may have a different frame rate.
+        options = replace(options, frame_rate=known.options.frame_rate)
+    return (
+        view.is_edited
+        or options != known.options
+        or len(actors) != len(old)
+        or any(map(_differs, actors, old))
+    )
+
+
+def _moving(state: AppState) -> tuple[object, ...]:
+    """Return the key of the scene's poses, and the poses of moving actors."""
+    poses = [actor.pose for actor in state.scene.actors if actor.clip is not None]
+    return (state.clock.posed_for, *(pose_key(pose) for pose in poses if pose is not None))
+
+
+def _differs(actor: Actor, old: Actor) -> bool:
+    if actor.figure is not old.figure:
+        return True
+    # All animations of the file were checked.
+    is_known = any(animation.plays(actor.clip) for animation in actor.figure.animations)
+    if actor.clip is not old.clip and not is_known:
+        return True
+    if actor.offset != old.offset or (actor.placement != old.placement).any():
+        return True
+    if actor.clip is not None or actor.pose is None or old.pose is None:
+        return False
+    return pose_key(actor.pose) != pose_key(old.pose)
+
+
+def _choose_finding(state: AppState, index: int) -> None:
+    """Show a finding: its actor, joint and time; -1 or the same index again clears the selection.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the camera, which moves to the finding in the next frame.
+    index : int
+        Index into ``state.of(Linting).checked.findings``.
+    """
+    view = state.of(Linting)
+    view.chosen = -1 if index == view.chosen else index
+    finding = view.finding
+    if finding is None or finding.actor is None or not _is_in_scene(state, finding):
+        return
+    view.wants_aim = True
+    actor = state.scene.actors[finding.actor]
+    joint = int(finding.joints[0]) if len(finding.joints) else -1
+    if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:
+        joint = -1
+    take_pick(state, Pick(finding.actor, joint, -1, -1, actor.placement[:3, 3]), False)
+    if finding.animation >= 0:
+        choose_animation(state, finding.animation)
+    if len(finding.times) and state.clock.has_motion:
+        state.clock.playing = False
+        seek = finding.times[0] if finding.seek is None else finding.seek
+        state.clock.seek(float(seek))
+        if finding.seek is not None and finding.code == "C005":
+            state.say_status("Last frame before the gap: the person is absent in the next frame")
+    if not actor.visible:
+        state.say_status(f"{printable(actor.name, 60)} is hidden: see the Actors panel")
+
+
+def _is_in_scene(state: AppState, finding: Finding) -> bool:
+    """Return whether a finding is about an actor of the scene; others are about files only."""
+    return finding.actor is not None and finding.actor < len(state.scene.actors)
+
+
+def _is_known_there(state: AppState, finding: Finding) -> bool:
+    """Return whether an actor's figure is still the one that was checked.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the last check.
+    finding : Finding
+        A finding of that check.
+    """
+    known, index = state.of(Linting).checked, finding.actor
+    if known is None or index is None or not _is_in_scene(state, finding):
+        return False
+    return state.scene.actors[index].figure is known.scene.actors[index].figure
+
+
+def _file_place(finding: Finding) -> str:
+    """Return ``path:line`` or ``path#pointer`` of a finding; empty if it is not about a file."""
+    return finding.place()
+
+
+def _copy_place(state: AppState, finding: Finding) -> None:
+    """Copy path and line of a finding that is not about an actor, and clear the selection."""
+    _choose_finding(state, -1)
+    place = _file_place(finding)
+    if place:
+        imgui.set_clipboard_text(place)
+        state.say_status(f"Copied {place}")
+
+
+def _copy_findings(state: AppState, as_json: bool) -> None:
+    """Copy all findings as ``viewer lint`` prints them."""
+    known = state.of(Linting).checked
+    if known is None:
+        return
+    if as_json:
+        text = json.dumps(describe(known.findings, known.scene), indent=1, allow_nan=False)
+    else:
+        last = summary(known.findings, known.n_files)
+        text = "\n".join([*map(finding_text, known.findings), last])
+    imgui.set_clipboard_text(text)
+    count = len(known.findings)
+    kind = "JSON" if as_json else "text"
+    state.say_status(f"{counted(count, 'finding')} copied as {kind}")

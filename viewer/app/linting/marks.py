@@ -7,9 +7,9 @@ from dataclasses import astuple
 
 import numpy as np
 
-from viewer.app.core.fitting import fit_points
+from viewer.app.core.camera_moves import fit_points
 from viewer.app.core.state import AppState
-from viewer.app.linting.state import Linting
+from viewer.app.linting.lint_panel import Linting
 from viewer.errors import ViewerError
 from viewer.lint import Places, places_of, points_of
 from viewer.rendering.camera import Camera, camera_axes

@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 
 from viewer.app.core.clock import FASTEST, MODES
 from viewer.app.core.fields import begin_field, drag_int, in_row
-from viewer.app.core.key_names import key_name, with_key
 from viewer.app.core.reasons import no_motion
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import number_field, whole_field
@@ -18,13 +17,14 @@ from viewer.app.core.widgets import (
     choice,
     disabled,
     explain,
+    key_name,
     note_item,
     offer_files,
     same_line_if_room,
     slider,
+    with_key,
 )
-from viewer.app.files.state import Files
-from viewer.app.playback.actions import go_to_end, play, step
+from viewer.app.files.files import Files
 from viewer.app.playback.animations import animation_texts, choose_animation, played
 from viewer.app.playback.tracks import draw_tracks
 from viewer.rig.captures.points import PointClip
@@ -256,3 +256,41 @@ def _is_together(one: Actor, other: Actor) -> bool:
     return (a.frame_rate, a.n_frames, a.first_frame, a.start) == (
         b.frame_rate, b.n_frames, b.first_frame, b.start,
     )  # fmt: skip
+
+
+def play(state: AppState) -> None:
+    """Play or pause."""
+    if not state.clock.has_motion:
+        state.say_status(no_motion(state))
+        return
+    state.clock.toggle()
+    state.say_status("Playing" if state.clock.playing else "Paused")
+
+
+def step(state: AppState, frames: int) -> None:
+    """Step by some frames, forwards or backwards."""
+    if state.clock.has_motion:
+        state.clock.step(frames)
+
+
+def go_to_end(state: AppState, last: bool) -> None:
+    """Go to the first or last frame of the playback range."""
+    clock = state.clock
+    if clock.has_motion:
+        clock.seek(clock.end if last else clock.start)
+
+
+def range_in(state: AppState) -> None:
+    """Start the playback range at the current time."""
+    clock = state.clock
+    if clock.has_motion:
+        clock.set_range(clock.time, max(clock.end, clock.time))
+        state.say_status(f"The range starts at {number_text(clock.start, '.3f')} s")
+
+
+def range_out(state: AppState) -> None:
+    """End the playback range at the current time."""
+    clock = state.clock
+    if clock.has_motion:
+        clock.set_range(min(clock.start, clock.time), clock.time)
+        state.say_status(f"The range ends at {number_text(clock.end, '.3f')} s")

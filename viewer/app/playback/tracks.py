@@ -9,8 +9,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.clock import Clock
-from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import faint
 from viewer.app.core.widgets import note_item
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats

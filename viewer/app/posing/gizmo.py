@@ -16,7 +16,6 @@ from imgui_bundle import ImVec2Like, imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import Place, ViewFrame, view_frame
-from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.move_tool import (
     LENGTH,
@@ -29,6 +28,7 @@ from viewer.app.posing.move_tool import (
     used_chain,
 )
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
+from viewer.app.posing.posing import Drag, Handle, Outcome, Posing, pause_for_edit
 from viewer.app.posing.rotate_tool import (
     RADIUS,
     Ring,
@@ -39,8 +39,7 @@ from viewer.app.posing.rotate_tool import (
     rings,
     toward_eye,
 )
-from viewer.app.posing.state import Drag, Handle, Outcome, Posing
-from viewer.app.posing.tool_actions import cancel_drag, no_tool, selected
+from viewer.app.posing.toolbar import cancel_drag, no_tool, selected
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix

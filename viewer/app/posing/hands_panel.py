@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item, offer_files, plain_zero, same_line_if_room
-from viewer.app.posing.state import Posing
+from viewer.app.posing.posing import Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix

@@ -11,8 +11,7 @@ from imgui_bundle import imgui
 from viewer.app.core.fields import drag_float, in_row, slider_float
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
-from viewer.app.posing.clip_pause import pause_for_edit
-from viewer.app.posing.state import HeldVector, Posing
+from viewer.app.posing.posing import HeldVector, Posing, pause_for_edit
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

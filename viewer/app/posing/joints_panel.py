@@ -9,10 +9,9 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
-from viewer.app.core.ink import ink
-from viewer.app.core.key_names import with_key
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
+from viewer.app.core.theme import ink
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -23,9 +22,9 @@ from viewer.app.core.widgets import (
     plain_zero,
     same_line_if_room,
     show_tooltip,
+    with_key,
 )
-from viewer.app.curves.state import Curves
-from viewer.app.posing.clip_pause import pause_for_edit
+from viewer.app.curves.editing import Curves
 from viewer.app.posing.joint_fields import (
     draw_own_numbers,
     draw_scale,
@@ -37,15 +36,16 @@ from viewer.app.posing.joint_fields import (
     unlocked_joints,
 )
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.posing.pose_actions import (
+from viewer.app.posing.posing import (
+    Posing,
     copy_numbers,
     copy_pose,
     mirror,
     paste_pose,
+    pause_for_edit,
     reset_joint,
     reset_pose,
 )
-from viewer.app.posing.state import Posing
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointLayout

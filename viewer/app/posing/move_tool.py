@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import PosedJoint
-from viewer.app.posing.state import Outcome
+from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints

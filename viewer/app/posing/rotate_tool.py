@@ -13,7 +13,7 @@ import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import PosedJoint
-from viewer.app.posing.state import Outcome
+from viewer.app.posing.posing import Outcome
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix

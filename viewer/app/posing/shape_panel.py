@@ -6,9 +6,9 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float
-from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field, whole_field
+from viewer.app.core.theme import faint
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -18,9 +18,8 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     show_tooltip,
 )
-from viewer.app.posing.clip_pause import pause_for_edit
-from viewer.app.posing.pose_actions import random_shape, reset_shape
-from viewer.app.posing.state import Posing
+from viewer.app.posing.posing import Posing, pause_for_edit, random_shape, reset_shape
+from viewer.errors import ViewerError
 from viewer.phrases import counted, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
@@ -30,8 +29,6 @@ from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
-
-__all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
 _SEARCHED = 60  # lists with more shapes have a filter
@@ -194,3 +191,16 @@ def _draw_marks() -> None:
         height = 7.0 if sigma == 0 else 4.0
         color = imgui.get_color_u32(faint(0.8 if sigma == 0 else 0.5))
         draw_list.add_line((x, high.y - height), (x, high.y - 1.0), color)
+
+
+def drop_unreadable_shapes(state: AppState) -> None:
+    """Set all shapes to 0 if blend shape offsets, which are read on first use, cannot be read."""
+    try:
+        for actor in state.scene.actors:
+            if actor.pose is not None:
+                shaped(actor.figure, actor.pose.shape_weights)
+    except ViewerError as problem:
+        state.error = str(problem)
+        for actor in state.scene.actors:
+            if actor.pose is not None:
+                actor.pose.shape_weights = np.zeros(actor.figure.n_shapes)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
+
 from imgui_bundle import imgui
 
-from viewer.app.core.key_names import KeyNames
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import change_scale, set_theme
+from viewer.app.core.widgets import KeyNames
 from viewer.app.features import KEYS
 from viewer.app.preferences.key_map import label_of
-from viewer.app.preferences.state import Appearance, Preferences, save_preferences
-from viewer.app.theme import change_scale, set_theme
-
-__all__ = ["change", "chosen_scale", "chosen_theme", "follow_preferences", "scale_of", "start_with"]
+from viewer.app.preferences.preferences import Appearance, Preferences, save_preferences
 
 
 def start_with(state: AppState, preferences: Preferences) -> None:
@@ -45,7 +47,7 @@ def change(state: AppState, preferences: Preferences) -> None:
         state.say_status(problem)
 
 
-def scale_of(state: AppState) -> float:
+def _scale_of(state: AppState) -> float:
     """Return the scale of the interface in the current window."""
     return chosen_scale(state.of(Preferences), state.of(Appearance))
 
@@ -69,7 +71,7 @@ def follow_preferences(state: AppState) -> None:
     if theme != applied.theme:
         set_theme(theme)
         applied.theme = theme
-    scale = scale_of(state)
+    scale = _scale_of(state)
     if scale != applied.scale:
         change_scale(applied.scale, scale)
         applied.scale = scale
@@ -81,3 +83,46 @@ def follow_preferences(state: AppState) -> None:
         applied.keys = dict(preferences.keys)
         names = {key.label: label_of(key, preferences.keys) for key in KEYS}
         state.of(KeyNames).changed = {usual: name for usual, name in names.items() if name != usual}
+
+
+_PATIENCE = 1.0  # time limit in seconds: some desktops do not respond
+_GSETTINGS = ("gsettings", "get", "org.gnome.desktop.interface", "color-scheme")
+_DEFAULTS = ("defaults", "read", "-g", "AppleInterfaceStyle")
+_PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"
+
+
+def system_theme() -> str:
+    """Return ``"dark"`` or ``"light"``; empty if it cannot be determined."""
+    if sys.platform == "win32":
+        return _of_windows()
+    if sys.platform == "darwin":
+        # The key exists only while the dark theme is chosen.
+        return "dark" if "Dark" in _answer(_DEFAULTS) else "light"
+    scheme = _answer(_GSETTINGS)
+    if not scheme:
+        return ""
+    return "dark" if "dark" in scheme else "light"
+
+
+def _answer(command: tuple[str, ...]) -> str:
+    """Return a command's output; empty if the command is missing, fails or takes too long."""
+    if shutil.which(command[0]) is None:
+        return ""
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_PATIENCE, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout if done.returncode == 0 else ""
+
+
+def _of_windows() -> str:
+    import winreg
+
+    try:
+        with winreg.OpenKey(winreg.HKEY_CURRENT_USER, _PERSONALIZE) as key:  # type: ignore[attr-defined,unused-ignore]
+            value, _ = winreg.QueryValueEx(key, "AppsUseLightTheme")  # type: ignore[attr-defined,unused-ignore]
+    except OSError:
+        return ""
+    return "light" if value else "dark"

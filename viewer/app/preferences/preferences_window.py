@@ -7,8 +7,8 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float
-from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import WARNING, ink
 from viewer.app.core.widgets import (
     begin_window,
     button,
@@ -20,11 +20,11 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.model_folder import set_model_folder
-from viewer.app.files.state import Files
-from viewer.app.preferences.applying import change
+from viewer.app.files.files import Files
+from viewer.app.files.model_menu import set_model_folder
+from viewer.app.preferences.applying import change, system_theme
 from viewer.app.preferences.key_map import FIXED, chord_name, conflicts, label_of, pressed
-from viewer.app.preferences.state import (
+from viewer.app.preferences.preferences import (
     CAPTURED,
     FONT_SIZES,
     SAMPLES,
@@ -34,7 +34,6 @@ from viewer.app.preferences.state import (
     Appearance,
     Preferences,
 )
-from viewer.app.preferences.system_theme import system_theme
 from viewer.models import load_model_folder
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 
+import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following
@@ -21,23 +23,19 @@ from viewer.app.core.widgets import (
     note_item,
 )
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.state import Files
-from viewer.app.recording.preview import preview_size
-from viewer.app.recording.state import (
-    KINDS,
-    LEAST_PIXELS,
-    VIDEO_KINDS,
-    RecordingState,
-    RecordSettings,
-    playback_frames,
-    recorded_times,
-)
+from viewer.app.files.files import Files
+from viewer.data_classes import dataclass
 from viewer.formats import file_stem
+from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import counted
-from viewer.rendering.options import QUALITIES
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.target import Target
+from viewer.rendering.options import QUALITIES, DisplayOptions
+from viewer.rendering.recorder import Follow
+from viewer.rendering.renderer import Renderer
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.timing import frame_at, frame_times
 from viewer.rig.number_text import number_text
-
-__all__ = ["ask_where", "draw_record_dialog", "open_record_dialog"]
 
 _SIZES = {
     "view": "size of the view",
@@ -98,7 +96,7 @@ def draw_record_dialog(state: AppState) -> None:
 def _draw_preview(state: AppState, settings: RecordSettings) -> None:
     """Draw the current view as a frame of the recording, centred."""
     texture = state.of(RecordingState).preview
-    width, height = preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
+    width, height = _preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
     scale = imgui.get_font_size() / 15.0
     size = (scale * width, scale * height)
     room = imgui.get_content_region_avail().x
@@ -127,7 +125,7 @@ def _draw_picture(state: AppState, settings: RecordSettings) -> None:
     if settings.size == "own":
         size = _pair_field(state, "Pixels", settings.own_size)
         if size is not None:
-            width, height = (min(max(side, LEAST_PIXELS), _MOST_PIXELS) for side in size)
+            width, height = (min(max(side, _LEAST_PIXELS), _MOST_PIXELS) for side in size)
             settings.own_size = width, height
     looks = {"": "as the view, but at most Normal for motions", **QUALITIES}
     settings.look = choice(state, "Quality##look", settings.look, looks)
@@ -229,7 +227,7 @@ def ask_where(state: AppState, settings: RecordSettings) -> None:
     stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")
-    suffixes = (".png",) if settings.kind in names else VIDEO_KINDS
+    suffixes = (".png",) if settings.kind in names else _VIDEO_KINDS
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths), _start, "save", f"Record: {KINDS[settings.kind]}",
         suffixes, name,
@@ -238,6 +236,261 @@ def ask_where(state: AppState, settings: RecordSettings) -> None:
 
 def _start(state: AppState, paths: list[Path]) -> None:
     recording, suffix = state.of(RecordingState), paths[0].suffix.lower()
-    if recording.settings is not None and {suffix, recording.settings.kind} <= {*VIDEO_KINDS}:
+    if recording.settings is not None and {suffix, recording.settings.kind} <= {*_VIDEO_KINDS}:
         recording.settings.kind = suffix  # the user typed a different suffix
     recording.wanted = paths[0]
+
+
+KINDS = {
+    ".mp4": "MP4 video (H.264)",
+    ".webm": "WebM video (VP9)",
+    ".gif": "Animated GIF",
+    "pictures": "Numbered pictures (PNG)",
+    "sheet": "Contact sheet (PNG)",
+}
+"""Kinds of recordings, with their labels."""
+_VIDEO_KINDS = (".mp4", ".webm", ".gif")
+"""Kinds that are a video file, by its suffix."""
+_LEAST_PIXELS = 16
+"""Minimum width and height of a recording."""
+
+
+@dataclass(slots=True)
+class RecordSettings:
+    """Settings of a recording.
+
+    Attributes
+    ----------
+    kind : str
+        A key of ``KINDS``.
+    size : str
+        A key of the available sizes.
+    own_size : (int, int)
+        Width and height for the size ``"own"``.
+    rate : float
+        Frames per second; 0 for the scene's own rate.
+    turntable : bool
+        Whether the camera orbits once around the scene.
+    seconds : float
+        Duration of the orbit if there is no motion.
+    n_cells : int
+        Number of frames in a contact sheet.
+    quality : int
+        Quality of the compression of videos, 0 to 100.
+    look : str
+        Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
+        the view, or normal if the view is final and there are several frames.
+    samples : int
+        Samples per pixel; 0 for those of the view.
+    background : str
+        As in ``DisplayOptions``; empty for the background of the view.
+    follows : bool
+        Whether the camera follows the same actor or joint as in the view.
+    frames : (int, int) or None
+        First and last frame, numbered as in the timeline; None for the playback range.
+    """
+
+    kind: str = ".mp4"
+    size: str = "view"
+    own_size: tuple[int, int] = (1280, 720)
+    rate: float = 0.0
+    turntable: bool = False
+    seconds: float = 6.0
+    n_cells: int = 12
+    quality: int = 75
+    look: str = ""
+    samples: int = 0
+    background: str = ""
+    follows: bool = True
+    frames: tuple[int, int] | None = None
+
+    @property
+    def is_transparent(self) -> bool:
+        """Whether the background is transparent and the file format supports transparency."""
+        return self.background == "transparent" and self.kind != ".mp4"
+
+    def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
+        """Return the width and height of the recording for a given size of the view."""
+        if self.size == "view":
+            wide, high = (max(round(side), _LEAST_PIXELS) for side in view)
+            # Videos need even sizes; losing a row of the view does not matter.
+            return wide - wide % 2, high - high % 2
+        if self.size == "own":
+            return self.own_size
+        width, _, height = self.size.partition("x")
+        return int(width), int(height)
+
+
+@dataclass(slots=True)
+class RecordingState:
+    """State of the Record window.
+
+    Attributes
+    ----------
+    settings : RecordSettings or None
+        Settings shown in the window; None while it is closed.
+    wanted : Path or None
+        Target file of a recording that starts after the frame.
+    preview : int
+        ID of the preview's texture; 0 if there is none.
+    """
+
+    settings: RecordSettings | None = None
+    wanted: Path | None = None
+    preview: int = 0
+
+
+def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:
+    """Return the display options of a recording.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the options of the view, which are copied.
+    settings : RecordSettings
+        Settings of the recording.
+    n_frames : int
+        Number of frames; several frames are not drawn in final quality unless it is chosen.
+    """
+    options = copy.deepcopy(state.options)
+    if settings.look:
+        options.quality = settings.look
+    elif options.quality == "final" and n_frames > 1:
+        options.quality = "normal"
+    options.samples = settings.samples or options.samples
+    if settings.background:
+        options.background = settings.background
+    if options.background == "transparent" and settings.kind == ".mp4":
+        options.background = "gradient"
+    return options
+
+
+def recorded_follow(state: AppState, settings: RecordSettings) -> Follow | None:
+    """Return the actor or joint that a recording's camera follows; None if it does not move."""
+    following = state.of(Following)
+    if not settings.follows or following.target is None or following.place is None:
+        return None
+    return Follow(*following.target, following.place)
+
+
+def playback_frames(state: AppState) -> tuple[int, int]:
+    """Return the first and the last frame that are recorded, numbered as in the timeline."""
+    clock = state.clock
+    first = clock.first_frame + frame_at(clock.start - clock.origin, clock.frame_rate)
+    return first, first + frame_at(clock.end - clock.start, clock.frame_rate)
+
+
+def recorded_times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int], float]:
+    """Return the times of all frames in seconds, their numbers, and the frame rate."""
+    clock = state.clock
+    rate = settings.rate or clock.frame_rate
+    if settings.kind == ".gif":
+        rate = min(rate, MOST_GIF_RATE)
+    if not clock.has_motion:
+        count = max(round(settings.seconds * rate), 1) if settings.turntable else 1
+        if settings.kind == "sheet":
+            count = settings.n_cells if settings.turntable else 1
+        return np.zeros(count), list(range(count)), rate
+    start, end = clock.start, clock.end
+    if settings.frames is not None:
+        start, end = (clock.frame_time(n - clock.first_frame) for n in settings.frames)
+    times = frame_times(start, end, rate)
+    first = clock.first_frame if rate == clock.frame_rate else 0
+    first += frame_at(start - clock.origin, rate)
+    if settings.kind == "sheet":
+        last = len(times) - 1
+        chosen = np.unique(np.rint(np.linspace(0, last, settings.n_cells)).astype(int))
+        return times[chosen], (first + chosen).tolist(), rate
+    return times, list(range(first, first + len(times))), rate
+
+
+_WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
+
+
+class Preview:
+    """Draws the preview into a texture whenever the preview changes.
+
+    Parameters
+    ----------
+    programs : Programs
+        Programs of the context that is current in every call.
+    """
+
+    def __init__(self, programs: Programs) -> None:
+        self._programs, self.context = programs, programs.context
+        self.target: Target | None = None
+        self._renderer: Renderer | None = None
+        self._drawn: object = None
+        self._old: list[Target] = []
+
+    def draw(self, state: AppState, key: object) -> None:
+        """Draw the preview if the Record window is open and the image has changed.
+
+        Parameters
+        ----------
+        state : AppState
+            State with the settings; receives the texture.
+        key : object
+            Identifies the image of the view.
+        """
+        recording = state.of(RecordingState)
+        settings = recording.settings
+        self._release_old()
+        if settings is None:
+            self._drawn, recording.preview = None, 0
+            self._retire()
+            self._release_renderer()
+            return
+        size = _preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
+        wanted = (key, size, settings.look, settings.background, settings.kind, settings.samples)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        recording.preview = self._draw(state, settings, size)
+
+    def _draw(self, state: AppState, settings: RecordSettings, size: tuple[int, int]) -> int:
+        """Draw the preview and return the ID of its texture."""
+        options = recorded_options(state, settings, 2)
+        target = self.target
+        if target is None or (target.size, target.asked_samples) != (size, options.samples):
+            self._retire()
+            self.target = target = Target(self.context, size, options.samples)
+        camera = state.camera.copy()
+        selected = (state.chosen_actor, state.selected_joint)
+        # The view's renderer may still be averaging its own image.
+        renderer = self._renderer = self._renderer or Renderer(self._programs)
+        renderer.draw(state.scene, camera, options, target, state.box, selected)
+        target.resolve()
+        return int(target.texture.glo)
+
+    def _retire(self) -> None:
+        """Release the target in the next frame: panels of this frame may show its texture."""
+        if self.target is not None:
+            self._old.append(self.target)
+            self.target = None
+
+    def _release_old(self) -> None:
+        for target in self._old:
+            target.release()
+        self._old.clear()
+
+    def release(self) -> None:
+        """Release everything, as when the window is closed."""
+        self._retire()
+        self._release_old()
+        self._release_renderer()
+
+    def _release_renderer(self) -> None:
+        if self._renderer is not None:
+            self._renderer.release()
+            self._renderer = None
+
+
+def _preview_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the size of the preview of an image, pixels.
+
+    >>> preview_size((1920, 1080)), preview_size((1000, 2000)), preview_size((16, 4000))
+    ((320, 180), (100, 200), (1, 200))
+    """
+    factor = min(_WIDEST / size[0], _HIGHEST / size[1], 1.0)
+    return max(round(factor * size[0]), 1), max(round(factor * size[1]), 1)

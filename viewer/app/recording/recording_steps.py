@@ -10,17 +10,17 @@ from pathlib import Path
 
 from viewer.app.core.jobs import FrameJob
 from viewer.app.core.state import AppState
+from viewer.app.linting.lint_panel import Linting
 from viewer.app.linting.marks import marks_of
-from viewer.app.linting.state import Linting
-from viewer.app.recording.state import (
+from viewer.app.recording.record_dialog import (
     RecordingState,
     RecordSettings,
     recorded_follow,
     recorded_options,
     recorded_times,
 )
-from viewer.app.weights.explanation_lines import vertex_annotation
-from viewer.app.weights.state import Weights
+from viewer.app.weights.vertex_panel import vertex_annotation
+from viewer.app.weights.weights_panel import Weights
 from viewer.errors import OutputError, ViewerError
 from viewer.formats import check_targets
 from viewer.lint import Finding, places_of

@@ -8,7 +8,7 @@ from dataclasses import field, replace
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_drive, no_job_room
 from viewer.app.core.state import AppState
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.app.core.state import AppState
-from viewer.app.rigging.sources import current_template, target_mesh
-from viewer.app.rigging.state import Placing, Rigging, Template
+from viewer.app.rigging.rigging import Placing, Rigging, Template, current_template, target_mesh
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.diagnostics import Diagnostic

@@ -7,15 +7,30 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from imgui_bundle import imgui
 
+from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
+from viewer.app.core.theme import WARNING, ink
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    explain,
+    key_name,
+    note_item,
+    same_line_if_room,
+    with_key,
+)
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.files import Files
 from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
-from viewer.app.rigging.state import Comparison, Result, Rigging
+from viewer.app.rigging.rigging import Comparison, Result, Rigging, no_results
 from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError, ViewerError
-from viewer.export._rigged_files import files_of, write_rigged
+from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of, write_rigged
+from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
@@ -37,7 +52,7 @@ MATCH_COLORS = {
     "field:match angle": "angle",
 }
 """Scalar quantities that show how the target matches the template, with their labels."""
-RESULT_COLORS = {
+_RESULT_COLORS = {
     "class:confidence": "confidence",
     "field:distance": "distance",
     "class:guarded": "rest position",
@@ -105,9 +120,9 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
 def _play(state: AppState, result: Result) -> None:
     """Show the joints of a result, and play the template's motion or a trial motion."""
     state.options.xray = True
-    set_motion(state, result, plays=not no_motion_of(result))
+    _set_motion(state, result, plays=not _no_motion_of(result))
     if result.actor.clip is None:
-        set_trial(state, result, plays=True)
+        _set_trial(state, result, plays=True)
     if result.actor.clip is not None:
         state.clock.follow(state.actor)
         state.clock.seek(state.clock.start)
@@ -119,7 +134,7 @@ def _row(actors: list[Actor], actor: Actor) -> int:
     return next((row for row, one in enumerate(actors) if one is actor), -1)
 
 
-def versions(state: AppState) -> dict[str, Actor]:
+def _versions(state: AppState) -> dict[str, Actor]:
     """Return the versions that A cycles through: the target and its results in the scene."""
     view, actors = state.of(Rigging), state.scene.actors
     if view.target is None:
@@ -128,14 +143,14 @@ def versions(state: AppState) -> dict[str, Actor]:
     return {name: actor for name, actor in found.items() if _row(actors, actor) >= 0}
 
 
-def shown_version(state: AppState) -> str:
+def _shown_version(state: AppState) -> str:
     """Return the key of the visible version; empty if none is visible."""
-    return next((name for name, actor in versions(state).items() if actor.visible), "")
+    return next((name for name, actor in _versions(state).items() if actor.visible), "")
 
 
 def shown_result(state: AppState) -> Result | None:
     """Return the visible result, or the last one in the scene."""
-    known = versions(state)
+    known = _versions(state)
     present = [one for name, one in state.of(Rigging).results.items() if name in known]
     visible = [one for one in present if one.actor.visible]
     return (visible or present)[-1] if present else None
@@ -143,17 +158,17 @@ def shown_result(state: AppState) -> Result | None:
 
 def switch_version(state: AppState) -> None:
     """Show the next version, the target or one of its results, in place of the current one."""
-    known = list(versions(state))
+    known = list(_versions(state))
     if len(known) < 2:
         state.say_status("A/B: nothing is rigged yet, see Window > Rig")
         return
-    shown = shown_version(state)
+    shown = _shown_version(state)
     following = known[(known.index(shown) + 1) % len(known)] if shown else known[0]
-    show_version(state, following)
+    _show_version(state, following)
 
 
-def show_version(state: AppState, name: str) -> None:
-    """Show one of ``versions`` without recording an undo step."""
+def _show_version(state: AppState, name: str) -> None:
+    """Show one of ``_versions`` without recording an undo step."""
     # Other changes in this frame keep their own undo step.
     state.history.observe(state.scene, state.options, busy=False)
     _look(state, name)
@@ -163,7 +178,7 @@ def show_version(state: AppState, name: str) -> None:
 
 
 def _look(state: AppState, name: str) -> None:
-    known = versions(state)
+    known = _versions(state)
     was_chosen = any(state.actor is actor for actor in known.values())
     for key, actor in known.items():
         actor.visible = key == name
@@ -205,16 +220,16 @@ def plays_trial(result: Result) -> bool:
     return isinstance(clip, Clip) and clip.name == _TRIAL
 
 
-def no_trial_of(result: Result) -> str:
+def _no_trial_of(result: Result) -> str:
     """Return the reason why a result cannot play the trial motion."""
     skeleton = result.rigged.figure.skeleton
     found = None if skeleton is None else trial_clip(skeleton, result.rigged.pose)
     return "" if found is not None else "no joint of the template can rotate"
 
 
-def set_trial(state: AppState, result: Result, plays: bool) -> None:
+def _set_trial(state: AppState, result: Result, plays: bool) -> None:
     """Play the trial motion in the pose of the target, or stop it."""
-    set_motion(state, result, plays=False)
+    _set_motion(state, result, plays=False)
     skeleton = result.rigged.figure.skeleton
     if plays and skeleton is not None:
         result.actor.clip = trial_clip(skeleton, result.rigged.pose)
@@ -222,7 +237,7 @@ def set_trial(state: AppState, result: Result, plays: bool) -> None:
         result.actor.offset = 0.0
 
 
-def no_motion_of(result: Result | None) -> str:
+def _no_motion_of(result: Result | None) -> str:
     """Return the reason why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
@@ -231,7 +246,7 @@ def no_motion_of(result: Result | None) -> str:
     return "the template has no motion: it needs one before Run is pressed"
 
 
-def set_motion(state: AppState, result: Result, plays: bool) -> None:
+def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     """Play the template's motion at the target's position, or pose the result like the target."""
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
     place = target_place(result.target)
@@ -263,7 +278,7 @@ def _template_space(result: Result) -> Floats:
     return matrix
 
 
-def save_rigged(state: AppState, result: Result, path: Path) -> None:
+def _save_rigged(state: AppState, result: Result, path: Path) -> None:
     """Write a result in the background: all of its files or none."""
     try:
         files = files_of(path)
@@ -321,3 +336,141 @@ def _channel(skeleton: Skeleton, dof: int, value: float, start: float, seconds: 
     bent[[0, 3]] = value
     times = start + seconds * np.array([0.0, 0.3, 0.7, 1.0])
     return Channel(dof, times, bent, (("smooth", "smooth"),) * 4)
+
+
+_LINES_HEIGHT = 9.0  # number of visible lines of the report
+
+
+def draw_results(state: AppState) -> None:
+    """Draw the choice of version and colours, the statistics of each method, and the report."""
+    why, result = no_results(state), shown_result(state)
+    if why or result is None:
+        imgui.text_wrapped(f"The rig was undone; {key_name(state, 'Ctrl+Shift+Z')} restores it.")
+        return
+    _draw_versions(state)
+    _draw_colors(state)
+    moves = plays_motion(result)
+    still = _no_motion_of(result)
+    plays = checkbox(state, "Move like the template", moves, still)
+    if not still:
+        explain("play the template's motion at the target's position")
+    if plays != moves:
+        _set_motion(state, result, plays)
+    tries, still = plays_trial(result), _no_trial_of(result)
+    chosen = checkbox(state, "Trial motion", tries, still)
+    if not still:
+        explain("bend each joint in both directions, to see how the weights deform the mesh")
+    if chosen != tries:
+        _set_trial(state, result, chosen)
+    _draw_table(state)
+    if button(state, "Save rigged…", no_job_room(state)):
+        ask_where_to_save_rig(state, result)
+    same_line_if_room("Copy report")
+    if button(state, "Copy report"):
+        imgui.set_clipboard_text("\n".join(line.labelled for line in result.rigged.lines))
+        state.say_status("Report copied")
+    _draw_lines(state, result)
+
+
+def _draw_versions(state: AppState) -> None:
+    """Draw the target and its results as radio buttons; the key A cycles through them."""
+    shown = _shown_version(state)
+    for number, name in enumerate(_versions(state)):
+        text = "original" if name == TARGET else name
+        if number:
+            same_line_if_room(text)
+        if imgui.radio_button(f"{text}###version {name}", name == shown) and name != shown:
+            _show_version(state, name)
+        note_item(state, f"version {name}")
+        explain(with_key(state, "cycle through the versions", "A"))
+
+
+def _draw_colors(state: AppState) -> None:
+    options = state.options
+    now = options.scalar if options.shading == "scalar" else ""
+    for number, (view, text) in enumerate({"": "plain", **_RESULT_COLORS}.items()):
+        if number:
+            same_line_if_room(text)
+        is_on = now == view if view else now not in _RESULT_COLORS
+        if imgui.radio_button(f"{text}###color {view}", is_on):
+            show_colors(state, view)
+        note_item(state, f"color {view}")
+
+
+def _draw_table(state: AppState) -> None:
+    """Draw the statistics of the methods side by side."""
+    view, known = state.of(Rigging), _versions(state)
+    found = [one for name, one in view.results.items() if name in known]
+    if not imgui.begin_table("methods", 1 + len(found), imgui.TableFlags_.sizing_stretch_same):
+        return
+    rigged = [one.rigged for one in found]
+    _table_row("", "", [one.method for one in found])
+    _table_row(
+        "matched",
+        "vertices whose weights come from the closest points of the template",
+        [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
+    )
+    _table_row(
+        "largest error",
+        "largest distance of the posed result from the target, relative to its size",
+        [f"{one.residual:.1e}" for one in rigged],
+    )
+    _table_row(
+        "estimated",
+        "vertices with a pose too extreme to invert exactly: their rest position is an estimate",
+        [f"{int(one.guarded.sum()):,}" for one in rigged],
+    )
+    _table_row(
+        "joints outside",
+        "joints outside the mesh that are inside the template",
+        [f"{len(one.outside):,}" for one in rigged],
+    )
+    imgui.end_table()
+    if view.comparison is not None and len(found) > 1:
+        text = (
+            f"weights differ by {view.comparison.weights:.3f} (mean L1), same dominant joint at "
+            f"{100.0 * view.comparison.dominant:.1f} % of the vertices"
+        )
+        imgui.text_wrapped(text)
+
+
+def _table_row(title: str, meaning: str, cells: list[str]) -> None:
+    imgui.table_next_row()
+    for text in (title, *cells):
+        imgui.table_next_column()
+        imgui.text_unformatted(text)
+        explain(meaning)
+
+
+def _draw_lines(state: AppState, result: Result) -> None:
+    """Draw the report, with warnings highlighted."""
+    height = _LINES_HEIGHT * imgui.get_text_line_height_with_spacing()
+    if imgui.begin_child("report", (0.0, height), imgui.ChildFlags_.borders):
+        for line in result.rigged.lines:
+            warns = line.severity == "warning"
+            if warns:
+                imgui.push_style_color(imgui.Col_.text, ink(WARNING))
+            imgui.text_wrapped(printable(line.labelled, 400))
+            if warns:
+                imgui.pop_style_color()
+    imgui.end_child()
+    note_item(state, "report")
+
+
+def ask_where_to_save_rig(state: AppState, result: Result) -> None:
+    """Ask where to save a rigged mesh."""
+    name = f"{file_stem(result.target.name)}_rigged.npz"
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: _save_rigged(state, result, paths[0]),
+        "save",
+        "Save rigged mesh: .npz, .glb, or .skel with .skin, .obj and .json",
+        RIGGED_SUFFIXES,
+        name,
+        written=_written,
+    )
+
+
+def _written(path: Path) -> list[Path]:
+    """Return all files written for a name; other suffixes are rejected on saving."""
+    return files_of(path) if path.suffix.lower() in RIGGED_SUFFIXES else [path]

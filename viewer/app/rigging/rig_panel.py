@@ -9,11 +9,11 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, in_row
-from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import number_field
+from viewer.app.core.theme import WARNING, ink
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -27,7 +27,7 @@ from viewer.app.core.widgets import (
     slider,
 )
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.state import Files
+from viewer.app.files.files import Files
 from viewer.app.rigging.placing import (
     aligned_template,
     box_fit,
@@ -37,9 +37,14 @@ from viewer.app.rigging.placing import (
     posed_template,
     similarity_now,
 )
-from viewer.app.rigging.results import MATCH_COLORS, show_colors
-from viewer.app.rigging.results_section import draw_results
-from viewer.app.rigging.sources import (
+from viewer.app.rigging.results import MATCH_COLORS, draw_results, show_colors
+from viewer.app.rigging.rigging import (
+    GHOSTS,
+    TOOLS,
+    Placing,
+    RigChoices,
+    Rigging,
+    Template,
     choose_target,
     choose_template,
     current_template,
@@ -49,7 +54,6 @@ from viewer.app.rigging.sources import (
     targets,
     template_texts,
 )
-from viewer.app.rigging.state import GHOSTS, TOOLS, Placing, RigChoices, Rigging, Template
 from viewer.app.rigging.tools import choose_rig_tool
 from viewer.app.rigging.work import (
     landmark_settings,

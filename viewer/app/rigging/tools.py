@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import imgui, imguizmo
 
-from viewer.app.core.fitting import fit_points
+from viewer.app.core.camera_moves import fit_points
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import ViewFrame, view_frame
-from viewer.app.posing.state import Posing
+from viewer.app.posing.posing import Posing
 from viewer.app.rigging.placing import (
     aligned_template,
     as_similarity,
@@ -25,10 +25,9 @@ from viewer.app.rigging.placing import (
     similarity_now,
     target_place,
 )
-from viewer.app.rigging.sources import refresh, target_mesh
-from viewer.app.rigging.state import TOOLS, Landmark, Rigging, Template
+from viewer.app.rigging.rigging import TOOLS, Landmark, Rigging, Template, refresh, target_mesh
 from viewer.app.rigging.work import finish_work, start_align, start_reading
-from viewer.app.view.state import Picking
+from viewer.app.view.hovering import Picking
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import RayHit, first_hit, surface_point

@@ -14,15 +14,7 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import aligned_template, placing_now, target_place
 from viewer.app.rigging.results import compare, put_results, show_match
-from viewer.app.rigging.sources import (
-    choose_target,
-    choose_template,
-    current_template,
-    read_template,
-    target_mesh,
-    template_files,
-)
-from viewer.app.rigging.state import (
+from viewer.app.rigging.rigging import (
     Landmark,
     Placing,
     Result,
@@ -30,6 +22,12 @@ from viewer.app.rigging.state import (
     Rigging,
     Running,
     Template,
+    choose_target,
+    choose_template,
+    current_template,
+    read_template,
+    target_mesh,
+    template_files,
 )
 from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity

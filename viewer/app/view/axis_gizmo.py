@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect
-from viewer.app.view.camera_actions import fly_to
+from viewer.app.view.camera_panel import fly_to
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.key_names import with_key
+from viewer.app.core.camera_moves import fit_again, fit_points, fit_shown, look_through_view
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider
-from viewer.app.view.camera_actions import face, fit_view, look, look_through, toggle_projection
+from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider, with_key
+from viewer.app.posing.posed_joint import posed_joint
+from viewer.app.view.flight import fly_from
+from viewer.errors import ViewerError
 from viewer.phrases import printable
-from viewer.rendering.camera import VIEWS, front_azimuth
-from viewer.rig.inspection.front import front_axes
-from viewer.rig.mesh import box_size
-
-__all__ = ["draw"]
+from viewer.rendering.camera import VIEWS, front_azimuth, look_from
+from viewer.rendering.camera_views import image_notes, lens_notes
+from viewer.rig.arrays import Floats
+from viewer.rig.inspection.front import Front, front_axes
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.scene import actor_points
 
 _CLAMP = imgui.SliderFlags_.always_clamp
 _LOG = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
@@ -91,3 +95,76 @@ def _draw_views(state: AppState) -> None:
 def _digits(size: float) -> str:
     """Return a format with enough digits for the figure's unit."""
     return "%.3g" if size < 0.1 or size > 1e4 else "%.2f"
+
+
+_AROUND = 0.12  # extent shown around a joint, relative to the actor's size
+
+
+def fit_view(state: AppState) -> None:
+    """Aim the camera at the scene in its current pose and fill the view with it."""
+    fit_shown(state)
+
+
+def fit_selection(state: AppState) -> None:
+    """Aim the camera at the selected joint, or at the chosen actor, and fill the view."""
+    joint = posed_joint(state.actor, state.selected_joint)
+    if joint is None or not state.actor.is_drawn:
+        fit_actor(state)
+        return
+    size = box_size(bounding_box(actor_points(state.actor))) or 1.0
+    beside = [row for row, above in enumerate(joint.skeleton.parents) if above == joint.joint]
+    points: Floats = joint.world[[joint.joint, *beside], :3, 3]
+    room = points.mean(axis=0) + _AROUND * size * np.array([[-1.0], [1.0]])
+    before = state.camera.copy()
+    fit_points(state, np.concatenate([points, room]))
+    fly_from(state, before)
+
+
+def fit_actor(state: AppState) -> None:
+    """Aim the camera at the chosen actor, and fill the view with it."""
+    before, points = state.camera.copy(), actor_points(state.actor)
+    if state.actor.is_drawn and len(points):
+        fit_points(state, points)
+        fly_from(state, before)
+
+
+def look(state: AppState, name: str) -> None:
+    """Rotate the camera to a named view, and fit it to the scene."""
+    state.camera.fixed = None
+    look_from(state.camera, name)
+    fit_again(state)
+
+
+def fly_to(state: AppState, name: str) -> None:
+    """Do the same as ``look``, but animate the camera for a fifth of a second."""
+    before = state.camera.copy()
+    look(state, name)
+    fly_from(state, before)
+
+
+def face(state: AppState, front: Front) -> None:
+    """Set the axis that the figures face ("auto" estimates it), and rotate the camera with it."""
+    state.set_front(front)
+    fit_again(state)
+
+
+def look_through(state: AppState, index: int) -> None:
+    """Look through a calibrated camera of the capture; -1 frees the camera at its position."""
+    if index < 0:
+        state.camera.fixed = None
+        return
+    view = state.scene.views[index]
+    try:
+        look_through_view(state, view)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    for note in (*image_notes(state.scene, view), *lens_notes(state.scene, view)):
+        state.say(note[0].upper() + note[1:])
+
+
+def toggle_projection(state: AppState) -> None:
+    """Switch between perspective and parallel projection."""
+    state.camera.fixed = None
+    state.camera.orthographic = not state.camera.orthographic
+    state.say_status("Orthographic" if state.camera.orthographic else "Perspective")

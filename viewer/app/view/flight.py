@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.app.core.fitting import fit_again
+from viewer.app.core.camera_moves import fit_again
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera

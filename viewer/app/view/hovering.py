@@ -6,17 +6,15 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import joint_at
-from viewer.app.posing.state import Posing
-from viewer.app.posing.tool_actions import no_tool
+from viewer.app.posing.posing import Posing
+from viewer.app.posing.toolbar import no_tool
 from viewer.app.view.axis_gizmo import is_over_gizmo
-from viewer.app.weights.state import Weights, wants_vertex
+from viewer.app.weights.weights_panel import Weights, wants_vertex
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.visibility import has_joint_marks, shows_skeleton
 from viewer.rig.skeleton import joint_label
-
-__all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are picked
 _MOST = 16  # maximum number of actors for picking, which is slow on software drivers
@@ -130,3 +128,20 @@ def _is_free(state: AppState) -> bool:
     is_inside = x <= io.mouse_pos.x < x + width and y <= io.mouse_pos.y < y + height
     is_free = is_inside and not is_held and not io.want_capture_mouse and not state.error
     return is_free and not wants_vertex(state.of(Weights)) and not is_over_gizmo(state)
+
+
+@dataclass(slots=True)
+class Picking:
+    """State of picking in the view.
+
+    Attributes
+    ----------
+    wanted : (x, y, aims) or None
+        Position of a click, relative to the upper left corner of the view, and whether the camera
+        is aimed there.
+    menu_at : (x, y) or None
+        Position of a right click without a drag.
+    """
+
+    wanted: tuple[float, float, bool] | None = None
+    menu_at: tuple[float, float] | None = None

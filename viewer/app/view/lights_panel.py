@@ -15,7 +15,7 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     slider,
 )
-from viewer.app.view.display_actions import reset_lights
+from viewer.app.view.display_panel import reset_lights
 from viewer.rendering.options import Color, Light
 from viewer.rig.srgb import decode_color, encode_color
 

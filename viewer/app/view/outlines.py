@@ -6,7 +6,7 @@ import moderngl
 
 from viewer.app.core.state import AppState
 from viewer.app.view.hovering import Hovered
-from viewer.app.weights.state import Weights
+from viewer.app.weights.weights_panel import Weights
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.rendering.gpu.target import Target

@@ -10,13 +10,11 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.posing.state import Posing
-from viewer.app.posing.tool_actions import no_tool
-from viewer.app.view.hovering import hover_actor, joint_near
-from viewer.app.view.state import Picking
-from viewer.app.weights.actions import pin_vertex
-from viewer.app.weights.hover_text import shows_vertex_info
-from viewer.app.weights.state import Hover, Weights, wants_vertex
+from viewer.app.posing.posing import Posing
+from viewer.app.posing.toolbar import no_tool
+from viewer.app.view.hovering import Picking, hover_actor, joint_near
+from viewer.app.weights.vertex_panel import shows_vertex_info
+from viewer.app.weights.weights_panel import Hover, Weights, pin_vertex, wants_vertex
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable

@@ -7,22 +7,36 @@ from collections.abc import Sequence
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.key_names import with_key
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
+from viewer.app.core.widgets import (
+    begin_overlay,
+    button,
+    checkbox,
+    explain,
+    note_item,
+    overlay_rect,
+    same_line_if_room,
+    with_key,
+)
+from viewer.app.files.files import Files
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.weights.actions import explained, toggle_picking, unpin
-from viewer.app.weights.explanation_lines import influence_colors
-from viewer.app.weights.state import Weights
+from viewer.app.weights.weights_panel import Weights, explained, toggle_picking, unpin
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
+from viewer.rendering.colors import joint_palette
+from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
+from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined
+from viewer.rendering.projection import picture_scale, project
+from viewer.rendering.view import view_of
+from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.inspection.explanation import DualTerms, Explanation, explanation_text
+from viewer.rig.memo import Memo
 from viewer.rig.number_text import number_text
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import Skeleton
 from viewer.rig.skinning import METHODS
-
-__all__ = ["draw", "fitting", "matrix_text"]
 
 _DIGITS = 4
 _COPIED_DIGITS = 6
@@ -56,7 +70,7 @@ def draw(state: AppState) -> None:
     # flicker.
     bars = imgui.WindowFlags_.horizontal_scrollbar | imgui.WindowFlags_.always_vertical_scrollbar
     if imgui.begin_child("numbers", (0.0, 0.0), 0, bars):
-        scale, digits = fitting(imgui.get_content_region_avail().x, imgui.get_font_size())
+        scale, digits = _fitting(imgui.get_content_region_avail().x, imgui.get_font_size())
         imgui.push_font(None, scale * imgui.get_style().font_size_base)
         imgui.push_style_var_x(imgui.StyleVar_.cell_padding, _PADDING)
         colors = influence_colors(explanation, pinned.figure.skeleton)
@@ -66,7 +80,7 @@ def draw(state: AppState) -> None:
     imgui.end_child()
 
 
-def fitting(room: float, font_size: float) -> tuple[float, int]:
+def _fitting(room: float, font_size: float) -> tuple[float, int]:
     """Return the font scale and the number of decimals with which rows fit into the panel.
 
     Parameters
@@ -275,3 +289,165 @@ def _draw_number(value: float, digits: int) -> None:
     room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
     imgui.text_unformatted(text)
+
+
+# Pixels in an image of standard height.
+_THINNEST, _THICKEST = 1.0, 5.0  # line widths for the smallest and largest weight
+_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot; dark borders of dots and lines
+_FAINTEST = 0.35
+_LONGEST_CELL = 24  # maximum length of a name in characters
+_DARK, _LIGHT = (0.05, 0.06, 0.08, 0.8), (1.0, 1.0, 1.0, 1.0)
+_palettes: Memo[Skeleton, Bytes] = Memo()
+
+
+def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
+    """Return the colours of the influences, as for dominant joints: (K, 3), sRGB.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        Explanation of a vertex.
+    skeleton : Skeleton
+        Skeleton of its figure.
+    """
+    colors = _palettes.get(skeleton, (), lambda: joint_palette(skeleton.parents))
+    return colors[explanation.joints, :3] / 255.0
+
+
+def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotation, ...]:
+    """Return the annotation of the pinned vertex; the same object as long as nothing changes.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the posed scene; a vertex that cannot be explained is unpinned.
+    size : (int, int)
+        Width and height of the image, pixels.
+    """
+    view = state.of(Weights)
+    pinned = view.pinned
+    if pinned is None or state.options.show == "binding":
+        return ()
+    try:
+        explanation = explained(state)
+    except ViewerError as problem:
+        state.error = str(problem)
+        unpin(state)
+        return ()
+    if explanation is None or not state.scene.actors[pinned.actor].is_drawn:
+        return ()
+    actor = state.scene.actors[pinned.actor]
+    key = (explanation, actor.placement.tobytes(), view.draws_lines, size)
+    if key != view.annotation_key or not view.annotations:
+        view.annotations = (vertex_annotation(explanation, actor, view.draws_lines, size),)
+        view.annotation_key = key
+    return view.annotations
+
+
+def vertex_annotation(
+    explanation: Explanation, actor: Actor, draws_lines: bool, size: tuple[int, int]
+) -> Annotation:
+    """Return a dot at a vertex, and lines from it to its rigid images M_i p with their weights.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        Explanation of the vertex in the actor's pose.
+    actor : Actor
+        Actor with a skeleton.
+    draws_lines : bool
+        Whether lines are drawn in addition to the dot.
+    size : (int, int)
+        Width and height of the image, pixels.
+    """
+    scale = picture_scale(size)
+    vertex = apply_transform(actor.placement, explanation.position)
+    rim = dots(vertex[None], np.array(_DARK), scale * (_DOT + _RIM + 1.0))
+    parts = [rim, dots(vertex[None], np.array(_LIGHT), scale * _DOT)]
+    if not draws_lines or not len(explanation.joints):
+        return Annotation(joined(parts), SegmentStyle(on_top=True))
+    skeleton = actor.figure.skeleton
+    assert skeleton is not None  # influences imply a skeleton
+    images = apply_transform(actor.placement @ explanation.placement, explanation.images)
+    colors = influence_colors(explanation, skeleton)
+    lines = _image_lines(vertex, images, colors, explanation.weights, scale)
+    texts = tuple(
+        f"{printable(name, _LONGEST_CELL)}  {weight:.3f}"
+        for name, weight in zip(explanation.names, explanation.weights.tolist(), strict=True)
+    )
+    white = np.broadcast_to(LABEL_COLOR, (len(texts), 3))
+    # Priorities after the name of the selected joint, before those of all other joints.
+    labels = Labels(texts, images, np.arange(1, len(texts) + 1, dtype=np.int32), white)
+    return Annotation(joined([lines, *parts]), SegmentStyle(on_top=True), labels)
+
+
+def _image_lines(
+    vertex: Floats, images: Floats, colors: Floats, weights: Floats, scale: float
+) -> Segments:
+    """Return a line and a dot for each influence, both with a dark rim; the strongest is on top."""
+    strengths = np.clip(np.abs(weights), 0.0, 1.0)
+    opacities = _FAINTEST + (1.0 - _FAINTEST) * strengths
+    widths = _THINNEST + (_THICKEST - _THINNEST) * strengths
+    count = len(images)
+    dark, one = np.tile(_DARK, (count, 1)), np.ones((count, 1))
+    starts = np.stack([np.broadcast_to(vertex, images.shape)] * 2 + [images] * 2, axis=1)
+    ends = np.repeat(images[:, None], 4, axis=1)
+    faint, solid = np.hstack([colors, opacities[:, None]]), np.hstack([colors, one])
+    shades = np.stack([dark, faint, dark, solid], axis=1)
+    dot = np.full(count, _DOT)
+    thick = scale * np.stack([widths + _BORDER, widths, dot + _RIM, dot], axis=1)
+    # The weakest influence is drawn first; explanations list it last.
+    order = np.arange(count)[::-1]
+    return Segments(
+        starts[order].reshape(-1, 3),
+        ends[order].reshape(-1, 3),
+        shades[order].reshape(-1, 4),
+        thick[order].ravel(),
+    )
+
+
+def draw_hovered(state: AppState) -> None:
+    """Mark the vertex that the hover text describes, only in the window, not in screenshots."""
+    hover = state.of(Weights).hover
+    if not hover.lines:
+        return
+    x, y, width, height = state.view_rect
+    size = (max(round(width), 1), max(round(height), 1))
+    found = project(view_of(state.camera, size, state.box), size, hover.point[None])
+    if not found.seen[0]:
+        return
+    draw_list = imgui.get_background_draw_list()
+    draw_list.push_clip_rect((x, y), (x + width, y + height), True)
+    across, down = (found.pixels[0] + [x, y]).tolist()
+    for radius, color in ((0.5 * (_DOT + _RIM), _DARK), (0.5 * _DOT, _LIGHT)):
+        draw_list.add_circle((across, down), radius, imgui.get_color_u32(color), 0, 2.0)
+    draw_list.pop_clip_rect()
+
+
+_AWAY = 16.0  # points between the mouse and the text
+
+
+def draw_hover_text(state: AppState) -> None:
+    """Draw the hover text while the mouse does not move."""
+    hover = state.of(Weights).hover
+    mouse = imgui.get_io().mouse_pos
+    if not hover.lines or hover.place != (mouse.x, mouse.y) or not shows_vertex_info(state):
+        return
+    x, y, width, height = state.view_rect
+    is_right, is_low = mouse.x > x + 0.6 * width, mouse.y > y + 0.6 * height
+    left = mouse.x - _AWAY if is_right else mouse.x + _AWAY
+    top = mouse.y - _AWAY if is_low else mouse.y + _AWAY
+    if begin_overlay("##hover", left, top, (float(is_right), float(is_low))):
+        for line in hover.lines:
+            imgui.text_unformatted(line)
+    overlay_rect(state, "##hover")
+    imgui.end()
+
+
+def shows_vertex_info(state: AppState) -> bool:
+    """Return whether hover text is currently shown."""
+    view, io = state.of(Weights), imgui.get_io()
+    shows_panel = view.panel_frame == imgui.get_frame_count()
+    is_covered = bool(state.error) or state.of(Files).dialog is not None or io.want_capture_mouse
+    is_held = any(io.mouse_down[button] for button in range(3))
+    return (view.always_shows_info or shows_panel) and not is_covered and not is_held

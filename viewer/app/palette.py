@@ -8,16 +8,15 @@ from functools import partial
 
 from imgui_bundle import imgui
 
-from viewer.app.core.ink import ink
-from viewer.app.core.key_names import key_name
 from viewer.app.core.reasons import no_panel, no_skeleton
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import note_item, overlay_rect
+from viewer.app.core.theme import ink
+from viewer.app.core.widgets import key_name, note_item, overlay_rect
 from viewer.app.features import ACTIONS, KEYS, PANELS
+from viewer.app.layout import show_panel
 from viewer.app.playback.animations import choose_animation
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.shown_panels import show_panel
-from viewer.app.view.display_actions import set_shading, show, show_bones
+from viewer.app.view.display_panel import set_shading, show, show_bones
 from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING

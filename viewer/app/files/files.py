@@ -1,24 +1,195 @@
-"""Reading of captures in the background while their first frames are shown."""
+"""State of opening files: dialog, loader, stream, and recent files."""
 
 from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import field, replace
+from pathlib import Path
 
 from viewer.app.core.jobs import unexpected
+from viewer.app.files.file_choice import FileDialog
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
+from viewer.loading import Contents, MotionSettings, begin, read_files
 from viewer.loading.capturing import Builder
 from viewer.progress import Cancelled, receiving
+from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.retargeting.drive import Drive
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Scene
 
-__all__ = ["Stream", "keep_rate"]
+
+@dataclass(slots=True)
+class Files:
+    """State of opening files.
+
+    Attributes
+    ----------
+    dialog : FileDialog or None
+        File dialog that is open.
+    wants_open : list of Path
+        Files to open after the frame.
+    loader : Loader or None
+        Loader of files that are being opened.
+    stream : Stream or None
+        Reader of captures that are not yet complete.
+    recent : list of tuple of str
+        Groups of files that were opened together, latest first.
+    rig : str
+        Rig of the body model that is opened next; empty for its default.
+    models : dict
+        Body models that were found, by name; searched for when the menu opens.
+    model_folder : Path or None
+        Folder of body models; read when the window "Preferences" opens.
+    """
+
+    dialog: FileDialog | None = None
+    wants_open: list[Path] = field(default_factory=list)
+    loader: Loader | None = None
+    stream: Stream | None = None
+    recent: list[tuple[str, ...]] = field(default_factory=list)
+    rig: str = ""
+    models: dict[str, Path] = field(default_factory=dict)
+    model_folder: Path | None = None
+
+
+class Loader:
+    """Thread that reads files.
+
+    Dropping a loader discards its result.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files to open.
+    attempts : sequence of sequences of Path
+        Tried in order until one loads; if all fail, the last error is reported.
+    wake : callable
+        Called from the thread when loading ends.
+    settings : MotionSettings, optional
+        Settings for reading motions.
+    opened : sequence of Path
+        Files of the current scene, to whose figures the motions are applied.
+
+    Attributes
+    ----------
+    scene : Scene or None
+        The scene that was read.
+    builders : list of Builder
+        Builders of captures whose first frames are in the scene.
+    addition : Contents or None
+        Poses and images for the open figure, if the files contain nothing else.
+    error : str
+        Reason why nothing was read; empty if there is no error.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        attempts: Sequence[Sequence[Path]],
+        wake: Callable[[], None],
+        settings: MotionSettings | None = None,
+        opened: Sequence[Path] = (),
+    ) -> None:
+        self.paths: tuple[Path, ...] = tuple(paths)
+        self.scene: Scene | None = None
+        self.builders: list[Builder] = []
+        self.addition: Contents | None = None
+        self.error = ""
+        self._attempts, self._wake, self._settings = attempts, wake, settings
+        self._opened = tuple(opened)
+        self._is_cancelled = False
+        self._progress = (0, 0, "")
+        self._started = time.monotonic()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        try:
+            with receiving(self._receive):
+                self._try_all()
+        except Cancelled:
+            return
+        self._wake()
+
+    def _receive(self, done: int, total: int, unit: str, _: str) -> None:
+        if self._is_cancelled:
+            raise Cancelled
+        self._progress = (done, total, unit)
+
+    def _try_all(self) -> None:
+        for paths in self._attempts:
+            try:
+                self._read_one(paths)
+                if self.scene is not None:
+                    prepare_scene(self.scene)
+                self.error = ""
+                break
+            except ViewerError as problem:
+                self.error = str(problem)
+            except MemoryError:
+                self.error = f"{paths[-1]}: not enough memory"
+
+    def _read_one(self, paths: Sequence[Path]) -> None:
+        contents = read_files(paths, settings=self._settings)
+        self.paths = tuple(paths)
+        if contents.is_addition:
+            self.addition = contents
+        elif contents.needs_figure and self._opened:
+            self._join(contents, paths)
+        else:
+            self.scene, self.builders = begin(contents, self._settings)
+
+    def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
+        """Apply motions to the open figures; motions that match none are shown separately."""
+        from viewer.loading.body_models import is_body
+
+        opened = read_files(self._opened, settings=self._settings)
+        figures = opened.figures
+        if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
+            figures = []  # people drawn with the bundled body replace the scene
+        kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
+        morphs = [*opened.morphs, *contents.morphs]
+        joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
+        joined.used_options = (contents.used_options or set()) | (opened.used_options or set())
+        count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
+        self.scene, self.builders = begin(joined, self._settings)
+        if contents.skeleton_motions and len(self.scene.actors) > count:
+            # A BVH that drives no open figure is shown separately.
+            kept = set()
+            self.scene, self.builders = begin(contents, self._settings)
+        self.paths = (*(path for path in self._opened if path in kept), *paths)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is a scene or an error."""
+        return not self._thread.is_alive()
+
+    @property
+    def progress(self) -> tuple[int, int, str]:
+        """Completed steps, their total and their unit; the total is 0 if it is unknown."""
+        return self._progress
+
+    def cancel(self) -> None:
+        """Stop reading at the next part of a file."""
+        self._is_cancelled = True
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since loading began."""
+        return time.monotonic() - self._started
+
+    def wait(self) -> None:
+        """Wait until loading ends."""
+        self._thread.join()
+
 
 _Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
 _WAITING = 4  # maximum number of parts in the queue: limits memory

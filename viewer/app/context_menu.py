@@ -12,29 +12,19 @@ from viewer.app.core.reasons import no_pose, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, menu_item
 from viewer.app.features import key_of
-from viewer.app.palette.palette_window import toggle_palette
+from viewer.app.palette import toggle_palette
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.posing.pose_actions import (
-    copy_pose,
-    mirror,
-    paste_pose,
-    reset_actor,
-    reset_joint,
-)
-from viewer.app.view.camera_actions import fit_actor, fit_selection
-from viewer.app.view.display_actions import toggle_option
+from viewer.app.posing.posing import copy_pose, mirror, paste_pose, reset_actor, reset_joint
+from viewer.app.view.camera_panel import fit_actor, fit_selection
+from viewer.app.view.display_panel import draw_bone_styles, draw_views, toggle_option
+from viewer.app.view.hovering import Picking
 from viewer.app.view.picks import Spot, spot_at
-from viewer.app.view.state import Picking
-from viewer.app.view.view_menu import draw_bone_styles, draw_views
-from viewer.app.weights.actions import no_view, pin_vertex, show_scalar, unpin
-from viewer.app.weights.state import Weights
+from viewer.app.weights.weights_panel import Weights, no_view, pin_vertex, show_scalar, unpin
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.renderer import Renderer
 from viewer.rig.skeleton import joint_label
-
-__all__ = ["ContextMenu", "answer_right_click", "draw_context_menu"]
 
 _POPUP = "context menu"
 _LONGEST = 40  # maximum length of a name in characters

@@ -8,10 +8,9 @@ from imgui_bundle import imgui
 
 from viewer.rendering.overlay.typeface import interface_font, system_fonts
 
-__all__ = ["add_system_fonts", "apply_theme", "change_scale", "lacks_letters", "set_theme"]
-
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
+
 # Colours by use: dark theme, light theme.
 _COLORS = {
     "panel": ((0.125, 0.135, 0.15, 1.0), (0.945, 0.95, 0.955, 1.0)),
@@ -124,3 +123,33 @@ def set_theme(theme: str) -> None:
     for use, names in _USES.items():
         for name in names:
             style.set_color_(getattr(imgui.Col_, name), _COLORS[use][row])
+
+
+Color = tuple[float, float, float, float]
+WARNING: Color = (1.0, 0.77, 0.30, 1.0)
+ERROR: Color = (1.0, 0.50, 0.42, 1.0)
+_DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a light panel
+
+
+def ink(color: Color) -> Color:
+    """Return a colour chosen for dark panels, darker if the panels are light."""
+    if not _is_light():
+        return color
+    red, green, blue, alpha = color
+    return _DARKER * red, _DARKER * green, _DARKER * blue, alpha
+
+
+def accent() -> Color:
+    """Return the background of a button that is switched on."""
+    return (0.95, 0.70, 0.42, 1.0) if _is_light() else (0.62, 0.36, 0.12, 1.0)
+
+
+def faint(opacity: float) -> Color:
+    """Return the colour of text with some opacity, for lines and areas."""
+    text = imgui.get_style().color_(imgui.Col_.text)
+    return text.x, text.y, text.z, opacity
+
+
+def _is_light() -> bool:
+    text = imgui.get_style().color_(imgui.Col_.text)
+    return text.x + text.y + text.z < 1.5

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.app.context.context_menu import ContextMenu
+from viewer.app.context_menu import ContextMenu
 from viewer.app.posing.gizmo import joint_places
-from viewer.app.weights.state import Weights
+from viewer.app.weights.weights_panel import Weights
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.rendering.camera import fit
+from viewer.rendering.camera import Camera, camera_from_view, fit, follow_view
 from viewer.rig.arrays import Floats
+from viewer.rig.captures.cameras import CameraView
+from viewer.rig.captures.carried_view import view_in
 from viewer.rig.scene import scene_points
-
-__all__ = ["fit_again", "fit_points", "fit_shown", "keep_fitting"]
 
 _GAP = 6.0  # margin between the tools and the scene, points
 _LEAST = 0.6  # minimum fraction of the view's height to fill, even if overlays cover it
@@ -103,3 +103,28 @@ def _covered_height(state: AppState, points: Floats) -> float:
     across = (points[is_high] @ matrix[0, :3] + matrix[0, 3]) / depth[is_high]
     is_covered = x + 0.5 * width * (1.0 + across) > tools[0] - _GAP
     return lower - y if is_covered.any() else 0.0
+
+
+def look_through_view(state: AppState, view: CameraView) -> None:
+    """Look through a calibrated camera of the scene.
+
+    Raises
+    ------
+    RigError
+        If the size of the camera's images is unknown.
+    """
+    scene = state.scene
+    seen = camera_from_view(view, _size(state), scene.up, state.box, view_in(view, scene))
+    seen.front = state.camera.front
+    for name in Camera.__slots__:
+        setattr(state.camera, name, getattr(seen, name))
+
+
+def follow_calibrated(state: AppState) -> None:
+    """Update the view through a moving calibrated camera, if it looks through one."""
+    follow_view(state.camera, _size(state), state.scene, state.box)
+
+
+def _size(state: AppState) -> tuple[int, int]:
+    _, _, width, height = state.view_rect
+    return max(round(width), 1), max(round(height), 1)

@@ -1,1 +1,0 @@
-"""Context menus: actions on the item under a right click in the view."""
