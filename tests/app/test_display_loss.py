@@ -19,7 +19,7 @@ PROGRAM = """
 import os, signal, sys
 from pathlib import Path
 from viewer.app import window
-from viewer.app.recording.state import RecordingState, RecordSettings
+from viewer.app.recording.record_dialog import RecordingState, RecordSettings
 from viewer.cli import run
 
 server, folder = int(sys.argv[1]), sys.argv[2]
@@ -123,7 +123,7 @@ def test_previous_handler_is_restored():
     """Run in a separate process, as Xlib has one global handler."""
     program = (
         "import ctypes\n"
-        "from viewer.app.display_loss import stop_watching, watch_display\n"
+        "from viewer.app.display import stop_watching, watch_display\n"
         "ask = ctypes.CDLL('libX11.so.6')['XSetIOErrorHandler']\n"
         "ask.restype = ctypes.c_void_p\n"
         "first = ask(None)\n"  # Xlib's default handler

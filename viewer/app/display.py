@@ -69,7 +69,7 @@ def find_display() -> None:
             raise NoDisplay("no display found (DISPLAY is not set)")
         if not os.environ.get("DISPLAY"):
             raise NoDisplay("no X display found (DISPLAY is not set; Wayland needs XWayland)")
-        _watch_display()
+        watch_display()
     glfw = import_glfw()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -121,7 +121,7 @@ _TO_OTHERS = {2, 18, 20, 24, 25}
 """ChangeWindowAttributes, ChangeProperty, GetProperty, ConvertSelection and SendEvent."""
 
 
-def _watch_display() -> None:
+def watch_display() -> None:
     """Install the handlers of lost windows and of a lost connection.
 
     Called before GLFW starts, because the connection may be lost while a window is created. Further
