@@ -183,7 +183,7 @@ def broken(line: int, new: str):
         (broken(20, "$ 1.0"), 2),
         (broken(2, "$ up"), 2),
         (broken(2, ""), 0),
-        (broken(150, "nan" + " 0" * 16), 2),
+        (broken(150, "nan" + " 0" * 16), 0),
         (broken(150, "1e30" + " 0" * 16), 2),
         (broken(1, "1 2 3"), 0),
         (lambda text: text.replace("Frames: 300", "Frames: 299"), 0),

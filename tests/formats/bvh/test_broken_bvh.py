@@ -240,10 +240,6 @@ FRAMES = GOOD.partition("0.0333333\n")[2]
             ("F002.bvh-seconds", 32, {"found": b"-0.1"}),
         ),
         (
-            GOOD.replace("10 20 30", "10 inf 30"),
-            ("F003.number", 34, {"item": Phrase("bvh-frame", frame=1), "found": b"inf"}),
-        ),
-        (
             GOOD.replace("0.0 1.0 0.0 0", "0.0 1.0 0.0 0;"),
             ("F002.number", 33, {"item": Phrase("bvh-frame", frame=0), "found": b"0;"}),
         ),
@@ -382,3 +378,66 @@ def test_channels_of_an_end_site_are_counted_and_ignored() -> None:
     assert warnings == [("F006.bvh-end-channels", 1, {"joint": joint})]
     half = np.radians(15)
     np.testing.assert_allclose(motion.clip.rotations, [[[np.sin(half), 0, 0, np.cos(half)]]])
+
+
+# Root at height 90 in five frames, which turns the spine by 10 to 50 degrees about z.
+TURNS = """HIERARCHY
+ROOT hips
+{
+  OFFSET 0 90 0
+  CHANNELS 3 Xposition Yposition Zposition
+  JOINT spine
+  {
+    OFFSET 0 20 0
+    CHANNELS 3 Zrotation Yrotation Xrotation
+    End Site
+    {
+      OFFSET 0 30 0
+    }
+  }
+}
+MOTION
+Frames: 5
+Frame Time: 0.0333333
+0 90 0 10 0 0
+1 90 0 20 0 0
+2 90 0 30 0 0
+3 90 0 40 0 0
+4 90 0 50 0 0
+"""
+
+
+@pytest.mark.parametrize("word", ["nan", "-NaN", "inf", "-1.#IND", "1e999"])
+def test_frames_with_numbers_that_are_not_finite_are_gaps(word: str) -> None:
+    text = TURNS.replace("20 0 0", f"{word} 0 0").replace("2 90", "2 -inf").replace("50", "nan")
+    motion, notes = read(text)
+    clip = motion.clip
+    assert clip.timing.rows.tolist() == [0, -1, -1, 3, -1]
+    # Half the angle of a turn about z is the arc tangent of z over w.
+    turns = 2.0 * np.degrees(np.arctan2(clip.rotations[:, 1, 2], clip.rotations[:, 1, 3]))
+    np.testing.assert_allclose(turns[[0, 3]], [10.0, 40.0], atol=1e-4)
+    gaps = next(note for note in notes if note[0] == "F007.frames-lost")
+    assert gaps[2]["n"] == 3
+    key, _, values = gaps[2]["problem"]
+    assert key == ("F003.too-large" if word == "1e999" else "F003.number")
+    assert values["found"] == word.encode()
+    assert values["item"] == Phrase("bvh-frame", frame=1)
+
+
+def test_gaps_are_found_without_line_ends() -> None:
+    text = TURNS.replace("20 0 0", "nan 0 0")
+    head, _, frames = text.partition("0.0333333\n")
+    motion, _ = read(f"{head}0.0333333\n{' '.join(frames.split())}")
+    assert motion.clip.timing.rows.tolist() == [0, -1, 2, 3, 4]
+
+
+def test_word_in_a_frame_is_refused_beside_gaps() -> None:
+    text = TURNS.replace("20 0 0", "nan 0 0").replace("40 0 0", "up 0 0")
+    item = Phrase("bvh-frame", frame=3)
+    assert refusal(text) == ("F002.number", 22, {"item": item, "found": b"up"})
+
+
+def test_motion_without_a_finite_frame_is_refused() -> None:
+    text = re.sub(r" 90 0 ", " nan 0 ", TURNS)
+    key, line, values = refusal(text)
+    assert (key, line, values["n"]) == ("F003.frames-lost", None, 5)

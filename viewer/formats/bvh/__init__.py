@@ -74,9 +74,12 @@ def read(source: Source) -> SkeletonMotion:
         )
     has_motion = hierarchy.motion >= 0
     rate = frame_rate(source, motion.frame_time) if has_motion else DEFAULT_RATE
+    rows = np.arange(len(motion.values), dtype=np.int32)
+    if motion.lost is not None:
+        rows[motion.lost] = -1
     clip = SampledClip(
         source.path.stem,
-        Timing(rate, np.arange(len(motion.values), dtype=np.int32)),
+        Timing(rate, rows),
         rotations_of(table, motion.values),
         # Position channels replace the OFFSETs, so zeros would not be the rest pose.
         translations_of(source, table, motion.values) if motion.has_frames else None,

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._frame_gaps import gap_notes, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_numbers, to_number
+from viewer.formats._text.numbers import is_infinite, parse_numbers, to_number
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.formats._translation_limit import FARTHEST, is_beyond
 from viewer.formats.bvh.hierarchy import BvhJoint, called
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import align_signs
 
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
@@ -43,11 +44,14 @@ class _Motion:
         Seconds between frames as written; None if missing.
     has_frames : bool
         False for the rest pose of a file without frames.
+    lost : (N,) or None
+        Whether a number of a frame is not finite, so that the frame is a gap; None if none is.
     """
 
     values: Floats
     frame_time: bytes | None
     has_frames: bool = True
+    lost: Bools | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +96,8 @@ def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
     Raises
     ------
     FormatError
-        If a word is not a number, or a row is too short or too long; the error has the line.
+        If a word is not a number, a row is too short or too long, or no frame is finite; the error
+        has the line.
     """
     if start < 0:
         source.warn("F007.bvh-no-motion", source.end)
@@ -103,8 +108,8 @@ def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
     if n_channels == 0:
         source.warn("F007.bvh-no-channels", start)
         return _rest(0, time)
-    rows = _rows(source, start, n_channels, declared)
-    return _Motion(rows, time) if len(rows) else _rest(n_channels, time)
+    rows, lost = _rows(source, start, n_channels, declared)
+    return _Motion(rows, time, lost=lost) if len(rows) else _rest(n_channels, time)
 
 
 def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int]:
@@ -139,8 +144,10 @@ def _rest(n_channels: int, time: bytes | None) -> _Motion:
     return _Motion(np.zeros((1, n_channels)), time, has_frames=False)
 
 
-def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
-    """Return all complete frames: (N, C)."""
+def _rows(
+    source: Source, start: int, width: int, declared: int | None
+) -> tuple[Floats, Bools | None]:
+    """Return all complete frames, (N, C), and which of them are gaps, if any."""
     data = source.data
     source.remember("frames", lambda row: source.number_offset(start, len(data), row * width))
     # Motions are usually read once, and exported ones are read back: caching would only waste
@@ -149,10 +156,10 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
     whole, rest = divmod(len(values), width)
     is_whole = bad < 0 and rest == 0 and whole > 0
     if is_whole and (declared is None or whole == declared):
-        return values.reshape(whole, width)
-    repaired = _held_frames(source, start, width, declared)
-    if repaired is not None:
-        return repaired
+        return values.reshape(whole, width), None
+    held = _held_frames(source, start, width, declared)
+    if held is not None:
+        return held
     if bad >= 0:
         _refuse_word(source, start, bad, width, declared)
     if rest or (declared is not None and whole != declared):
@@ -160,13 +167,16 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
         _warn_of_difference(source, width, declared, whole, rest)
     if whole == 0:
         source.warn("F007.bvh-empty", start)
-    return values[: whole * width].reshape(whole, width)
+    return values[: whole * width].reshape(whole, width), None
 
 
-def _held_frames(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
+def _held_frames(
+    source: Source, start: int, width: int, declared: int | None
+) -> tuple[Floats, Bools | None] | None:
     """Record all errors in the frames, and return the frames with invalid ones replaced.
 
-    None if there is no error in them, or the starts of the frames are unknown.
+    Frames with numbers that are not finite, such as ``nan`` and ``-1.#IND``, are gaps, which are
+    returned too. None if there is no error in the frames, or their starts are unknown.
     """
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
@@ -186,20 +196,42 @@ def _held_frames(source: Source, start: int, width: int, declared: int | None) -
         return None
     frames = np.searchsorted(begins, bad, side="right") - 1
     frame_of = dict(zip(bad.tolist(), frames.tolist(), strict=True))
+    is_number = np.array([is_infinite(words.word(index)) for index in bad.tolist()], dtype=np.bool_)
     refuse_words(
         source,
         words,
-        bad,
+        bad[~is_number],
         lambda word: Phrase("bvh-frame", frame=frame_of[word]),
         "frames",
-        frames,
+        frames[~is_number],
     )
+    lost = _gaps(source, words, bad[is_number], frames[is_number], len(begins))
     _refuse_sizes(source, words.offsets[begins], sizes, width)
     rows = np.full((len(begins), width), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(width)]
     if rest or (declared is not None and len(rows) != declared):
         _warn_of_difference(source, width, declared, len(rows), rest)
-    return held_rows(rows, np.isnan(rows).any(axis=1))
+    return held_rows(rows, np.isnan(rows).any(axis=1)), lost
+
+
+def _gaps(source: Source, words: Words, bad: _Places, frames: _Places, count: int) -> Bools | None:
+    """Return which of all frames have numbers that are not finite, and report them.
+
+    ``bad`` are the indices of these words, ``frames`` their frames. None if there are none.
+    """
+    if len(bad) == 0:
+        return None
+    word, offset = words.word(int(bad[0])), int(words.offsets[bad[0]])
+    item = Phrase("bvh-frame", frame=int(frames[0]))
+    first = source.fault(number_key(word), offset, item=item, found=word)
+    source.frame_faults.append(first.diagnostic)
+    lost = np.zeros(count, dtype=np.bool_)
+    lost[frames] = True
+    if lost.all():
+        raise no_frames(source, count)
+    for note in gap_notes(source, {None: np.flatnonzero(lost)}):
+        source.diagnostics.add(note)
+    return lost
 
 
 def _without_rest(
