@@ -1,14 +1,24 @@
-"""Changes of materials by expressions of VRM, in the terms of version 1.0.
+"""Materials of VRM: the changes by expressions, and those of version 0.x in the terms of 1.0.
 
 ::
 
-    VRM 0.x  materialValues: materialName, propertyName, targetValue of 4 numbers
-    VRM 1.0  materialColorBinds: material, type, targetValue of 4 numbers
-             textureTransformBinds: material, scale, offset
+    changes   VRM 0.x  materialValues: materialName, propertyName, targetValue of 4 numbers
+              VRM 1.0  materialColorBinds: material, type, targetValue of 4 numbers
+                       textureTransformBinds: material, scale, offset
+
+    materialProperties of VRM 0.x, which override the core members of toon and unlit materials
+        vectorProperties   _Color (sRGB), _EmissionColor (linear)   colours
+                           _MainTex                                 placement of all textures
+        textureProperties  _MainTex, _BumpMap, _EmissionMap         textures
+        keywordMap         _ALPHATEST_ON, _ALPHABLEND_ON            alphaMode, if the core has none
+        shader             VRM/UnlitCutout, VRM/UnlitTransparent…   alphaMode, if the core has none
+        floatProperties    _Cutoff, _CullMode, _BumpScale           alphaCutoff, doubleSided, scale
+                                                                    of normals, if the core has none
 
 Colours of version 0.x are sRGB, except those of emission. ``_MainTex_ST`` has the scale and the
 offset of texture coordinates whose origin is at the bottom; ``_MainTex_ST_S`` and ``_MainTex_ST_T``
-change only one axis.
+change only one axis. Widths of outlines are in centimetres or hundredths of half the image height,
+and rotations of texture coordinates are in revolutions per second.
 """
 
 from __future__ import annotations
@@ -24,7 +34,7 @@ from viewer.rig.expressions import COLOR_KINDS, TRANSFORM
 from viewer.rig.srgb import decode_srgb
 
 _Bind = tuple[int, str, Floats]
-"""Material, kind and target (4,), as in ``viewer.rig.material_binds.MaterialBinds``."""
+"""Material, kind and target (4,), as in ``viewer.rig.expressions.MaterialBinds``."""
 _COLORS = {
     "_Color": "color",
     "_EmissionColor": "emissionColor",
@@ -34,6 +44,46 @@ _COLORS = {
 }
 _LINEAR = "_EmissionColor"
 _AXES = {"_MainTex_ST": (0, 1), "_MainTex_ST_S": (0,), "_MainTex_ST_T": (1,)}
+
+_TEXTURE_TRANSFORM = "KHR_texture_transform"
+_SURFACE = "pbrMetallicRoughness"
+_CORE_TEXTURES = {
+    "_MainTex": (_SURFACE, "baseColorTexture"),
+    "_BumpMap": ("normalTexture",),
+    "_EmissionMap": ("emissiveTexture",),
+}
+_CULL_OFF = 0.0
+_BRIGHTEST = 1e6
+
+_TOON_TEXTURES = {
+    "_ShadeTexture": "shadeMultiplyTexture",
+    "_SphereAdd": "matcapTexture",
+    "_RimTexture": "rimMultiplyTexture",
+    "_OutlineWidthTexture": "outlineWidthMultiplyTexture",
+    "_UvAnimMaskTexture": "uvAnimationMaskTexture",
+}
+_TOON_COLORS = {
+    "_ShadeColor": ("shadeColorFactor", (0.97, 0.81, 0.86, 1.0)),
+    "_RimColor": ("parametricRimColorFactor", (0.0, 0.0, 0.0, 1.0)),
+    "_OutlineColor": ("outlineColorFactor", (0.0, 0.0, 0.0, 1.0)),
+}
+_TOON_NUMBERS = {
+    "_RimLightingMix": ("rimLightingMixFactor", 0.0, 1.0),
+    "_RimFresnelPower": ("parametricRimFresnelPowerFactor", 1.0, 1.0),
+    "_RimLift": ("parametricRimLiftFactor", 0.0, 1.0),
+    "_UvAnimScrollX": ("uvAnimationScrollXSpeedFactor", 0.0, 1.0),
+    "_UvAnimScrollY": ("uvAnimationScrollYSpeedFactor", 0.0, -1.0),
+    "_UvAnimRotation": ("uvAnimationRotationSpeedFactor", 0.0, 2.0 * np.pi),
+}
+
+# Default of each number without a counterpart, and textures without a counterpart.
+_LOST_NUMBERS = {"_ReceiveShadowRate": 1.0, "_ShadingGradeRate": 1.0, "_LightColorAttenuation": 0.0}
+_LOST_TEXTURES = ("_ReceiveShadowTexture", "_ShadingGradeTexture")
+_OUTLINE_MODES = ("none", "worldCoordinates", "screenCoordinates")
+
+# Metres per centimetre, and image heights per hundredth of half the height.
+_OUTLINE_WIDTHS = (0.0, 0.01, 0.005)
+_WRITES_DEPTH = 3  # value of _BlendMode
 
 
 def old_binds(told: Any, materials: list[Any]) -> tuple[list[_Bind], list[str]]:
@@ -75,12 +125,9 @@ def _linear(name: str, value: Floats) -> Floats:
     return np.append(decode_srgb(value[:3].clip(0.0, 1.0)), value[3])
 
 
-def _main_transform(properties: Any) -> Floats:
-    """Return scale and offset of the texture coordinates of a material, origin at the top: (4,).
-
-    ``properties``: a member of ``materialProperties``, as parsed from JSON.
-    """
-    value = rows_of(part(properties, "vectorProperties", "_MainTex"), (0.0, 0.0, 1.0, 1.0))
+def _main_transform(told: Any) -> Floats:
+    """Return scale and offset of the texture coordinates of a material, origin at the top: (4,)."""
+    value = rows_of(part(told, "vectorProperties", "_MainTex"), (0.0, 0.0, 1.0, 1.0))
     x, y, width, height = (0.0, 0.0, 1.0, 1.0) if value is None else value.tolist()
     return np.array([width, height, x, 1.0 - y - height])
 
@@ -117,49 +164,10 @@ def _color(told: Any) -> Floats | None:
     return None if told is None else rows_of(told, (0.0,) * 4)
 
 
-# Core members of toon and unlit materials of VRM 0.x, which ``materialProperties`` overrides.
-#
-# ::
-#
-#     vectorProperties   _Color (sRGB), _EmissionColor (linear)   colours
-#                        _MainTex                                 placement of all textures
-#     textureProperties  _MainTex, _BumpMap, _EmissionMap         textures
-#     keywordMap         _ALPHATEST_ON, _ALPHABLEND_ON            alphaMode, if the core has none
-#     shader             VRM/UnlitCutout, VRM/UnlitTransparent…   alphaMode, if the core has none
-#     floatProperties    _Cutoff, _CullMode, _BumpScale           alphaCutoff, doubleSided, scale of
-#                                                                 normals, if the core has none
-
-_TEXTURE_TRANSFORM = "KHR_texture_transform"
-_SURFACE = "pbrMetallicRoughness"
-_CORE_TEXTURES = {
-    "_MainTex": (_SURFACE, "baseColorTexture"),
-    "_BumpMap": ("normalTexture",),
-    "_EmissionMap": ("emissiveTexture",),
-}
-_CULL_OFF = 0.0
-_BRIGHTEST = 1e6
-
-
-def placement(told: Any) -> dict[str, Any]:
-    """Return the extensions of textures that are placed like the main texture.
-
-    ``told``: a member of ``materialProperties``, as parsed from JSON.
-    """
-    values = _main_transform(told).tolist()
-    if values == [1.0, 1.0, 0.0, 0.0]:
-        return {}
-    return {"extensions": {_TEXTURE_TRANSFORM: {"scale": values[:2], "offset": values[2:]}}}
-
-
 def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
     """Return the members of a core material with those that ``materialProperties`` replaces.
 
-    Parameters
-    ----------
-    core : mapping
-        A member of ``materials``, as parsed from JSON.
-    told : Any
-        The member of ``materialProperties`` with the same index.
+    ``core``, ``told``: members of ``materials`` and ``materialProperties`` with the same index.
     """
     found = _opacity(told) | dict(core)
     surface = found.get(_SURFACE)
@@ -170,7 +178,7 @@ def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
     if color is not None:
         values = [*decode_srgb(color[:3].clip(0.0, 1.0)), color[3].clip(0.0, 1.0)]
         found[_SURFACE]["baseColorFactor"] = [float(value) for value in values]
-    placed = placement(told)
+    placed = _placement(told)
     for name, (*outer, member) in _CORE_TEXTURES.items():
         owner = found[_SURFACE] if outer else found
         index = part(told, "textureProperties", name)
@@ -181,30 +189,6 @@ def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
         if isinstance(owner.get(member), dict):
             owner[member] = {**owner[member], **placed}
     return found | _emission(told, found.get("extensions"))
-
-
-def _vector(told: Any, name: str) -> Floats | None:
-    """Return four numbers; None if they are missing or invalid."""
-    value = part(told, "vectorProperties", name)
-    return None if value is None else rows_of(value, (0.0,) * 4)
-
-
-def _emission(told: Any, extensions: Any) -> dict[str, Any]:
-    """Return the emitted light: factors up to 1, and the strength in an extension."""
-    color = _vector(told, "_EmissionColor")
-    if color is None:
-        return {}
-    light = color[:3].clip(0.0, _BRIGHTEST)
-    strength = max(1.0, float(light.max()))
-    given = extensions if isinstance(extensions, dict) else {}
-    strengths = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
-    return {"emissiveFactor": (light / strength).tolist(), "extensions": {**given, **strengths}}
-
-
-def _scale(told: Any, name: str) -> dict[str, float]:
-    """Return the scale of a texture of normals."""
-    scale = value_of(part(told, "floatProperties", "_BumpScale"), 1.0)
-    return {} if name != "_BumpMap" or scale is None else {"scale": scale}
 
 
 def _opacity(told: Any) -> dict[str, Any]:
@@ -222,39 +206,36 @@ def _opacity(told: Any) -> dict[str, Any]:
     return found
 
 
-# Toon materials of VRM 0.x, ``materialProperties``, in the terms of VRM 1.0.
-#
-# Colours are sRGB, widths of outlines are in centimetres or hundredths of half the image height,
-# and rotations of texture coordinates are in revolutions per second.
-_TOON_TEXTURES = {
-    "_ShadeTexture": "shadeMultiplyTexture",
-    "_SphereAdd": "matcapTexture",
-    "_RimTexture": "rimMultiplyTexture",
-    "_OutlineWidthTexture": "outlineWidthMultiplyTexture",
-    "_UvAnimMaskTexture": "uvAnimationMaskTexture",
-}
-_TOON_COLORS = {
-    "_ShadeColor": ("shadeColorFactor", (0.97, 0.81, 0.86, 1.0)),
-    "_RimColor": ("parametricRimColorFactor", (0.0, 0.0, 0.0, 1.0)),
-    "_OutlineColor": ("outlineColorFactor", (0.0, 0.0, 0.0, 1.0)),
-}
-_TOON_NUMBERS = {
-    "_RimLightingMix": ("rimLightingMixFactor", 0.0, 1.0),
-    "_RimFresnelPower": ("parametricRimFresnelPowerFactor", 1.0, 1.0),
-    "_RimLift": ("parametricRimLiftFactor", 0.0, 1.0),
-    "_UvAnimScrollX": ("uvAnimationScrollXSpeedFactor", 0.0, 1.0),
-    "_UvAnimScrollY": ("uvAnimationScrollYSpeedFactor", 0.0, -1.0),
-    "_UvAnimRotation": ("uvAnimationRotationSpeedFactor", 0.0, 2.0 * np.pi),
-}
+def _vector(told: Any, name: str) -> Floats | None:
+    """Return four numbers; None if they are missing or invalid."""
+    value = part(told, "vectorProperties", name)
+    return None if value is None else rows_of(value, (0.0,) * 4)
 
-# Default of each number without a counterpart, and textures without a counterpart.
-_LOST_NUMBERS = {"_ReceiveShadowRate": 1.0, "_ShadingGradeRate": 1.0, "_LightColorAttenuation": 0.0}
-_LOST_TEXTURES = ("_ReceiveShadowTexture", "_ShadingGradeTexture")
-_OUTLINE_MODES = ("none", "worldCoordinates", "screenCoordinates")
 
-# Metres per centimetre, and image heights per hundredth of half the height.
-_OUTLINE_WIDTHS = (0.0, 0.01, 0.005)
-_WRITES_DEPTH = 3  # value of _BlendMode
+def _placement(told: Any) -> dict[str, Any]:
+    """Return the extensions of textures that are placed like the main texture."""
+    values = _main_transform(told).tolist()
+    if values == [1.0, 1.0, 0.0, 0.0]:
+        return {}
+    return {"extensions": {_TEXTURE_TRANSFORM: {"scale": values[:2], "offset": values[2:]}}}
+
+
+def _scale(told: Any, name: str) -> dict[str, float]:
+    """Return the scale of a texture of normals."""
+    scale = value_of(part(told, "floatProperties", "_BumpScale"), 1.0)
+    return {} if name != "_BumpMap" or scale is None else {"scale": scale}
+
+
+def _emission(told: Any, extensions: Any) -> dict[str, Any]:
+    """Return the emitted light: factors up to 1, and the strength in an extension."""
+    color = _vector(told, "_EmissionColor")
+    if color is None:
+        return {}
+    light = color[:3].clip(0.0, _BRIGHTEST)
+    strength = max(1.0, float(light.max()))
+    given = extensions if isinstance(extensions, dict) else {}
+    strengths = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    return {"emissiveFactor": (light / strength).tolist(), "extensions": {**given, **strengths}}
 
 
 def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
@@ -295,16 +276,6 @@ def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
     return toon, [f"{name} {each}" for each in used]
 
 
-def _placed_textures(told: Any) -> dict[str, Any]:
-    """Return the textures, placed like the main texture, except for the sphere map."""
-    found, placed = dict[str, Any](), placement(told)
-    for old, new in _TOON_TEXTURES.items():
-        index = part(told, "textureProperties", old)
-        if isinstance(index, int):
-            found[new] = {"index": index} | (placed if old != "_SphereAdd" else {})
-    return found
-
-
 def _modern_ramp(toony: float, shift: float) -> tuple[float, float]:
     """Return ``shadingToonyFactor`` and ``shadingShiftFactor`` with the same ramp.
 
@@ -316,3 +287,13 @@ def _modern_ramp(toony: float, shift: float) -> tuple[float, float]:
     """
     toony += (1.0 - toony) * (0.5 + 0.5 * shift)
     return toony, -shift - (1.0 - toony)
+
+
+def _placed_textures(told: Any) -> dict[str, Any]:
+    """Return the textures, placed like the main texture, except for the sphere map."""
+    found, placed = dict[str, Any](), _placement(told)
+    for old, new in _TOON_TEXTURES.items():
+        index = part(told, "textureProperties", old)
+        if isinstance(index, int):
+            found[new] = {"index": index} | (placed if old != "_SphereAdd" else {})
+    return found

@@ -1,4 +1,4 @@
-"""Humanoid bones, expressions and permissions of a VRM file.
+"""VRM properties of a glTF file: bones, expressions, springs, constraints, views and permissions.
 
 Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0. Version 0
 names the joints of a thumb differently, states the weights of expressions in percent, and binds
@@ -26,6 +26,16 @@ from viewer.rig.springs.springs import Springs
 
 _PERCENT = 100.0
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
+
+_SINGLE = {"node", "center", "firstPersonBone"}
+_LISTS = {"bones"}
+
+_VIEWS: dict[str, PartView] = {
+    "auto": "auto",
+    "both": "both",
+    "thirdpersononly": "third-person",
+    "firstpersononly": "first-person",
+}
 
 # Heading of each property, and the property's names in versions 1.0 and 0.x.
 _META = {
@@ -91,35 +101,27 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     return replace(file, facts=_contents(file))
 
 
-def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
-    """Return facts about parts that are drawn in only one view, and about constraints."""
-    names = file.tree.names
-    shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
-    facts = [
-        (heading, ", ".join(part_name(file, node) for node, view in file.part_views.items()
-                            if view == wanted))
-        for heading, wanted in shown.items()
-    ]  # fmt: skip
-    facts.append((
-        "constraints",
-        ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
-    ))  # fmt: skip
-    if file.springs is not None:
-        facts.append(("springs", _springs(file.springs)))
-    return tuple((heading, _shortened(text)) for heading, text in facts if text)
+def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
+    """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` of the root name.
 
-
-def _springs(springs: Springs) -> str:
-    parts = (
-        (springs.n_chains, "chain"),
-        (springs.n_joints, "joint"),
-        (springs.colliders.n_colliders, "collider"),
-    )
-    return ", ".join(f"{count} {word}{'s' * (count != 1)}" for count, word in parts if count)
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    >>> told = {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1, 9], "center": 2}]}}}
+    >>> sorted(_named_nodes(told, 3))
+    [1, 2]
+    """
+    found: set[int] = set()
+    stack: list[Any] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
+    while stack:
+        told = stack.pop()
+        if isinstance(told, list):
+            stack += told
+        elif isinstance(told, dict):
+            for name, value in told.items():
+                given = value if name in _LISTS and isinstance(value, list) else [value]
+                if name in _SINGLE or name in _LISTS:
+                    found.update(each for each in given if is_index(each, n_nodes))
+                else:
+                    stack.append(value)
+    return frozenset(found)
 
 
 def _expressions(
@@ -150,25 +152,6 @@ def _expressions(
     if undrawn:
         source.warn("F007.vrm-materials", at, names=undrawn)
     return tuple(found)
-
-
-def _expression(
-    name: str, told: Mapping[str, Any], binds: tuple[tuple[int, int, float], ...]
-) -> NodeExpression:
-    overrides = {}
-    for kind, key in _OVERRIDES.items():
-        effect = told.get(key, "none")
-        overrides[kind] = effect if effect in OVERRIDES else "none"
-    kinds = [kind for kind, names in PROCEDURAL.items() if name in names]
-    preset = str(told.get("presetName") or "").lower()
-    return NodeExpression(
-        name,
-        binds,
-        is_binary=told.get("isBinary") is True,
-        kind=kinds[0] if kinds else "",
-        overrides=overrides,
-        preset=OLD_PRESETS.get(preset, ""),
-    )
 
 
 def _old_name(told: Mapping[str, Any]) -> str:
@@ -204,6 +187,58 @@ def _has_target(file: NodeFile, node: int, index: Any) -> bool:
     return mesh >= 0 and is_index(index, len(file.meshes[mesh].target_names))
 
 
+def _expression(
+    name: str, told: Mapping[str, Any], binds: tuple[tuple[int, int, float], ...]
+) -> NodeExpression:
+    overrides = {}
+    for kind, key in _OVERRIDES.items():
+        effect = told.get(key, "none")
+        overrides[kind] = effect if effect in OVERRIDES else "none"
+    kinds = [kind for kind, names in PROCEDURAL.items() if name in names]
+    preset = str(told.get("presetName") or "").lower()
+    return NodeExpression(
+        name,
+        binds,
+        is_binary=told.get("isBinary") is True,
+        kind=kinds[0] if kinds else "",
+        overrides=overrides,
+        preset=OLD_PRESETS.get(preset, ""),
+    )
+
+
+def _read_part_views(
+    file: NodeFile, told: Mapping[str, Any], version: int, pointer: str, source: Source
+) -> dict[int, PartView]:
+    """Return the view in which each annotated node's mesh is drawn.
+
+    Version 0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), version 1 nodes
+    (``type: "firstPersonOnly"``). Invalid annotations are ignored with a message.
+    """
+    annotations = listed(told, "firstPerson", "meshAnnotations")
+    found: dict[int, PartView] = {}
+    for index, each in enumerate(annotations):
+        view = part(each, "firstPersonFlag" if version == 0 else "type")
+        known = _VIEWS.get(view.lower()) if isinstance(view, str) else None
+        nodes = _annotated_nodes(file, each, version)
+        if known is None or not nodes:
+            at = f"{pointer}/firstPerson/meshAnnotations/{index}"
+            source.warn("G006.first-person", at, found=str(view))
+            continue
+        found.update(dict.fromkeys(nodes, known))
+    return found
+
+
+def _annotated_nodes(file: NodeFile, each: Any, version: int) -> list[int]:
+    """Return the nodes whose mesh is annotated."""
+    if version == 0:
+        mesh = part(each, "mesh")
+        has_mesh = is_index(mesh, len(file.meshes))
+        return file.tree.with_mesh(mesh) if has_mesh else []
+    node = part(each, "node")
+    has_node = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0
+    return [node] if has_node else []
+
+
 def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the properties of the model for ``viewer info``, each a heading and a text."""
     meta = told.get("meta")
@@ -221,87 +256,32 @@ def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     return tuple(facts)
 
 
-_SINGLE = {"node", "center", "firstPersonBone"}
-_LISTS = {"bones"}
+def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
+    """Return facts about parts that are drawn in only one view, and about constraints."""
+    names = file.tree.names
+    shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
+    facts = [
+        (heading, ", ".join(part_name(file, node) for node, view in file.part_views.items()
+                            if view == wanted))
+        for heading, wanted in shown.items()
+    ]  # fmt: skip
+    facts.append((
+        "constraints",
+        ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
+    ))  # fmt: skip
+    if file.springs is not None:
+        facts.append(("springs", _spring_counts(file.springs)))
+    return tuple((heading, _shortened(text)) for heading, text in facts if text)
 
 
-def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
-    """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` name.
-
-    Parameters
-    ----------
-    extensions : mapping
-        Extensions of the root, as parsed from JSON.
-    n_nodes : int
-        Number of nodes; other indices are ignored.
-
-    >>> told = {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1, 9], "center": 2}]}}}
-    >>> sorted(_named_nodes(told, 3))
-    [1, 2]
-    """
-    found: set[int] = set()
-    stack: list[Any] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
-    while stack:
-        told = stack.pop()
-        if isinstance(told, list):
-            stack += told
-        elif isinstance(told, dict):
-            for name, value in told.items():
-                given = value if name in _LISTS and isinstance(value, list) else [value]
-                if name in _SINGLE or name in _LISTS:
-                    found.update(each for each in given if is_index(each, n_nodes))
-                else:
-                    stack.append(value)
-    return frozenset(found)
+def _spring_counts(springs: Springs) -> str:
+    parts = (
+        (springs.n_chains, "chain"),
+        (springs.n_joints, "joint"),
+        (springs.colliders.n_colliders, "collider"),
+    )
+    return ", ".join(f"{count} {word}{'s' * (count != 1)}" for count, word in parts if count)
 
 
-_VIEWS: dict[str, PartView] = {
-    "auto": "auto",
-    "both": "both",
-    "thirdpersononly": "third-person",
-    "firstpersononly": "first-person",
-}
-
-
-def _read_part_views(
-    file: NodeFile, told: Mapping[str, Any], version: int, pointer: str, source: Source
-) -> dict[int, PartView]:
-    """Return the view in which each annotated node's mesh is drawn.
-
-    Parameters
-    ----------
-    file : NodeFile
-        Nodes and meshes.
-    told : mapping
-        The VRM extension.
-    version : int
-        0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), 1 nodes
-        (``type: "firstPersonOnly"``).
-    pointer : str
-        JSON pointer to the extension.
-    source : Source
-        Records messages about invalid annotations, which are ignored.
-    """
-    listed = part(told, "firstPerson", "meshAnnotations")
-    found: dict[int, PartView] = {}
-    for index, each in enumerate(listed if isinstance(listed, list) else ()):
-        view = part(each, "firstPersonFlag" if version == 0 else "type")
-        known = _VIEWS.get(view.lower()) if isinstance(view, str) else None
-        nodes = _nodes(file, each, version)
-        if known is None or not nodes:
-            at = f"{pointer}/firstPerson/meshAnnotations/{index}"
-            source.warn("G006.first-person", at, found=str(view))
-            continue
-        found.update(dict.fromkeys(nodes, known))
-    return found
-
-
-def _nodes(file: NodeFile, each: Any, version: int) -> list[int]:
-    """Return the nodes whose mesh is annotated."""
-    if version == 0:
-        mesh = part(each, "mesh")
-        has_mesh = is_index(mesh, len(file.meshes))
-        return file.tree.with_mesh(mesh) if has_mesh else []
-    node = part(each, "node")
-    has_node = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0
-    return [node] if has_node else []
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"

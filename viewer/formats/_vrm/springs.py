@@ -9,14 +9,19 @@
         colliders       node, shape: sphere (offset, radius) or capsule (offset, tail, radius);
                         VRMC_springBone_extended_collider replaces the shape: also inside, or
                         plane (offset, normal)
+    VRM.secondaryAnimation (0.x)
+        boneGroups      bones (nodes), stiffiness, dragForce, gravityPower, gravityDir, hitRadius,
+                        center (node), colliderGroups; all nodes below a bone belong to the chain,
+                        each points at its first child, and the last one 7 cm further
+        colliderGroups  node, colliders (offset, radius)
 
-Version 0.x is in ``old_springs.py``.
+Vectors of version 0.x are in Unity's axes, whose z axis is reversed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -31,6 +36,36 @@ from viewer.rig.springs.springs import INSIDE, OUTSIDE, PLANE, Colliders, Spring
 _EXTENSION = "VRMC_springBone"
 EXTENDED = "VRMC_springBone_extended_collider"
 _DOWN = (0.0, -1.0, 0.0)
+
+_END = 0.07  # distance from the last joint to the swinging point, metres
+_TO_OURS = np.array([1.0, 1.0, -1.0])  # from the axes of Unity
+_Groups: TypeAlias = list[tuple[int, ...]]
+"""Colliders of each group."""
+
+
+@dataclass(frozen=True, slots=True)
+class _SpringJoint:
+    """One spring joint, and the settings of its chain."""
+
+    node: int
+    tail: Floats
+    stiffness: float
+    drag: float
+    gravity: Floats
+    radius: float
+    center: int
+    obstacles: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """A sphere, capsule or plane, as in ``Colliders``."""
+
+    node: int
+    offset: Floats
+    tail: Floats
+    radius: float
+    kind: int = OUTSIDE
 
 
 def read_springs(file: NodeFile, source: Source) -> Springs | None:
@@ -57,10 +92,9 @@ def read_springs(file: NodeFile, source: Source) -> Springs | None:
     for chain in chains:
         for joint in chain:
             found.setdefault(joint.node, joint)
-    return _springs([*found.values()], shapes, len(chains)) if found else None
-
-
-def _springs(joints: list[_SpringJoint], shapes: list[Shape], n_chains: int) -> Springs:
+    if not found:
+        return None
+    joints = [*found.values()]
     return Springs(
         joints=np.array([each.node for each in joints], np.int32),
         tails=np.array([each.tail for each in joints]),
@@ -77,14 +111,14 @@ def _springs(joints: list[_SpringJoint], shapes: list[Shape], n_chains: int) -> 
             np.array([each.kind for each in shapes], np.int32),
         ),
         obstacles=tuple(each.obstacles for each in joints),
-        n_chains=n_chains,
+        n_chains=len(chains),
     )
 
 
-def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[Shape], list[tuple[int, ...]]]:
+def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _Groups]:
     """Return the colliders of version 1.0, and the colliders of each group."""
     places: dict[int, int] = {}
-    shapes: list[Shape] = []
+    shapes: list[_Shape] = []
     for index, each in enumerate(listed(told, "colliders")):
         extended = part(each, "extensions", EXTENDED, "shape")
         told_shape = part(each, "shape") if extended is None else extended
@@ -102,7 +136,7 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[Shape], lis
     ]
 
 
-def _shape(node: Any, told: Any, n_nodes: int) -> Shape | None:
+def _shape(node: Any, told: Any, n_nodes: int) -> _Shape | None:
     """Return a collider of version 1.0, possibly an extended one; None if it is invalid."""
     kinds = [kind for kind in ("sphere", "capsule", "plane") if isinstance(part(told, kind), dict)]
     if not is_index(node, n_nodes) or len(kinds) != 1:
@@ -117,12 +151,12 @@ def _shape(node: Any, told: Any, n_nodes: int) -> Shape | None:
         normal = rows_of(part(given, "normal"), (0.0, 0.0, 1.0))
         if normal is None or not normal.any():
             return None
-        return Shape(node, offset, offset + normal, 0.0, PLANE)
-    return Shape(node, offset, tail, radius, INSIDE if part(given, "inside") is True else OUTSIDE)
+        return _Shape(node, offset, offset + normal, 0.0, PLANE)
+    return _Shape(node, offset, tail, radius, INSIDE if part(given, "inside") is True else OUTSIDE)
 
 
 def _chains(
-    file: NodeFile, told: Any, groups: list[tuple[int, ...]], source: Source
+    file: NodeFile, told: Any, groups: _Groups, source: Source
 ) -> Iterator[list[_SpringJoint]]:
     """Yield the chains of version 1.0."""
     for index, spring in enumerate(listed(told, "springs")):
@@ -134,7 +168,7 @@ def _chains(
 
 
 def _chain(
-    tree: NodeTree, spring: Any, joints: list[Any], groups: list[tuple[int, ...]]
+    tree: NodeTree, spring: Any, joints: list[Any], groups: _Groups
 ) -> list[_SpringJoint] | None:
     """Return the joints of a chain that point at the next one; None if it is invalid."""
     nodes = [part(each, "node") for each in joints]
@@ -164,32 +198,7 @@ def _chain(
     return chain
 
 
-@dataclass(frozen=True, slots=True)
-class _SpringJoint:
-    """One spring joint, and the settings of its chain."""
-
-    node: int
-    tail: Floats
-    stiffness: float
-    drag: float
-    gravity: Floats
-    radius: float
-    center: int
-    obstacles: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A sphere, capsule or plane, as in ``Colliders``."""
-
-    node: int
-    offset: Floats
-    tail: Floats
-    radius: float
-    kind: int = OUTSIDE
-
-
-def _obstacles_of(spring: Any, groups: list[tuple[int, ...]]) -> tuple[int, ...]:
+def _obstacles_of(spring: Any, groups: _Groups) -> tuple[int, ...]:
     """Return the colliders of a chain's groups, each once."""
     chosen = [g for g in listed(spring, "colliderGroups") if is_index(g, len(groups))]
     return tuple(dict.fromkeys(index for group in chosen for index in groups[group]))
@@ -207,57 +216,23 @@ def _tail_between(tree: NodeTree, head: int, tail: int) -> Floats | None:
     return place
 
 
-def _node_world(tree: NodeTree, node: int) -> Floats:
-    """Return the matrix from a node to the scene: (4, 4)."""
-    matrix = np.eye(4)
-    while node >= 0:
-        matrix = _node_matrix(tree, node) @ matrix
-        node = int(tree.parents[node])
-    return matrix
-
-
-def _node_matrix(tree: NodeTree, node: int) -> Floats:
-    """Return the matrix from a node to its parent: (4, 4)."""
-    if node in tree.matrices:
-        return tree.matrices[node]
-    matrix = np.eye(4)
-    matrix[:3, :3] = quaternion_to_matrix(tree.rotations[node]) * tree.scales[node]
-    matrix[:3, 3] = tree.translations[node]
-    return matrix
-
-
-# Spring chains of VRM 0.x, ``VRM.secondaryAnimation``.
-#
-# ::
-#
-#     boneGroups      bones (nodes), stiffiness, dragForce, gravityPower, gravityDir, hitRadius,
-#                     center (node), colliderGroups; all nodes below a bone belong to the chain,
-#                     each
-#                     points at its first child, and the last one 7 cm further
-#     colliderGroups  node, colliders (offset, radius)
-#
-# Vectors are in Unity's axes, whose z axis is reversed.
-_END = 0.07  # distance from the last joint to the swinging point, metres
-_TO_OURS = np.array([1.0, 1.0, -1.0])
-
-
-def _old_shapes(file: NodeFile, told: Any) -> tuple[list[Shape], list[tuple[int, ...]]]:
+def _old_shapes(file: NodeFile, told: Any) -> tuple[list[_Shape], _Groups]:
     """Return the colliders of version 0.x, and the colliders of each group."""
-    shapes: list[Shape] = []
-    groups: list[tuple[int, ...]] = []
+    shapes: list[_Shape] = []
+    groups: _Groups = []
     for each in listed(told, "colliderGroups"):
         first, node = len(shapes), part(each, "node")
         for given in listed(each, "colliders") if is_index(node, file.tree.n_nodes) else ():
             offset = _vector(part(given, "offset"), (0.0, 0.0, 0.0))
             radius = value_of(part(given, "radius"), 0.0)
             if offset is not None and radius is not None:
-                shapes.append(Shape(node, offset, offset, radius))
+                shapes.append(_Shape(node, offset, offset, radius))
         groups.append(tuple(range(first, len(shapes))))
     return shapes, groups
 
 
 def _old_chains(
-    file: NodeFile, told: Any, groups: list[tuple[int, ...]], source: Source
+    file: NodeFile, told: Any, groups: _Groups, source: Source
 ) -> Iterator[list[_SpringJoint]]:
     """Yield the chains of version 0.x, one for each root bone."""
     tree = file.tree
@@ -311,3 +286,22 @@ def _vector(told: Any, default: tuple[float, ...]) -> Floats | None:
         return np.array(default) * _TO_OURS
     found = rows_of([part(told, axis) or 0.0 for axis in "xyz"], default)
     return None if found is None else found * _TO_OURS
+
+
+def _node_world(tree: NodeTree, node: int) -> Floats:
+    """Return the matrix from a node to the scene: (4, 4)."""
+    matrix = np.eye(4)
+    while node >= 0:
+        matrix = _node_matrix(tree, node) @ matrix
+        node = int(tree.parents[node])
+    return matrix
+
+
+def _node_matrix(tree: NodeTree, node: int) -> Floats:
+    """Return the matrix from a node to its parent: (4, 4)."""
+    if node in tree.matrices:
+        return tree.matrices[node]
+    matrix = np.eye(4)
+    matrix[:3, :3] = quaternion_to_matrix(tree.rotations[node]) * tree.scales[node]
+    matrix[:3, 3] = tree.translations[node]
+    return matrix

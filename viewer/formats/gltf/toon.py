@@ -9,7 +9,7 @@
              floatProperties._ShadeToony, ._ShadeShift, …, which are translated to version 1.0
 
 Exporters also write the lit side's base colour, texture and opacity to the core material; those of
-version 0.x are replaced by ``_vrm/old.py``. With the cosine c of the angle of incidence, the
+version 0.x are replaced by ``_vrm/materials.py``. With the cosine c of the angle of incidence, the
 fraction of the lit colour rises linearly from 0 to 1 between c = toony - 1 - shift and
 c = 1 - toony - shift.
 """
@@ -58,22 +58,15 @@ _NOT_DRAWN = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Toon:
-    """Shading of a material that VRM declares toon-shaded or unlit.
-
-    Attributes
-    ----------
-    values : dict
-        Fields of ``Material``.
-    slots : mapping of Slot
-        Textures by field of ``Material``, or by fields of its rim light and outline:
-        ``"rim.texture"``.
-    core : Element or None
-        The core material with the members that VRM 0.x adds; None if it adds none.
-    """
+    """Shading of a material that VRM declares toon-shaded or unlit."""
 
     values: dict[str, Any] = field(default_factory=dict)
+    """Fields of ``Material``."""
     slots: Mapping[str, Slot] = field(default_factory=dict)
+    """Textures by field of ``Material``, or by fields of its rim light and outline:
+    ``"rim.texture"``."""
     core: Element | None = None
+    """The core material with the members that VRM 0.x adds; None if it adds none."""
 
 
 def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
