@@ -1,4 +1,10 @@
-"""Contents of an ``.fbx`` from the messages of the child process."""
+"""Contents of an ``.fbx``: messages of the child process, checked and converted.
+
+The child runs once for everything except the keys, and once more for the keys of each animation
+that is played. Its numbers must be finite and within reach, and its indices must exist. A mesh is
+repeated for each list of materials and each placement with which nodes show it. Cameras get nodes
+of their own, which turn them from +x to -z.
+"""
 
 from __future__ import annotations
 
@@ -41,14 +47,35 @@ from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.material import Material, Texture
 from viewer.rig.units import METRES, UNIT_NAMES
 
-_STRAIGHT = 180.0  # limit of a field of view, degrees
-
-# Translation, rotation and scale that turn -z to +x: -90 degrees about y.
-_TO_CAMERA = np.array([0.0, 0.0, 0.0, 0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5), 1.0, 1.0, 1.0])
 _BINARY = b"Kaydara FBX Binary"  # first bytes of the binary variant
 _UNSTRUCTURED = re.compile(rb'"[^"]*"|;[^\n]*')  # strings and comments of the text variant
 _STACKED = 7000  # version since which animations are objects instead of a last section, Takes
 _CONNECTED = 6000  # version since which objects are connected by a section of their own
+_STRAIGHT = 180.0  # limit of a field of view, degrees
+
+# Translation, rotation and scale that turn -z to +x: -90 degrees about y.
+_TO_CAMERA = np.array([0.0, 0.0, 0.0, 0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5), 1.0, 1.0, 1.0])
+
+_LEAST_ALPHA = 255  # minimum alpha of opaque pixels
+
+_WHAT = {
+    "vertices": "position",
+    "normals": "normal",
+    "colors": "color",
+    "matrices": "bind-matrix",
+    "weights": "weight",
+    "blend": "weight",
+    "offsets": "offset",
+}
+"""Phrase of a number in an array of a mesh, by the array's name."""
+
+# Limits of the child process.
+_SECONDS = 60.0  # time limit for the smallest files, seconds
+_STEP = 1 << 20  # bytes per step, which take about 0.1 s to read
+_SECONDS_PER_STEP = 2.0  # seconds added to the time limit for each step
+_MEMORY = 4 << 30  # bytes that the child may use for the smallest files
+_MEMORY_PER_BYTE = 64  # bytes added for each byte of the file
+_WORKER = "viewer.formats.fbx.worker"
 
 
 def node_file(source: Source) -> NodeFile:
@@ -101,6 +128,59 @@ def node_file(source: Source) -> NodeFile:
         named_nodes=frozenset(range(n_joints) if told["stacks"] else ()),
         asset={"generator": told["creator"], "version": f"{told['version'] / 1000:g}"},
     )
+
+
+def _run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]:
+    """Run the worker on a file, and return its message."""
+    if find_spec("ufbx") is None:
+        raise source.fault("F001.fbx-extra")
+    if source.is_piped:
+        # The library reads files, in any order.
+        prefix = new_prefix(tempfile.gettempdir(), "viewer-fbx")
+        with tempfile.TemporaryDirectory(prefix=prefix) as folder:
+            path = Path(folder, "piped.fbx")
+            path.write_bytes(source.data)
+            return _run(source, path, arguments)
+    return _run(source, source.path.resolve(), arguments)
+
+
+def _run(source: Source, path: Path, arguments: Sequence[str]) -> tuple[Arrays, dict[str, Any]]:
+    size = path.stat().st_size
+    seconds = _SECONDS + _SECONDS_PER_STEP * (size / _STEP)
+    command = [sys.executable, "-m", _WORKER, str(path), *arguments]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=seconds,
+            env=_environment(_MEMORY + _MEMORY_PER_BYTE * size),
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise source.fault("F001.fbx-slow", seconds=seconds) from None
+    message = unpacked(done.stdout) if done.returncode == 0 else None
+    if message is None:
+        raise source.fault("F001.fbx-crash", how=_ending(done.returncode, done.stderr))
+    if "error" in message[1]:
+        raise source.fault("F002.fbx", reason=message[1]["error"])
+    return message
+
+
+def _environment(memory: int) -> dict[str, str]:
+    """Return the child's environment, in which it finds this package and uses one thread."""
+    package = str(Path(viewer.__file__).resolve().parents[1])
+    paths = filter(None, (package, os.environ.get("PYTHONPATH", "")))
+    limits = {"VIEWER_FBX_MEMORY": str(memory), "OPENBLAS_NUM_THREADS": "1"}
+    return {**os.environ, **limits, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _ending(code: int, errors: bytes) -> Phrase:
+    """Return a phrase that describes how a process ended."""
+    if code < 0:
+        return Phrase("ended-by-signal", number=-code)
+    lines = errors.decode(errors="replace").strip().splitlines()
+    return Phrase("ended-with-error", code=code, error=lines[-1] if lines else "")
 
 
 def _check_end(source: Source, version: int) -> None:
@@ -159,18 +239,6 @@ def _check_indices(source: Source, arrays: Arrays, told: dict[str, Any]) -> None
             raise source.fault("F002.vertex-range", item=place, last=last, found=found)
 
 
-_WHAT = {
-    "vertices": "position",
-    "normals": "normal",
-    "colors": "color",
-    "matrices": "bind-matrix",
-    "weights": "weight",
-    "blend": "weight",
-    "offsets": "offset",
-}
-"""Phrase of a number in an array of a mesh, by the array's name."""
-
-
 def _place(told: dict[str, Any], name: str, row: int) -> Phrase:
     """Return where an array of the contents stands in the file."""
     if name in ("local", "geometry"):
@@ -190,6 +258,29 @@ def _place_of_keys(told: dict[str, Any], track: dict[str, Any]) -> Phrase:
         rows = [shape for mesh in told["meshes"] for shape in mesh["shapes"]]
         name = next((r["name"] for r in rows if r["element"] == track["element"]), "")
     return Phrase("fbx-keys", node=name, path=track["path"])
+
+
+def _say_unused(source: Source, told: dict[str, Any]) -> None:
+    """Report unused elements of the file, and converted axes or units."""
+    if told["unused"]:
+        items = [counted(n, word) for word, n in told["unused"].items()]
+        source.warn("F007.fbx-unused", items=items)
+    for text in told["warnings"]:
+        source.warn("F007.fbx-warning", text=text)
+    if told["converted"]:
+        names = {"target_axes": "axes", "target_unit_meters": "unit"}
+        what = [names[key] for key in told["converted"] if key in names]
+        to = [Phrase("fbx-axes") if name == "axes" else UNIT_NAMES["m"] for name in what]
+        source.warn("F007.fbx-converted", what=what, to=to)
+
+
+def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, Any]) -> None:
+    """Report the properties of a mesh that have no equivalent."""
+    if mesh["color_sets"] > 1:
+        source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
+    for shape in mesh["shapes"]:
+        if shape["place"] == len(shape["targets"]) - 1 > 0:
+            source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["place"])
 
 
 def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera, ...], Ints]:
@@ -242,29 +333,6 @@ def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints, cameras: 
 
 def _unit(metres: float) -> str:
     return min(METRES, key=lambda name: abs(np.log(METRES[name] / metres)))
-
-
-def _say_unused(source: Source, told: dict[str, Any]) -> None:
-    """Report unused elements of the file, and converted axes or units."""
-    if told["unused"]:
-        items = [counted(n, word) for word, n in told["unused"].items()]
-        source.warn("F007.fbx-unused", items=items)
-    for text in told["warnings"]:
-        source.warn("F007.fbx-warning", text=text)
-    if told["converted"]:
-        names = {"target_axes": "axes", "target_unit_meters": "unit"}
-        what = [names[key] for key in told["converted"] if key in names]
-        to = [Phrase("fbx-axes") if name == "axes" else UNIT_NAMES["m"] for name in what]
-        source.warn("F007.fbx-converted", what=what, to=to)
-
-
-def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, Any]) -> None:
-    """Report the properties of a mesh that have no equivalent."""
-    if mesh["color_sets"] > 1:
-        source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
-    for shape in mesh["shapes"]:
-        if shape["place"] == len(shape["targets"]) - 1 > 0:
-            source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["place"])
 
 
 def _animations(source: Source, told: dict[str, Any]) -> tuple[NodeAnimation, ...]:
@@ -372,9 +440,6 @@ def _crossings(table: Floats, targets: list[float]) -> Floats:
     return np.concatenate(found)
 
 
-_LEAST_ALPHA = 255  # minimum alpha of opaque pixels
-
-
 def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[Material, ...]:
     """Return all materials of a message; textures may be inside the file or next to it.
 
@@ -475,70 +540,3 @@ def _picture(source: Source, content: bytes, name: str) -> Bytes | None:
     except FormatError as problem:
         source.warn("F005.texture", problem=problem.diagnostic)
         return None
-
-
-_SECONDS = 60.0  # time limit for the smallest files, seconds
-_STEP = 1 << 20  # bytes per step, which take about 0.1 s to read
-_SECONDS_PER_STEP = 2.0  # seconds added to the time limit for each step
-_MEMORY = 4 << 30  # bytes that the child may use for the smallest files
-_MEMORY_PER_BYTE = 64  # bytes added for each byte of the file
-_WORKER = "viewer.formats.fbx.worker"
-
-
-def _run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]:
-    """Run the worker on a file, and return its message.
-
-    Raises
-    ------
-    FormatError
-        If the library is missing, refuses the file, crashes, or takes too long.
-    """
-    if find_spec("ufbx") is None:
-        raise source.fault("F001.fbx-extra")
-    if source.is_piped:
-        # The library reads files, in any order.
-        prefix = new_prefix(tempfile.gettempdir(), "viewer-fbx")
-        with tempfile.TemporaryDirectory(prefix=prefix) as folder:
-            path = Path(folder, "piped.fbx")
-            path.write_bytes(source.data)
-            return _run(source, path, arguments)
-    return _run(source, source.path.resolve(), arguments)
-
-
-def _run(source: Source, path: Path, arguments: Sequence[str]) -> tuple[Arrays, dict[str, Any]]:
-    size = path.stat().st_size
-    seconds = _SECONDS + _SECONDS_PER_STEP * (size / _STEP)
-    command = [sys.executable, "-m", _WORKER, str(path), *arguments]
-    try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=seconds,
-            env=_environment(_MEMORY + _MEMORY_PER_BYTE * size),
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise source.fault("F001.fbx-slow", seconds=seconds) from None
-    message = unpacked(done.stdout) if done.returncode == 0 else None
-    if message is None:
-        raise source.fault("F001.fbx-crash", how=_ending(done.returncode, done.stderr))
-    if "error" in message[1]:
-        raise source.fault("F002.fbx", reason=message[1]["error"])
-    return message
-
-
-def _environment(memory: int) -> dict[str, str]:
-    """Return the child's environment, in which it finds this package and uses one thread."""
-    package = str(Path(viewer.__file__).resolve().parents[1])
-    paths = filter(None, (package, os.environ.get("PYTHONPATH", "")))
-    limits = {"VIEWER_FBX_MEMORY": str(memory), "OPENBLAS_NUM_THREADS": "1"}
-    return {**os.environ, **limits, "PYTHONPATH": os.pathsep.join(paths)}
-
-
-def _ending(code: int, errors: bytes) -> Phrase:
-    """Return a phrase that describes how a process ended."""
-    if code < 0:
-        return Phrase("ended-by-signal", number=-code)
-    lines = errors.decode(errors="replace").strip().splitlines()
-    return Phrase("ended-with-error", code=code, error=lines[-1] if lines else "")

@@ -18,24 +18,17 @@ from viewer.rig.arrays import Floats, Ints
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """One mesh of the message, at one of its nodes.
-
-    Attributes
-    ----------
-    prefix : str
-        Prefix of the names of its arrays.
-    told : dict
-        Parsed JSON of the mesh.
-    materials : list of int
-        Material of each slot, to which its faces refer.
-    placement : (4, 4)
-        Geometry to node; the identity for skinned meshes, whose inverse bind matrices include it.
-    """
+    """One mesh of the message, at one of its nodes."""
 
     prefix: str
+    """Prefix of the names of its arrays."""
     told: dict[str, Any]
+    """Parsed JSON of the mesh."""
     materials: list[int]
+    """Material of each slot, to which its faces refer."""
     placement: Floats
+    """Geometry to node, (4, 4); the identity for skinned meshes, whose inverse bind matrices
+    include it."""
 
 
 def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
