@@ -31,30 +31,20 @@ _NEARLY_SCENE = 1e-3
 
 @dataclass(slots=True, eq=False)
 class Bindings:
-    """The bindings of a figure so far.
-
-    Attributes
-    ----------
-    joints : Joints
-        The figure's joints; auxiliary ones are appended.
-    worlds : (J, 4, 4)
-        Rest transforms of the nodes' joints.
-    matrices : dict of (4, 4)
-        Inverse bind matrix of each bound joint.
-    slots : dict of (M,) int32
-        Joint of each slot of a skin.
-    baked : dict of (4, 4)
-        A of each skin: mesh space to binding space.
-    rigid : dict of (int, (4, 4))
-        Joint of each node with an attached mesh, and its A.
-    """
+    """The bindings of a figure so far."""
 
     joints: Joints
+    """The figure's joints; auxiliary ones are appended."""
     worlds: Floats
+    """Rest transforms of the nodes' joints: (J, 4, 4)."""
     matrices: dict[int, Floats] = field(default_factory=dict)
+    """Inverse bind matrix of each bound joint: (4, 4)."""
     slots: dict[int, Ints] = field(default_factory=dict)
+    """Joint of each slot of a skin: (M,) int32."""
     baked: dict[int, Floats] = field(default_factory=dict)
+    """A of each skin, (4, 4): mesh space to binding space."""
     rigid: dict[int, tuple[int, Floats]] = field(default_factory=dict)
+    """Joint of each node with an attached mesh, and its A."""
 
 
 def bind_skins(joints: Joints, worlds: Floats, skins: dict[int, NodeSkin]) -> Bindings:

@@ -28,40 +28,85 @@ REACH = 1e18
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NodeTree:
-    """All nodes of a file, in file order, as parallel arrays.
+class NodeFile:
+    """Everything in a file of nodes."""
 
-    Attributes
-    ----------
-    names : tuple of N str
-        As in the file; may repeat or be empty.
-    parents : (N,) int32
-        -1 for a root; a parent may come after its children.
-    translations, rotations, scales : (N, 3), (N, 4), (N, 3)
-        Local transform T R S; unit quaternions (x, y, z, w).
-    matrices : dict of (4, 4)
-        Local matrices of nodes that shear and therefore cannot be expressed as T R S. Their rows in
-        the three arrays above contain the identity.
-    meshes, skins, cameras : (N,) int32
-        Indices of each node's mesh, skin and camera, -1 for none.
-    shape_weights : dict of (S,)
-        Morph target weights of the nodes that override those of their mesh.
-    extras, extensions : dict
-        Application data and extensions by node, as parsed from JSON.
-    """
+    name: str
+    """The file's name without its suffix."""
+    tree: NodeTree
+    """All nodes."""
+    roots: tuple[int, ...]
+    """Root nodes of the scene that is shown."""
+    meshes: tuple[NodeMesh, ...] = ()
+    skins: tuple[NodeSkin, ...] = ()
+    materials: tuple[Material, ...] = ()
+    animations: tuple[NodeAnimation, ...] = ()
+    cameras: tuple[NodeCamera, ...] = ()
+    """In file order; referred to by index."""
+    up: Literal["y", "z"] = "y"
+    """Up axis of the file."""
+    unit: str = "m"
+    """Unit of length, a key of ``viewer.rig.units.METRES``; empty if unknown."""
+    extensions: Mapping[str, Any] = field(default_factory=dict)
+    """Parsed JSON of the root's extensions, such as ``VRMC_vrm``."""
+    extras: Any = None
+    """Application data of the root, as parsed from JSON; None if there is none."""
+    asset: Mapping[str, Any] = field(default_factory=dict)
+    """Generator, copyright and the like."""
+    scene: Mapping[str, Any] = field(default_factory=dict)
+    """Name and application data of the scene that is shown, as parsed from JSON."""
+    unkept: Callable[[], tuple[str, ...]] = tuple
+    """Returns the members of the file that are not read, such as ``images.extras``."""
+    lost_nodes: tuple[str, ...] = ()
+    """Names of the nodes that are neither joints, meshes nor cameras."""
+    contents: Callable[[], tuple[Phrase, ...]] = tuple
+    """Returns what the file holds, as parts of a message; empty if unknown."""
+    humanoid: Mapping[str, int] = field(default_factory=dict)
+    """Node of each human bone, by its name in VRM 1.0; empty if the file states none."""
+    expressions: tuple[NodeExpression, ...] = ()
+    """Facial expressions."""
+    constraints: tuple[Constraint, ...] = ()
+    """Nodes (instead of joints) that follow others, in the order of evaluation."""
+    part_views: Mapping[int, PartView] = field(default_factory=dict)
+    """The views in which the meshes of some nodes are drawn."""
+    springs: Springs | None = None
+    """Spring nodes (instead of joints)."""
+    named_nodes: frozenset[int] = frozenset()
+    """Further nodes that must become joints, because extensions refer to them."""
+    toon: Mapping[int, Any] = field(default_factory=dict)
+    """Toon and unlit extensions of materials by index, as parsed from JSON."""
+    textures: StoredTextures | None = None
+    """Textures as the file lists them."""
+    facts: tuple[tuple[str, str], ...] = ()
+    """Further properties for ``viewer info``, each a heading and a text."""
+    has_pointers: bool = False
+    """Whether elements have JSON pointers, such as ``/nodes/3``."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeTree:
+    """All nodes of a file, in file order, as parallel arrays."""
 
     names: tuple[str, ...]
+    """As in the file; may repeat or be empty."""
     parents: Ints
+    """-1 for a root; a parent may come after its children: (N,) int32."""
     translations: Floats
     rotations: Floats
     scales: Floats
+    """Local transform T R S, unit quaternions (x, y, z, w): (N, 3), (N, 4), (N, 3)."""
     meshes: Ints
     skins: Ints
     cameras: Ints
+    """Indices of each node's mesh, skin and camera, -1 for none: (N,) int32."""
     matrices: Mapping[int, Floats] = field(default_factory=dict)
+    """Local matrices of nodes that shear and therefore cannot be expressed as T R S, (4, 4). Their
+    translation, rotation and scale are those of the identity."""
     shape_weights: Mapping[int, Floats] = field(default_factory=dict)
+    """Morph target weights of the nodes that override those of their mesh: (S,)."""
     extras: Mapping[int, Any] = field(default_factory=dict)
     extensions: Mapping[int, Any] = field(default_factory=dict)
+    """Application data and extensions by node, as parsed from JSON."""
 
     @property
     def n_nodes(self) -> int:
@@ -74,296 +119,54 @@ class NodeTree:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Primitive:
-    """Triangles with one material; no other primitive uses the vertices.
+class NodeMesh:
+    """Primitives that share one name and one list of morph targets."""
 
-    Attributes
-    ----------
-    positions : (V, 3)
-        Mesh space, file units.
-    triangles : (T, 3) int32
-        Counter-clockwise from outside.
-    normals : (V, 3) or None
-        None if the file has none: the surface is flat shaded (glTF) or smoothed by the importer.
-    uvs : tuple of (V, 2)
-        Texture coordinate sets, v = 0 at the bottom row of the image.
-    colors : (V, 4) or None
-        Linear vertex colours with opacity, which multiply the material's base colour.
-    joints, weights : (V, K) int32, (V, K) or None
-        Influences of all sets in one table: indices into the skin's joints. Weights are as
-        stored, unused slots are 0.
-    dqs_fractions : (V,) or None
-        Fraction of dual quaternion skinning of each vertex, for skins with the method ``"mix"``.
-    material : int
-        Index into ``NodeFile.materials``, -1 for none.
-    targets : MorphTargets or None
-        Offsets of the positions for each morph target of the mesh.
-    normal_targets : MorphTargets or None
-        Offsets of the normals; None if the file has none.
-    pointer : str
-        JSON pointer to it; empty for files without JSON.
-    tangents : callable or None
-        Returns the directions of u in mesh space and the signs of the directions of v, (V, 4), or
-        None if they are invalid.
-    """
+    name: str
+    """As in the file."""
+    primitives: tuple[Primitive, ...]
+    """In file order; empty if the file has only points or lines."""
+    target_names: tuple[str, ...] = ()
+    """Names of the morph targets; empty strings without a name."""
+    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    """Default weights of the morph targets: (S,)."""
+    extras: Any = None
+    """Application data, as parsed from JSON; None if there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Primitive:
+    """Triangles with one material; no other primitive uses the vertices."""
 
     positions: Floats
+    """Mesh space, file units: (V, 3)."""
     triangles: Ints
+    """Counter-clockwise from outside: (T, 3) int32."""
     normals: Floats | None = None
+    """(V, 3); None if the file has none: the surface is flat shaded (glTF) or smoothed by the
+    importer."""
     uvs: tuple[Floats, ...] = ()
+    """Texture coordinate sets, v = 0 at the bottom row of the image: (V, 2)."""
     colors: Floats | None = None
+    """Linear vertex colours with opacity, which multiply the material's base colour: (V, 4)."""
     joints: Ints | None = None
     weights: Floats | None = None
+    """(V, K) int32, (V, K); influences of all sets in one table: indices into the skin's joints.
+    Weights are as stored, unused slots are 0."""
     dqs_fractions: Floats | None = None
+    """Fraction of dual quaternion skinning of each vertex, for skins with the method ``"mix"``:
+    (V,)."""
     material: int = -1
+    """Index into ``NodeFile.materials``, -1 for none."""
     targets: MorphTargets | None = None
+    """Offsets of the positions for each morph target of the mesh."""
     normal_targets: MorphTargets | None = None
+    """Offsets of the normals; None if the file has none."""
     pointer: str = ""
+    """JSON pointer to it; empty for files without JSON."""
     tangents: Callable[[], Floats | None] | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeMesh:
-    """Primitives that share one name and one list of morph targets.
-
-    Attributes
-    ----------
-    name : str
-        As in the file.
-    primitives : tuple of Primitive
-        In file order; empty if the file has only points or lines.
-    target_names : tuple of S str
-        Names of the morph targets; empty strings without a name.
-    shape_weights : (S,)
-        Default weights of the morph targets.
-    extras : Any
-        Application data, as parsed from JSON; None if there is none.
-    """
-
-    name: str
-    primitives: tuple[Primitive, ...]
-    target_names: tuple[str, ...] = ()
-    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
-    extras: Any = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeSkin:
-    """Joints that deform meshes.
-
-    Attributes
-    ----------
-    name : str
-        As in the file.
-    joints : (M,) int32
-        Node of each joint.
-    inverse_bind : (M, 4, 4)
-        Mesh-to-joint matrices at bind time; identities if the file has none.
-    method : "lbs", "dqs" or "mix"
-        Skinning method requested by the file.
-    """
-
-    name: str
-    joints: Ints
-    inverse_bind: Floats
-    method: Literal["lbs", "dqs", "mix"] = "lbs"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeChannel:
-    """Keys of one property of one node; see ``viewer.rig.motion.transform_clip``.
-
-    Attributes
-    ----------
-    node : int
-        Node that moves.
-    path : str
-        ``"translation"``, ``"rotation"``, ``"scale"`` or ``"weights"``.
-    times : (N,)
-        Seconds, increasing.
-    values : (N, C)
-        C = 3, 4 (quaternions, not necessarily of unit length), 3, or S.
-    interpolation : str
-        ``"step"``, ``"linear"`` or ``"cubic"``.
-    tangents : (N, 2, C) or None
-        Incoming and outgoing slopes per second; only for ``"cubic"``.
-    """
-
-    node: int
-    path: TransformPath
-    times: Floats
-    values: Floats
-    interpolation: Interpolation = "linear"
-    tangents: Floats | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeAnimation:
-    """A named animation, whose keys are read when it is first played.
-
-    Attributes
-    ----------
-    name : str
-        As in the file; may repeat or be empty.
-    start, end : float
-        Seconds of the first and the last key.
-    nodes : frozenset of int
-        Nodes that it moves.
-    read : callable
-        Returns the channels; called at most once, may raise a ``FormatError``.
-    pointer : str
-        JSON pointer to it; empty for files without JSON.
-    extras : Any
-        Application data, as parsed from JSON; None if there is none.
-    """
-
-    name: str
-    start: float
-    end: float
-    nodes: frozenset[int]
-    read: Callable[[], tuple[NodeChannel, ...]]
-    pointer: str = ""
-    extras: Any = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeCamera:
-    """A perspective or orthographic camera that looks along -z of its node, y up.
-
-    Attributes
-    ----------
-    name : str
-        As in the file.
-    vertical_angle : float or None
-        Vertical field of view in radians; None for an orthographic camera.
-    aspect : float or None
-        Width divided by height, if the file specifies it.
-    height : float
-        Height of an orthographic camera's view, file units.
-    near, far : float or None
-        Distances of the clipping planes, file units; None if there is none.
-    """
-
-    name: str
-    vertical_angle: float | None
-    aspect: float | None = None
-    height: float = 0.0
-    near: float | None = None
-    far: float | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeExpression:
-    """A facial expression: a weighted sum of morph targets; see ``viewer.rig.expressions``.
-
-    Attributes
-    ----------
-    name : str
-        As in the file.
-    binds : tuple of (int, int, float)
-        Node, morph target of its mesh, and the weight of that target at weight 1.
-    is_binary : bool
-        Whether it is always either fully on or off.
-    kind : str
-        Key of ``PROCEDURAL``; empty for other expressions.
-    overrides : dict of str
-        Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
-    materials : tuple of (int, str, (4,))
-        Material, kind and target of each change of a material; see ``MaterialBinds``.
-    preset : str
-        Name in VRM 1.0; empty if there is none.
-    """
-
-    name: str
-    binds: tuple[tuple[int, int, float], ...]
-    is_binary: bool = False
-    kind: str = ""
-    overrides: Mapping[str, str] = field(default_factory=dict)
-    materials: tuple[tuple[int, str, Floats], ...] = ()
-    preset: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NodeFile:
-    """Everything in a file of nodes.
-
-    Attributes
-    ----------
-    name : str
-        The file's name without its suffix.
-    tree : NodeTree
-        All nodes.
-    roots : tuple of int
-        Root nodes of the scene that is shown.
-    meshes, skins, materials, animations, cameras : tuple
-        In file order; referred to by index.
-    up : "y" or "z"
-        Up axis of the file.
-    unit : str
-        Unit of length, a key of ``viewer.rig.units.METRES``; empty if unknown.
-    extensions : dict
-        Parsed JSON of the root's extensions, such as ``VRMC_vrm``.
-    extras : Any
-        Application data of the root, as parsed from JSON; None if there is none.
-    asset : dict
-        Generator, copyright and the like.
-    scene : dict
-        Name and application data of the scene that is shown, as parsed from JSON.
-    unkept : callable
-        Returns the members of the file that are not read, such as ``images.extras``.
-    lost_nodes : tuple of str
-        Names of the nodes that are neither joints, meshes nor cameras.
-    contents : callable
-        Returns what the file holds, as parts of a message; empty if unknown.
-    humanoid : dict of int
-        Node of each human bone, by its name in VRM 1.0; empty if the file states none.
-    expressions : tuple of NodeExpression
-        Facial expressions.
-    constraints : tuple of Constraint
-        Nodes (instead of joints) that follow others, in the order of evaluation.
-    part_views : dict of PartView
-        The views in which the meshes of some nodes are drawn.
-    springs : Springs or None
-        Spring nodes (instead of joints).
-    named_nodes : frozenset of int
-        Further nodes that must become joints, because extensions refer to them.
-    toon : dict
-        Toon and unlit extensions of materials by index, as parsed from JSON.
-    textures : StoredTextures or None
-        Textures as the file lists them.
-    facts : tuple of (str, str)
-        Further properties for ``viewer info``, each a heading and a text.
-    has_pointers : bool
-        Whether elements have JSON pointers, such as ``/nodes/3``.
-    """
-
-    name: str
-    tree: NodeTree
-    roots: tuple[int, ...]
-    meshes: tuple[NodeMesh, ...] = ()
-    skins: tuple[NodeSkin, ...] = ()
-    materials: tuple[Material, ...] = ()
-    animations: tuple[NodeAnimation, ...] = ()
-    cameras: tuple[NodeCamera, ...] = ()
-    up: Literal["y", "z"] = "y"
-    unit: str = "m"
-    extensions: Mapping[str, Any] = field(default_factory=dict)
-    extras: Any = None
-    asset: Mapping[str, Any] = field(default_factory=dict)
-    scene: Mapping[str, Any] = field(default_factory=dict)
-    unkept: Callable[[], tuple[str, ...]] = tuple
-    lost_nodes: tuple[str, ...] = ()
-    contents: Callable[[], tuple[Phrase, ...]] = tuple
-    humanoid: Mapping[str, int] = field(default_factory=dict)
-    expressions: tuple[NodeExpression, ...] = ()
-    constraints: tuple[Constraint, ...] = ()
-    part_views: Mapping[int, PartView] = field(default_factory=dict)
-    springs: Springs | None = None
-    named_nodes: frozenset[int] = frozenset()
-    toon: Mapping[int, Any] = field(default_factory=dict)
-    textures: StoredTextures | None = None
-    facts: tuple[tuple[str, str], ...] = ()
-    has_pointers: bool = False
+    """Returns the directions of u in mesh space and the signs of the directions of v, (V, 4), or
+    None if they are invalid."""
 
 
 Moved: TypeAlias = tuple[NDArray[np.intp], Floats]
@@ -430,6 +233,94 @@ class MorphTargets:
             vertices, offsets = self.moved(target)
             result[target, vertices] = offsets
         return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeSkin:
+    """Joints that deform meshes."""
+
+    name: str
+    """As in the file."""
+    joints: Ints
+    """Node of each joint: (M,) int32."""
+    inverse_bind: Floats
+    """Mesh-to-joint matrices at bind time, (M, 4, 4); identities if the file has none."""
+    method: Literal["lbs", "dqs", "mix"] = "lbs"
+    """Skinning method requested by the file."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeAnimation:
+    """A named animation, whose keys are read when it is first played."""
+
+    name: str
+    """As in the file; may repeat or be empty."""
+    start: float
+    end: float
+    """Seconds of the first and the last key."""
+    nodes: frozenset[int]
+    """Nodes that it moves."""
+    read: Callable[[], tuple[NodeChannel, ...]]
+    """Returns the channels; called at most once, may raise a ``FormatError``."""
+    pointer: str = ""
+    """JSON pointer to it; empty for files without JSON."""
+    extras: Any = None
+    """Application data, as parsed from JSON; None if there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeChannel:
+    """Keys of one property of one node; see ``viewer.rig.motion.transform_clip``."""
+
+    node: int
+    """Node that moves."""
+    path: TransformPath
+    """``"translation"``, ``"rotation"``, ``"scale"`` or ``"weights"``."""
+    times: Floats
+    """Seconds, increasing: (N,)."""
+    values: Floats
+    """C = 3, 4 (quaternions, not necessarily of unit length), 3, or S: (N, C)."""
+    interpolation: Interpolation = "linear"
+    """``"step"``, ``"linear"`` or ``"cubic"``."""
+    tangents: Floats | None = None
+    """Incoming and outgoing slopes per second, (N, 2, C); only for ``"cubic"``."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeCamera:
+    """A perspective or orthographic camera that looks along -z of its node, y up."""
+
+    name: str
+    """As in the file."""
+    vertical_angle: float | None
+    """Vertical field of view in radians; None for an orthographic camera."""
+    aspect: float | None = None
+    """Width divided by height, if the file specifies it."""
+    height: float = 0.0
+    """Height of an orthographic camera's view, file units."""
+    near: float | None = None
+    far: float | None = None
+    """Distances of the clipping planes, file units; None if there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeExpression:
+    """A facial expression: a weighted sum of morph targets; see ``viewer.rig.expressions``."""
+
+    name: str
+    """As in the file."""
+    binds: tuple[tuple[int, int, float], ...]
+    """Node, morph target of its mesh, and the weight of that target at weight 1."""
+    is_binary: bool = False
+    """Whether it is always either fully on or off."""
+    kind: str = ""
+    """Key of ``PROCEDURAL``; empty for other expressions."""
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    """Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``."""
+    materials: tuple[tuple[int, str, Floats], ...] = ()
+    """Material, kind and target of each change of a material; see ``MaterialBinds``."""
+    preset: str = ""
+    """Name in VRM 1.0; empty if there is none."""
 
 
 def path_to_root(parents: Sequence[int] | Ints, node: int) -> list[int]:

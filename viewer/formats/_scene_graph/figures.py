@@ -1,4 +1,4 @@
-"""Figures made from the contents of a file of nodes."""
+"""Figures made from the contents of a file of nodes: their parts, records, facts and messages."""
 
 from __future__ import annotations
 
@@ -34,7 +34,23 @@ from viewer.rig.skeleton import Skeleton
 if TYPE_CHECKING:
     from viewer.formats._source import Source
 
-_MOST_VERTICES = 1 << 27
+_MOST_VERTICES = 1 << 27  # of all parts of all figures
+_LONGEST = 200  # maximum number of characters of a fact
+
+_ASSET = ("version", "generator", "copyright")
+
+_ATTRIBUTES = {"positions": "POSITION", "normals": "NORMAL", "weights": "WEIGHTS_0"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """A figure, its record and joints, its primitives, and the nodes that move it."""
+
+    figure: Figure
+    record: FileRecord
+    joints: Joints
+    pieces: list[Piece]
+    moved: set[int]
 
 
 def figure_group(file: NodeFile, source: Source) -> FigureGroup:
@@ -89,6 +105,20 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
 
 
+def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
+    """Refuse a file whose meshes, repeated at many nodes, would exhaust the memory."""
+    sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
+    meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
+    count = sum(sizes[mesh] for mesh in meshes)
+    if count > _MOST_VERTICES:
+        raise source.fault("F002.many-vertices", most=_MOST_VERTICES, found=count)
+
+
+def _above(file: NodeFile, cameras: set[int]) -> set[int]:
+    """Return the nodes of some cameras and the nodes above them."""
+    return with_ancestors(file.tree.parents.tolist(), cameras)
+
+
 def _lost_nodes(file: NodeFile, groups: list[Members], written: set[int]) -> tuple[str, ...]:
     """Return the names of the nodes that are neither joints, meshes, cameras nor above these.
 
@@ -104,22 +134,6 @@ def _lost_nodes(file: NodeFile, groups: list[Members], written: set[int]) -> tup
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Made:
-    """A figure, its record and joints, its primitives, and the nodes that move it."""
-
-    figure: Figure
-    record: FileRecord
-    joints: Joints
-    pieces: list[Piece]
-    moved: set[int]
-
-
-def _above(file: NodeFile, cameras: set[int]) -> set[int]:
-    """Return the nodes of some cameras and the nodes above them."""
-    return with_ancestors(file.tree.parents.tolist(), cameras)
-
-
 def _figure(
     file: NodeFile, members: Members, readers: list[Reader], source: Source, beside: set[int]
 ) -> _Made:
@@ -132,7 +146,7 @@ def _figure(
     matrices = inverse_binds(bindings)
     _check_positions(joints, worlds, matrices, pieces, source)
     columns = shape_columns(file, members.meshes, readers)
-    record = record_of(file, joints, members.meshes, columns, pieces)
+    record = _record_of(file, joints, members.meshes, columns, pieces)
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
@@ -161,6 +175,10 @@ def _worlds(joints: Joints, source: Source) -> Floats:
     return worlds
 
 
+def _is_skinned(file: NodeFile, node: int) -> bool:
+    return is_skinned(file.meshes[int(file.tree.meshes[node])], int(file.tree.skins[node]))
+
+
 def _check_positions(
     joints: Joints, worlds: Floats, inverse_bind: Floats, pieces: list[Piece], source: Source
 ) -> None:
@@ -178,94 +196,14 @@ def _check_positions(
             raise source.fault("F003.bind-reach", joint=name, limit=REACH)
 
 
-def _is_skinned(file: NodeFile, node: int) -> bool:
-    return is_skinned(file.meshes[int(file.tree.meshes[node])], int(file.tree.skins[node]))
-
-
-def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Refuse a file whose meshes, repeated at many nodes, would exhaust the memory."""
-    sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
-    meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
-    count = sum(sizes[mesh] for mesh in meshes)
-    if count > _MOST_VERTICES:
-        raise source.fault("F002.many-vertices", most=_MOST_VERTICES, found=count)
-
-
-def _note_normals(pieces: list[Piece], source: Source) -> None:
-    """Report primitives without normals, and the number of vertices that flat shading adds."""
-    split = [piece for piece in pieces if piece.shading == "flat"]
-    added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
-    if added:
-        source.warn("F007.flat-normals", n=len(split), vertices=added)
-    smooth = [piece for piece in pieces if piece.shading == "smooth"]
-    if smooth:
-        source.warn("F007.smooth-normals", n=len(smooth))
-
-
-def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
-    """Report animated nodes that belong to no figure, such as those of cameras.
-
-    The transform of a node with a skinned mesh has no effect.
-    """
-    moved = set[int]().union(*(each.nodes for each in file.animations))
-    others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
-    if others:
-        names = [file.tree.names[node] or f"node {node}" for node in others]
-        source.warn("F007.animated-others", n=len(names), names=names)
-
-
-def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Report skins that the file deforms by a method other than LBS."""
-    used = (file.skins[skin] for members in groups for skin in members.skins)
-    others: dict[str, list[str]] = {}
-    for skin in used:
-        if skin.method != "lbs":
-            others.setdefault(skin.method, []).append(skin.name)
-    for method, names in others.items():
-        source.warn("F007.skinning-method", names=names, n=len(names), method=method)
-
-
-def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights, located at the first."""
-    odd = [piece for piece in pieces if piece.influences.n_deviating]
-    if odd:
-        n = sum(piece.influences.n_deviating for piece in odd)
-        most = max(piece.influences.deviation for piece in odd)
-        source.warn("W001.divided", _weights_of(odd[0]), n=n, most=most)
-    unbound = [piece for piece in pieces if piece.influences.n_unbound]
-    if unbound:
-        n = sum(piece.influences.n_unbound for piece in unbound)
-        source.warn("W004.first-joint", _weights_of(unbound[0]), n=n)
-
-
-def _weights_of(piece: Piece) -> str | None:
-    """Return the JSON pointer to the weights of a primitive; None if there is none."""
-    pointer = piece.primitive.pointer
-    return f"{pointer}/attributes/WEIGHTS_0" if pointer else None
-
-
-def record_of(
+def _record_of(
     file: NodeFile,
     joints: Joints,
     nodes: list[int],
     columns: Mapping[int, Ints],
     pieces: list[Piece],
 ) -> FileRecord:
-    """Return the record of one figure.
-
-    Parameters
-    ----------
-    file : NodeFile
-        The file, with its asset, nodes and meshes.
-    joints : Joints
-        The joints of the figure.
-    nodes : list of int
-        Nodes with a mesh, one per part.
-    columns : mapping of (S,) int32
-        Blend shapes of each node's morph targets.
-    pieces : list of Piece
-        The primitives of the figure.
-    """
+    """Return the record of a figure whose parts are ``nodes``, with the columns of their shapes."""
     extras = file.tree.extras
     meshes = [file.meshes[int(file.tree.meshes[node])] for node in nodes]
     none = np.zeros(0, dtype=np.int32)
@@ -317,7 +255,22 @@ def _vrm_record(
     )
 
 
-_ATTRIBUTES = {"positions": "POSITION", "normals": "NORMAL", "weights": "WEIGHTS_0"}
+def _facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]:
+    """Return the facts about a figure and its file, each a heading and a text."""
+    facts = [
+        (key, str(file.asset[key])[:_LONGEST]) for key in _ASSET if file.asset.get(key) is not None
+    ]
+    licence = file.asset.get("license") or file.asset.get("licence")
+    extras = file.asset.get("extras")
+    if licence is None and isinstance(extras, dict):
+        licence = extras.get("license") or extras.get("licence")
+    if isinstance(licence, str):
+        facts.append(("licence", licence[:_LONGEST]))
+    sums = max((piece.influences.deviation for piece in pieces), default=0.0)
+    # Smaller deviations are rounding errors of float32.
+    if sums > 1e-6:
+        facts.append(("weight sums", f"within {sums:.2g} of 1, divided by their sum"))
+    return (*facts, *file.facts)
 
 
 def _remember_pointers(
@@ -328,23 +281,7 @@ def _remember_pointers(
     joints: Joints,
     pieces: list[Piece],
 ) -> None:
-    """Register the JSON pointers of nodes, skin joints and primitives, if the file has any.
-
-    Parameters
-    ----------
-    source : Source
-        The file.
-    skeleton : Skeleton
-        The figure's skeleton.
-    file : NodeFile
-        Its contents.
-    members : Members
-        The nodes of the figure.
-    joints : Joints
-        The joints of the figure.
-    pieces : list of Piece
-        The primitives of the figure.
-    """
+    """Register the JSON pointers of nodes, skin joints and primitives, if the file has any."""
     if not file.has_pointers:
         return
     first_vertices = np.cumsum([0, *(piece.n_vertices for piece in pieces)])
@@ -375,31 +312,54 @@ def _joint(file: NodeFile, members: Members, node: int, kind: str) -> str:
     return f"/nodes/{node}"
 
 
-_ASSET = ("version", "generator", "copyright")
-_LONGEST = 200  # maximum number of characters of a fact
+def _note_normals(pieces: list[Piece], source: Source) -> None:
+    """Report primitives without normals, and the number of vertices that flat shading adds."""
+    split = [piece for piece in pieces if piece.shading == "flat"]
+    added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
+    if added:
+        source.warn("F007.flat-normals", n=len(split), vertices=added)
+    smooth = [piece for piece in pieces if piece.shading == "smooth"]
+    if smooth:
+        source.warn("F007.smooth-normals", n=len(smooth))
 
 
-def _facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]:
-    """Return the facts about a figure and its file, each a heading and a text.
+def _note_weights(pieces: list[Piece], source: Source) -> None:
+    """Record sums of weights that are not 1, and vertices without weights, located at the first."""
+    odd = [piece for piece in pieces if piece.influences.n_deviating]
+    if odd:
+        n = sum(piece.influences.n_deviating for piece in odd)
+        most = max(piece.influences.deviation for piece in odd)
+        source.warn("W001.divided", _weights_of(odd[0]), n=n, most=most)
+    unbound = [piece for piece in pieces if piece.influences.n_unbound]
+    if unbound:
+        n = sum(piece.influences.n_unbound for piece in unbound)
+        source.warn("W004.first-joint", _weights_of(unbound[0]), n=n)
 
-    Parameters
-    ----------
-    file : NodeFile
-        The file, whose asset information is reported.
-    pieces : list of Piece
-        The primitives of the figure.
+
+def _weights_of(piece: Piece) -> str | None:
+    """Return the JSON pointer to the weights of a primitive; None if there is none."""
+    pointer = piece.primitive.pointer
+    return f"{pointer}/attributes/WEIGHTS_0" if pointer else None
+
+
+def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
+    """Report animated nodes that belong to no figure, such as those of cameras.
+
+    The transform of a node with a skinned mesh has no effect.
     """
-    facts = [
-        (key, str(file.asset[key])[:_LONGEST]) for key in _ASSET if file.asset.get(key) is not None
-    ]
-    licence = file.asset.get("license") or file.asset.get("licence")
-    extras = file.asset.get("extras")
-    if licence is None and isinstance(extras, dict):
-        licence = extras.get("license") or extras.get("licence")
-    if isinstance(licence, str):
-        facts.append(("licence", licence[:_LONGEST]))
-    sums = max((piece.influences.deviation for piece in pieces), default=0.0)
-    # Smaller deviations are rounding errors of float32.
-    if sums > 1e-6:
-        facts.append(("weight sums", f"within {sums:.2g} of 1, divided by their sum"))
-    return (*facts, *file.facts)
+    moved = set[int]().union(*(each.nodes for each in file.animations))
+    others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
+    if others:
+        names = [file.tree.names[node] or f"node {node}" for node in others]
+        source.warn("F007.animated-others", n=len(names), names=names)
+
+
+def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
+    """Report skins that the file deforms by a method other than LBS."""
+    used = (file.skins[skin] for members in groups for skin in members.skins)
+    others: dict[str, list[str]] = {}
+    for skin in used:
+        if skin.method != "lbs":
+            others.setdefault(skin.method, []).append(skin.name)
+    for method, names in others.items():
+        source.warn("F007.skinning-method", names=names, n=len(names), method=method)

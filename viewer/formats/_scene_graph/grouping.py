@@ -23,25 +23,17 @@ _MOST_COPIES = 4  # maximum number of joints of all figures, relative to the num
 
 @dataclass(slots=True, eq=False)
 class Members:
-    """The nodes of one figure.
-
-    Attributes
-    ----------
-    nodes : list of int
-        Nodes that become joints, parents first.
-    skins : list of int
-        Skins of the figure; skins of meshes come first, in the order of the meshes.
-    meshes : list of int
-        Nodes whose meshes are parts of the figure, in tree order.
-    name : str
-        Name of the topmost node that is not in another figure, or of the skin of which this node is
-        a joint; empty for the only figure of a file.
-    """
+    """The nodes of one figure."""
 
     nodes: list[int] = field(default_factory=list)
+    """Nodes that become joints, parents first."""
     skins: list[int] = field(default_factory=list)
+    """Skins of the figure; skins of meshes come first, in the order of the meshes."""
     meshes: list[int] = field(default_factory=list)
+    """Nodes whose meshes are parts of the figure, in tree order."""
     name: str = ""
+    """Name of the topmost node that is not in another figure, or of the skin of which this node is
+    a joint; empty for the only figure of a file."""
 
 
 def is_skinned(mesh: NodeMesh, skin: int) -> bool:

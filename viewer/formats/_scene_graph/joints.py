@@ -23,29 +23,21 @@ _BY_SPRING = ("tails", "stiffness", "drags", "gravities", "radii")
 
 @dataclass(slots=True, eq=False)
 class Joints:
-    """The joints of a figure whose skeleton is under construction.
-
-    Attributes
-    ----------
-    nodes : list of int
-        Node of each joint; -1 for auxiliary joints.
-    names, parents, translations, rotations, scales : list
-        As in ``Skeleton``.
-    own : dict of int
-        Joint of each node, which its animation moves.
-    carrier : dict of int
-        Joint with the whole transform of each node, which children and meshes follow: the node's
-        own joint, or an auxiliary one below it if the node shears.
-    """
+    """The joints of a figure whose skeleton is under construction."""
 
     nodes: list[int] = field(default_factory=list)
+    """Node of each joint; -1 for auxiliary joints."""
     names: list[str] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
     translations: list[Floats] = field(default_factory=list)
     rotations: list[Floats] = field(default_factory=list)
     scales: list[Floats] = field(default_factory=list)
+    """As in ``Skeleton``."""
     own: dict[int, int] = field(default_factory=dict)
+    """Joint of each node, which its animation moves."""
     carrier: dict[int, int] = field(default_factory=dict)
+    """Joint with the whole transform of each node, which children and meshes follow: the node's own
+    joint, or an auxiliary one below it if the node shears."""
 
     def add(
         self,

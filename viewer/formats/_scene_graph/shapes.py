@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._scene_graph.content import NodeExpression, NodeFile, NodeMesh
+from viewer.formats._scene_graph.content import MorphTargets, NodeExpression, NodeFile, NodeMesh
 from viewer.formats._scene_graph.motions import Reader
 from viewer.formats._scene_graph.surfaces import (
     Piece,
@@ -125,11 +125,8 @@ def blend_shapes_of(
     shape = len(targets) + len(mixed), count, 3
 
     def offsets(of_normals: bool) -> DeferredOffsets:
-        return DeferredOffsets(
-            shape,
-            lambda: _offsets(columns, pieces, count, of_normals, sums),
-            lambda weights: _sum(columns, pieces, count, of_normals, sums, weights),
-        )
+        of_all = _Offsets(columns, pieces, count, of_normals, sums)
+        return DeferredOffsets(shape, of_all.dense, of_all.weighted)
 
     has_normals = any(piece.shading == "file" for piece in pieces)
     names = (t.name if counts[t.name] == 1 else t.full_name for t in targets)
@@ -221,54 +218,51 @@ def _target(file: NodeFile, columns: dict[int, Ints], column: int, node: int) ->
     return _Target(name, f"{part}.{name}", float(_defaults(file, node)[index]))
 
 
-def _offsets(
-    columns: dict[int, Ints], pieces: list[Piece], count: int, of_normals: bool, sums: Floats
-) -> Floats:
-    """Return the offsets of all vertices, or of their normals, in binding space: (S + E, V, 3).
+@dataclass(frozen=True, slots=True, eq=False)
+class _Offsets:
+    """Offsets of the positions or normals of a figure, in binding space.
 
-    ``sums`` (E, S) are the weights of the expressions, which follow the S morph targets.
+    S morph targets come first; E expressions follow, which are sums of them.
     """
-    offsets = np.zeros((sums.shape[1], count, 3))
-    first = 0
-    for piece in pieces:
-        rows = slice(first, first + piece.n_vertices)
-        first += piece.n_vertices
-        primitive, own = piece.primitive, columns.get(piece.node)
-        targets = primitive.normal_targets if of_normals else primitive.targets
-        if own is None or targets is None:
-            continue
-        values = targets.dense()[:, piece.sources]
-        if of_normals:
-            offsets[own, rows] = values @ normal_matrix(piece) * normal_scales(piece)
-        else:
-            offsets[own, rows] = values @ piece.baked[:3, :3].T
-    if not len(sums):
-        return offsets
-    return np.concatenate([offsets, np.einsum("es,sva->eva", sums, offsets)])
 
+    columns: dict[int, Ints]
+    pieces: list[Piece]
+    n_vertices: int
+    of_normals: bool
+    sums: Floats
+    """Weights of the morph targets in the expressions: (E, S)."""
 
-def _sum(
-    columns: dict[int, Ints],
-    pieces: list[Piece],
-    count: int,
-    of_normals: bool,
-    sums: Floats,
-    weights: Floats,
-) -> Floats:
-    """Return the weighted sum of ``_offsets``, without the array: (V, 3)."""
-    n_targets = sums.shape[1]
-    weights = weights[:n_targets] + weights[n_targets:] @ sums
-    total, first = np.zeros((count, 3)), 0
-    for piece in pieces:
-        rows = slice(first, first + piece.n_vertices)
-        first += piece.n_vertices
-        primitive, own = piece.primitive, columns.get(piece.node)
-        targets = primitive.normal_targets if of_normals else primitive.targets
-        if own is None or targets is None:
-            continue
-        values = targets.weighted(weights[own])[piece.sources]
-        if of_normals:
-            total[rows] = values @ normal_matrix(piece) * normal_scales(piece)
-        else:
-            total[rows] = values @ piece.baked[:3, :3].T
-    return total
+    def dense(self) -> Floats:
+        """Return the offsets of all vertices: (S + E, V, 3)."""
+        offsets = np.zeros((self.sums.shape[1], self.n_vertices, 3))
+        for rows, piece, own, targets in self._targets():
+            offsets[own, rows] = self._bound(piece, targets.dense()[:, piece.sources])
+        if not len(self.sums):
+            return offsets
+        return np.concatenate([offsets, np.einsum("es,sva->eva", self.sums, offsets)])
+
+    def weighted(self, weights: Floats) -> Floats:
+        """Return the sum of the offsets by weights (S + E,), without that array: (V, 3)."""
+        n_targets = self.sums.shape[1]
+        weights = weights[:n_targets] + weights[n_targets:] @ self.sums
+        total = np.zeros((self.n_vertices, 3))
+        for rows, piece, own, targets in self._targets():
+            total[rows] = self._bound(piece, targets.weighted(weights[own])[piece.sources])
+        return total
+
+    def _targets(self) -> Iterator[tuple[slice, Piece, Ints, MorphTargets]]:
+        """Yield the rows of each piece with targets, the piece, its blend shapes and targets."""
+        first = 0
+        for piece in self.pieces:
+            rows = slice(first, first + piece.n_vertices)
+            first += piece.n_vertices
+            primitive, own = piece.primitive, self.columns.get(piece.node)
+            targets = primitive.normal_targets if self.of_normals else primitive.targets
+            if own is not None and targets is not None:
+                yield rows, piece, own, targets
+
+    def _bound(self, piece: Piece, values: Floats) -> Floats:
+        """Return offsets of a piece in binding space."""
+        if self.of_normals:
+            return values @ normal_matrix(piece) * normal_scales(piece)
+        return values @ piece.baked[:3, :3].T

@@ -1,8 +1,14 @@
-"""One mesh and skin made from all meshes of a figure, in its binding space."""
+"""One mesh and skin made from all meshes of a figure, in its binding space.
+
+Weights are scaled to sums of 1. Primitives without normals are shaded flat, which splits vertices
+between faces, or smoothly if they are large. Transformed normals keep the lengths that they have in
+the file.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -15,45 +21,64 @@ from viewer.rig.geometry.vectors import moved_tangents
 from viewer.rig.mesh import Mesh, PartView, triangle_areas, vertex_normals
 from viewer.rig.skin import Skin
 
+_NO_SUM = 1e-12  # minimum sum of weights that is scaled to 1
+_MOST_TRIANGLES = 200_000  # largest primitive that is shaded flat
+
+# Grid cells per unit of normal components: faces within half a degree share a normal.
+_CELLS = 128
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Influences:
+    """A flat list of influences, vertex by vertex."""
+
+    counts: Ints
+    """Number of influences of each vertex: (V,)."""
+    joints: Ints
+    weights: Floats
+    """Joint of the figure and weight of each, (N,); the weights of a vertex sum to
+    1."""
+    deviation: float = 0.0
+    """Largest deviation of a sum of weights from 1 before normalisation."""
+    n_deviating: int = 0
+    """Number of sums that deviate by more than the rounding of 8-bit weights."""
+    n_unbound: int = 0
+    """Number of vertices without any weight."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A primitive of the mesh of one node, as part of a figure.
-
-    Attributes
-    ----------
-    node, part : int
-        Node of the mesh, and index of the figure's part.
-    primitive : Primitive
-        As in the file.
-    baked : (4, 4)
-        Mesh space to binding space.
-    influences : Influences
-        Influences of the V vertices.
-    sources : (V,) int32
-        Original vertex of each vertex in the primitive, because flat shading splits vertices.
-    triangles : (T, 3) int32
-        Indices of the piece's vertices, counter-clockwise from outside in binding space.
-    normals : (V, 3)
-        Mesh space.
-    shading : "file", "flat" or "smooth"
-        Origin of the normals.
-    """
+    """A primitive of the mesh of one node, as part of a figure."""
 
     node: int
     part: int
+    """Node of the mesh, and index of the figure's part."""
     primitive: Primitive
+    """As in the file."""
     baked: Floats
+    """Mesh space to binding space: (4, 4)."""
     influences: Influences
+    """Influences of the V vertices."""
     sources: Ints
+    """Original vertex of each vertex in the primitive, because flat shading splits vertices: (V,)
+    int32."""
     triangles: Ints
+    """Indices of the piece's vertices, counter-clockwise from outside in binding space: (T, 3)
+    int32."""
     normals: Floats
+    """Mesh space: (V, 3)."""
     shading: str
+    """Origin of the normals."""
 
     @property
     def n_vertices(self) -> int:
         """Number of vertices, V."""
         return len(self.sources)
+
+
+_Shading: TypeAlias = tuple[Ints, Ints, Floats, bool]
+"""Original of each of R vertices, which include those without triangles, (R,); triangles of these
+vertices, (T, 3); unit normals, (R, 3); whether vertices were split between faces."""
 
 
 def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piece]:
@@ -69,7 +94,7 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
         Bindings of all their skins, and of nodes whose mesh no skin moves.
     """
     pieces: list[Piece] = []
-    shadings: dict[int, Shading] = {}  # by identity of the primitive, which many nodes may share
+    shadings: dict[int, _Shading] = {}  # by identity of the primitive, which many nodes may share
     for part, node in enumerate(nodes):
         skin = int(file.tree.skins[node])
         for primitive in file.meshes[int(file.tree.meshes[node])].primitives:
@@ -77,7 +102,7 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
                 continue
             if skin >= 0 and primitive.joints is not None:
                 baked = bindings.baked[skin]
-                influences = divided(primitive, bindings.slots[skin])
+                influences = _divided(primitive, bindings.slots[skin])
             else:
                 joint, baked = bindings.rigid[node]
                 influences = _on_joint(len(primitive.positions), joint)
@@ -88,12 +113,70 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
     return pieces
 
 
-def _shading(primitive: Primitive) -> Shading:
+def _on_joint(n_vertices: int, joint: int) -> Influences:
+    """Return the influences of vertices that follow one joint rigidly."""
+    counts, joints = np.ones(n_vertices, np.int32), np.full(n_vertices, joint, np.int32)
+    return Influences(counts, joints, np.ones(n_vertices))
+
+
+def _divided(primitive: Primitive, slots: Ints) -> Influences:
+    """Return a skinned primitive's influences, normalised to sums of 1 (glTF 2.0, 3.7.3.1).
+
+    A vertex without weights follows the joint of its first slot, as in Blender and three.js.
+    ``slots`` (M,): joint of the figure for each joint of the skin.
+    """
+    assert primitive.joints is not None and primitive.weights is not None
+    weights = primitive.weights.astype(np.float64)
+    sums = weights.sum(axis=1)
+    unbound = np.abs(sums) < _NO_SUM
+    weights[unbound] = 0.0
+    weights[unbound, :1] = 1.0
+    weights /= np.where(unbound, 1.0, sums)[:, None]
+    used = weights != 0.0
+    deviations = np.abs(sums - 1.0)[~unbound]
+    # Each of K weights is rounded to a multiple of 1 / 255.
+    rounding = 0.5 / 255.0 * weights.shape[1] + 1e-6
+    return Influences(
+        np.count_nonzero(used, axis=1).astype(np.int32),
+        slots[primitive.joints[used]],
+        weights[used],
+        float(deviations.max(initial=0.0)),
+        int(np.count_nonzero(deviations > rounding)),
+        int(np.count_nonzero(unbound)),
+    )
+
+
+def _shading(primitive: Primitive) -> _Shading:
     """Return the normals of a primitive, split between its faces if the file has none."""
     if primitive.normals is None:
         return flat_shaded(primitive.positions, primitive.triangles)
     sources = np.arange(len(primitive.positions), dtype=np.int32)
     return sources, primitive.triangles, primitive.normals, False
+
+
+def flat_shaded(positions: Floats, triangles: Ints) -> _Shading:
+    """Split vertices between faces with different normals.
+
+    Coplanar faces keep a common vertex, so a cube has 24 vertices. Large primitives are shaded
+    smoothly instead, because they could become six times as large.
+    """
+    if len(triangles) > _MOST_TRIANGLES:
+        sources = np.arange(len(positions), dtype=np.int32)
+        return sources, triangles, vertex_normals(positions, triangles), False
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    doubled = 2.0 * triangle_areas(positions, triangles)
+    normals /= np.where(doubled == 0.0, 1.0, doubled)[:, None]
+    cells = np.rint(normals * _CELLS).astype(np.int64) + _CELLS
+    side = 2 * _CELLS + 1
+    directions = (cells[:, 0] * side + cells[:, 1]) * side + cells[:, 2]
+    corners = triangles.ravel().astype(np.int64)
+    pairs = corners * side**3 + np.repeat(directions, 3)
+    unique, inverse = np.unique(pairs, return_inverse=True)
+    unused = np.setdiff1d(np.arange(len(positions)), corners)
+    sources = np.concatenate([unique // side**3, unused]).astype(np.int32)
+    split = inverse.reshape(-1, 3).astype(np.int32)
+    return sources, split, vertex_normals(positions[sources], split), True
 
 
 def _piece(
@@ -102,22 +185,26 @@ def _piece(
     primitive: Primitive,
     baked: Floats,
     influences: Influences,
-    shading: Shading,
+    shading: _Shading,
 ) -> Piece:
     """Return one piece; triangles that a reflection reverses are flipped back."""
     sources, triangles, normals, is_flat = shading
     kind = "file" if primitive.normals is not None else "flat" if is_flat else "smooth"
     if is_flat:
-        influences = _counted_as(_of_rows(influences, sources), influences)
+        influences = _of_rows(influences, sources)
     if np.linalg.det(baked[:3, :3]) < 0.0:
         triangles = triangles[:, ::-1]
     return Piece(node, part, primitive, baked, influences, sources, triangles, normals, kind)
 
 
-def _counted_as(split: Influences, whole: Influences) -> Influences:
-    """Return the influences of split vertices, with the statistics of the file's vertices."""
-    found = whole.deviation, whole.n_deviating, whole.n_unbound
-    return Influences(split.counts, split.joints, split.weights, *found)
+def _of_rows(influences: Influences, rows: Ints) -> Influences:
+    """Return the influences of the given vertices, which may repeat; the statistics stay."""
+    starts = np.concatenate([[0], np.cumsum(influences.counts)])
+    counts = influences.counts[rows]
+    firsts = np.concatenate([[0], np.cumsum(counts)])
+    index = np.repeat(starts[rows] - firsts[:-1], counts) + np.arange(firsts[-1])
+    joints, weights = influences.joints[index], influences.weights[index]
+    return replace(influences, counts=counts, joints=joints, weights=weights)
 
 
 def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
@@ -262,136 +349,3 @@ def _dqs_fractions(file: NodeFile, piece: Piece) -> Floats:
     if skin is not None and skin.method == "mix" and piece.primitive.dqs_fractions is not None:
         return piece.primitive.dqs_fractions[piece.sources]
     return np.full(piece.n_vertices, float(skin is not None and skin.method == "dqs"))
-
-
-_NO_SUM = 1e-12  # minimum sum of weights that is scaled to 1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Influences:
-    """A flat list of influences, vertex by vertex.
-
-    Attributes
-    ----------
-    counts : (V,)
-        Number of influences of each vertex.
-    joints, weights : (N,) int32, (N,)
-        Joint of the figure and weight of each; the weights of a vertex sum to 1.
-    deviation : float
-        Largest deviation of a sum of weights from 1 before normalisation.
-    n_deviating : int
-        Number of sums that deviate by more than the rounding of 8-bit weights.
-    n_unbound : int
-        Number of vertices without any weight.
-    """
-
-    counts: Ints
-    joints: Ints
-    weights: Floats
-    deviation: float = 0.0
-    n_deviating: int = 0
-    n_unbound: int = 0
-
-
-def _on_joint(n_vertices: int, joint: int) -> Influences:
-    """Return the influences of vertices that follow one joint rigidly."""
-    counts, joints = np.ones(n_vertices, np.int32), np.full(n_vertices, joint, np.int32)
-    return Influences(counts, joints, np.ones(n_vertices))
-
-
-def divided(primitive: Primitive, slots: Ints) -> Influences:
-    """Return a skinned primitive's influences, normalised to sums of 1 (glTF 2.0, 3.7.3.1).
-
-    A vertex without weights follows the joint of its first slot, as in Blender and three.js.
-
-    Parameters
-    ----------
-    primitive : Primitive
-        A primitive with (V, K) joints and weights.
-    slots : (M,) int32
-        Joint of the figure for each joint of the skin.
-
-    Returns
-    -------
-    Influences
-        Influences whose weight is not 0.
-    """
-    assert primitive.joints is not None and primitive.weights is not None
-    weights = primitive.weights.astype(np.float64)
-    sums = weights.sum(axis=1)
-    unbound = np.abs(sums) < _NO_SUM
-    weights[unbound] = 0.0
-    weights[unbound, :1] = 1.0
-    weights /= np.where(unbound, 1.0, sums)[:, None]
-    used = weights != 0.0
-    deviations = np.abs(sums - 1.0)[~unbound]
-    # Each of K weights is rounded to a multiple of 1 / 255.
-    rounding = 0.5 / 255.0 * weights.shape[1] + 1e-6
-    return Influences(
-        np.count_nonzero(used, axis=1).astype(np.int32),
-        slots[primitive.joints[used]],
-        weights[used],
-        float(deviations.max(initial=0.0)),
-        int(np.count_nonzero(deviations > rounding)),
-        int(np.count_nonzero(unbound)),
-    )
-
-
-def _of_rows(influences: Influences, rows: Ints) -> Influences:
-    """Return the influences of the given vertices, which may repeat."""
-    starts = np.concatenate([[0], np.cumsum(influences.counts)])
-    counts = influences.counts[rows]
-    firsts = np.concatenate([[0], np.cumsum(counts)])
-    index = np.repeat(starts[rows] - firsts[:-1], counts) + np.arange(firsts[-1])
-    return Influences(counts, influences.joints[index], influences.weights[index])
-
-
-Shading: TypeAlias = tuple[Ints, Ints, Floats, bool]
-"""Result of ``flat_shaded``."""
-_MOST_TRIANGLES = 200_000
-
-# Grid cells per unit of normal components: faces within half a degree share a normal.
-_CELLS = 128
-
-
-def flat_shaded(positions: Floats, triangles: Ints) -> Shading:
-    """Split vertices between faces with different normals.
-
-    Coplanar faces keep a common vertex, so a cube has 24 vertices. Large primitives are shaded
-    smoothly instead, because they could become six times as large.
-
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices, counter-clockwise from outside.
-
-    Returns
-    -------
-    sources : (R,) int32
-        Original of each split vertex; vertices without triangles are included.
-    triangles : (T, 3) int32
-        Indices into the split vertices.
-    normals : (R, 3)
-        Unit normals.
-    is_flat : bool
-        Whether the vertices were split.
-    """
-    if len(triangles) > _MOST_TRIANGLES:
-        sources = np.arange(len(positions), dtype=np.int32)
-        return sources, triangles, vertex_normals(positions, triangles), False
-    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
-    doubled = 2.0 * triangle_areas(positions, triangles)
-    normals /= np.where(doubled == 0.0, 1.0, doubled)[:, None]
-    cells = np.rint(normals * _CELLS).astype(np.int64) + _CELLS
-    side = 2 * _CELLS + 1
-    directions = (cells[:, 0] * side + cells[:, 1]) * side + cells[:, 2]
-    corners = triangles.ravel().astype(np.int64)
-    pairs = corners * side**3 + np.repeat(directions, 3)
-    unique, inverse = np.unique(pairs, return_inverse=True)
-    unused = np.setdiff1d(np.arange(len(positions)), corners)
-    sources = np.concatenate([unique // side**3, unused]).astype(np.int32)
-    split = inverse.reshape(-1, 3).astype(np.int32)
-    return sources, split, vertex_normals(positions[sources], split), True

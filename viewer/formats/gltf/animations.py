@@ -42,18 +42,12 @@ _OF_NODES = frozenset(TRANSFORM_PATHS) - {"weights"}
 
 @dataclass(frozen=True, slots=True)
 class _Moved:
-    """Target of a channel.
-
-    Attributes
-    ----------
-    path : str
-        Entry of ``TRANSFORM_PATHS``; for other targets, a name for messages.
-    nodes : tuple of int
-        Nodes that the channel animates; empty if it has no visible effect.
-    """
+    """Target of a channel."""
 
     path: str
+    """Entry of ``TRANSFORM_PATHS``; for other targets, a name for messages."""
     nodes: tuple[int, ...]
+    """Nodes that the channel animates; empty if it has no visible effect."""
 
     @property
     def transform_path(self) -> TransformPath:

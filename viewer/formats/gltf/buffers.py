@@ -21,41 +21,27 @@ from viewer.rig.arrays import Bytes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """A part of a buffer.
-
-    Attributes
-    ----------
-    data : (N,) uint8
-        Bytes of the view, read-only.
-    stride : int
-        Bytes from one element to the next; 0 if elements are tightly packed.
-    offset : int
-        Position of the first byte in the buffer; data at multiples of 4 are aligned.
-    """
+    """A part of a buffer."""
 
     data: Bytes
+    """Bytes of the view, read-only: (N,) uint8."""
     stride: int
+    """Bytes from one element to the next; 0 if elements are tightly packed."""
     offset: int
+    """Position of the first byte in the buffer; data at multiples of 4 are aligned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncodedImage:
-    """An image as it is stored: PNG, JPEG or WebP.
-
-    Attributes
-    ----------
-    name : str
-        Path relative to the document's folder; for embedded images the name of the image, which
-        may be empty.
-    data : bytes
-        The encoded image.
-    is_embedded : bool
-        Whether it is part of the document rather than a separate file.
-    """
+    """An image as it is stored: PNG, JPEG or WebP."""
 
     name: str
+    """Path relative to the document's folder; for embedded images the name of the image, which may
+    be empty."""
     data: bytes
+    """The encoded image."""
     is_embedded: bool
+    """Whether it is part of the document rather than a separate file."""
 
 
 def _located(buffer: Element, length: int) -> bytes:

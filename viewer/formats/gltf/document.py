@@ -48,27 +48,9 @@ _Content = TypeVar("_Content")
 
 
 class Document:
-    """An opened glTF file.
+    """An opened glTF file: its JSON, bytes and arrays.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records diagnostics.
-    root : dict
-        Its parsed JSON.
-    binary : memoryview or None
-        Contents of the binary chunk, with its padding; None if there is none.
-
-    Attributes
-    ----------
-    source : Source
-        The file.
-    root : Element
-        The root object.
-    buffers : Buffers
-        Bytes of buffers, buffer views and images.
-    accessors : Accessors
-        Arrays.
+    ``binary``: contents of the binary chunk, with its padding; None if there is none.
     """
 
     def __init__(self, source: Source, root: dict[str, Any], binary: memoryview | None) -> None:

@@ -20,18 +20,12 @@ _NAME = "KHR_draco_mesh_compression"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecodedPrimitive:
-    """Vertices and triangles of a compressed primitive.
-
-    Attributes
-    ----------
-    attributes : dict of (V, C)
-        Components by the name of their attribute.
-    triangles : (T, 3) int64
-        Vertex indices.
-    """
+    """Vertices and triangles of a compressed primitive."""
 
     attributes: Mapping[str, NDArray[Any]]
+    """Components by the name of their attribute: (V, C)."""
     triangles: NDArray[np.int64]
+    """Vertex indices: (T, 3) int64."""
 
 
 def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:

@@ -151,27 +151,18 @@ def _used(triangles: Ints, count: int) -> tuple[Ints | None, Ints]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Attributes:
-    """Attributes of a primitive, or of one of its morph targets.
-
-    Attributes
-    ----------
-    document : Document
-        The document.
-    element : Element
-        Accessor indices by name.
-    n_vertices : int
-        Number of elements that each accessor must have.
-    rows : (V,) int32 or None
-        Vertices to read, if other primitives use the remaining ones; None for all.
-    decoded : dict
-        Components of the attributes that are compressed with Draco.
-    """
+    """Attributes of a primitive, or of one of its morph targets."""
 
     document: Document
+    """The document."""
     element: Element
+    """Accessor indices by name."""
     n_vertices: int
+    """Number of elements that each accessor must have."""
     rows: Ints | None = None
+    """Vertices to read, (V,), if other primitives use the remaining ones; None for all."""
     decoded: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    """Components of the attributes that are compressed with Draco."""
 
     @property
     def n_rows(self) -> int:

@@ -41,18 +41,12 @@ _Content = TypeVar("_Content")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slot:
-    """Reference of a material to a texture.
-
-    Attributes
-    ----------
-    image : int
-        Index of the image, -1 if there is none that can be read.
-    placing : dict
-        Texture coordinate set, transform, wrap modes and filters, as in ``Texture``.
-    """
+    """Reference of a material to a texture."""
 
     image: int
+    """Index of the image, -1 if there is none that can be read."""
     placing: dict[str, Any]
+    """Texture coordinate set, transform, wrap modes and filters, as in ``Texture``."""
 
     def texture(self, images: dict[int, DecodedImage]) -> Texture:
         """Return the texture with its pixels."""
@@ -183,21 +177,14 @@ def _extension(element: Element, name: str) -> Element | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecodedImage:
-    """An image of a document.
-
-    Attributes
-    ----------
-    name : str
-        Path relative to the document's folder; for embedded images the name of the image.
-    pixels : (H, W, 4) uint8 or None
-        First row at the top; None if the image cannot be read.
-    encoded : bytes or None
-        The file, if it is embedded and a PNG or a JPEG.
-    """
+    """An image of a document."""
 
     name: str
+    """Path relative to the document's folder; for embedded images the name of the image."""
     pixels: Bytes | None = None
+    """(H, W, 4), first row at the top; None if the image cannot be read."""
     encoded: bytes | None = None
+    """The file, if it is embedded and a PNG or a JPEG."""
 
 
 @contextlib.contextmanager
