@@ -20,8 +20,6 @@ from viewer.errors import ViewerError
 from viewer.interrupts import watched
 from viewer.phrases import printable
 
-__all__ = ["FunctionJob", "attempt"]
-
 _BAD_INPUT, _UNWRITTEN, _DEFECT = 2, 5, 1  # exit codes
 _LONGEST = 2000  # maximum length of a message in characters
 

@@ -15,8 +15,6 @@ from viewer.formats import FORMATS, SUFFIXES
 from viewer.formats._published_models import published_names
 from viewer.phrases import counted, listed, printable
 
-__all__ = ["Inputs", "find_inputs", "is_recording", "natural_key"]
-
 _AMBIGUOUS = (".txt", ".json")  # usually notes and settings, not poses
 _WILD = re.compile(r"[*?[]")
 # Files next to the motions of AMASS, in its first and second release.

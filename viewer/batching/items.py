@@ -7,8 +7,6 @@ from typing import Any, Literal
 
 from viewer.data_classes import dataclass
 
-__all__ = ["Item", "Result", "Status"]
-
 Status = Literal["done", "failed", "timeout", "crashed", "memory", "cancelled", "unchanged"]
 
 

@@ -16,17 +16,6 @@ from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import counted, listed, printable
 
-__all__ = [
-    "FIELDS",
-    "check_further_outputs",
-    "check_outputs",
-    "check_summaries",
-    "filled",
-    "items_of",
-    "output_folder",
-    "template_of",
-]
-
 FIELDS = {
     "parent": "the input's folder, relative to the folder that all inputs share",
     "folder": "the input's folder, as it was given",

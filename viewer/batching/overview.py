@@ -1,4 +1,9 @@
-"""Overviews of a batch: a contact sheet of its pictures, or a page of HTML."""
+"""Overviews of a batch: contact sheets of its pictures, or a page of HTML.
+
+A page has a row for each item, worst first: its picture, status, findings, contents, and for
+comparisons the distances as bars. It needs no other file. Sheets show the pictures that the items
+have written, in cells with captions.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +35,22 @@ from viewer.phrases import counted, printable
 PAGES = (".html", ".htm")
 """Suffixes of pages; all other suffixes are those of pictures."""
 _PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+
+_MOST_ROWS = 5_000
+_MOST_MESSAGES = 20  # maximum number of messages per item
+_MOST_THUMBNAILS = 400
+_THUMBNAIL = (160, 120)  # maximum size of a thumbnail, pixels
+_SEVERITIES = ("error", "warning", "note")
+_FINISHED = ("done", "unchanged")
+_LONGEST = 1000  # maximum length of text in characters
+
+PER_SHEET = 120
+"""Maximum number of cells on a sheet."""
+
+MOST_SHEETS = 50
+"""Maximum number of sheets; further items are not shown."""
+
+_CELL = (240, 320)  # maximum size of a picture, pixels
 
 
 def check_overview(path: str | Path) -> None:
@@ -91,14 +112,6 @@ def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list
 
     with all_or_none(map(Path, overview_files(str(path), len(results)))):
         return _save_sheets(path, results)
-
-
-_MOST_ROWS = 5_000
-_MOST_MESSAGES = 20  # maximum number of messages per item
-_MOST_THUMBNAILS = 400
-_THUMBNAIL = (160, 120)  # maximum size of a thumbnail, pixels
-_SEVERITIES = ("error", "warning", "note")
-_FINISHED = ("done", "unchanged")
 
 
 @dataclass(frozen=True)
@@ -331,7 +344,6 @@ def _message(job: str, result: Result) -> str:
     return f"<details><summary>{_text_of(texts[0])}</summary><ul>{rest}{more}</ul></details>"
 
 
-_LONGEST = 1000  # maximum length of text in characters
 _STYLE = """
 :root { color-scheme: light dark; --back: #fff; --text: #1d2026; --soft: #626a77; --line: #dfe3e9;
   --raised: #f6f7f9; --error: #b3261e; --warning: #8a5a00; --note: #2b5f9e; --good: #1f7a3d; }
@@ -417,13 +429,6 @@ def _document(title: str, body: Iterable[str]) -> str:
         f"<title>{_text_of(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
         f"<body>\n{parts}\n</body>\n</html>\n"
     )
-
-
-PER_SHEET = 120
-"""Maximum number of cells on a sheet."""
-MOST_SHEETS = 50
-"""Maximum number of sheets; further items are not shown."""
-_CELL = (240, 320)  # maximum size of a picture, pixels
 
 
 def _save_sheets(path: Path, results: Sequence[Result]) -> list[str]:

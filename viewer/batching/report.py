@@ -23,8 +23,6 @@ from viewer.diagnostics.diagnostic import plain
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import printable
 
-__all__ = ["Report", "ReportFile", "read_results"]
-
 _ITEM_NAMES = [field.name for field in fields(Item)]
 _NAMES = [field.name for field in fields(Result) if field.name != "item"]
 _KINDS: dict[str, type | tuple[type, ...]] = {

@@ -1,4 +1,9 @@
-"""Execution of a batch: engine, report, resumption and interruption."""
+"""Execution of a batch: engine, report, resumption and interruption.
+
+Items run in an engine, and each result is a line of the report. A batch that is resumed skips the
+items that an earlier one finished: their keys, hashes of all that may change the result, are
+unchanged, and the files they wrote still exist.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +28,11 @@ from viewer.media.unfinished import remove_leftovers
 from viewer.phrases import printable
 
 _KILLED = ("crashed", "timeout", "memory")  # the worker could not remove its temporary files
+_CHUNK = 1 << 20  # bytes of a file that are read and hashed at a time
+_SIZE = 16  # bytes of a key
+
+# Hashes of files that all items read, by path, sizes and times.
+_remembered: dict[tuple[object, ...], bytes] = {}
 
 
 @dataclass(frozen=True)
@@ -228,11 +238,6 @@ def _has_content(path: Path) -> bool:
 def _is_there(result: Result) -> bool:
     """Return whether all files that an item wrote still exist."""
     return all(os.path.lexists(path) for path in result.outputs)
-
-
-_CHUNK = 1 << 20
-_SIZE = 16  # bytes of a key
-_remembered: dict[tuple[object, ...], bytes] = {}
 
 
 def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:

@@ -1,4 +1,9 @@
-"""Submissions: folders and zip archives, each compared with one reference."""
+"""Submissions: folders and zip archives, each compared with one reference.
+
+Submitted archives come from anyone: files are unpacked only if they are needed, below limits of
+number, size and compression ratio, and never outside the temporary folder. From each submission the
+files are chosen that match the reference's in name or kind; junk of operating systems is ignored.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +33,31 @@ _DEEPEST = 3  # maximum number of levels of nested archives
 _COMPANIONS = {  # suffixes of files that models refer to
     *(".bin", ".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".gif", ".webp", ".tif", ".tiff"),
     *SUFFIXES,
+}
+
+_ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.bz2", ".tar.xz")
+_JUNK_FOLDERS = {"__macosx", "__pycache__"}
+_JUNK_FILES = {"thumbs.db", "desktop.ini"}
+
+MOST_BYTES = 2 << 30
+"""Maximum number of bytes unpacked from one archive."""
+
+MOST_FILES = 5_000
+"""Maximum number of files unpacked from one archive."""
+
+_ENCRYPTED = 0x41  # bits 0 and 6 of the flags
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
+_DAMAGE = (*DAMAGE, NotImplementedError)
+_QUOTED = re.compile(r"""'.*'|".*\"""", re.DOTALL)  # names in messages
+
+# Parts of the messages of zipfile and zlib, and what they mean.
+_REASONS = {
+    "not a zip file": "zip-end",
+    "truncated": "zip-short",
+    "crc": "zip-checksum",
+    "magic number": "zip-header",
+    "differ": "zip-header",
+    "overlap": "zip-overlap",
 }
 
 
@@ -163,9 +193,6 @@ def _needed(archive: _Archive, chosen: _Chosen) -> Iterable[str]:
     ]
 
 
-_ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.bz2", ".tar.xz")
-
-
 @dataclass(frozen=True, slots=True)
 class _Found:
     """Submissions, and other files.
@@ -216,8 +243,6 @@ def _is_rig_file(file: Path) -> bool:
     return file.is_file() and suffix in SUFFIXES and suffix not in (".txt", ".json")
 
 
-_JUNK_FOLDERS = {"__macosx", "__pycache__"}
-_JUNK_FILES = {"thumbs.db", "desktop.ini"}
 _Chosen = tuple[str, ...]
 """Paths of the files to open together, or of one folder."""
 
@@ -332,26 +357,6 @@ def _folders(names: Sequence[str], is_wanted: Callable[[str], bool]) -> list[str
     """Return the folders nearest to the top that directly contain wanted files."""
     nearest = _nearest([name for name in names if is_wanted(name)])
     return sorted({name.rpartition("/")[0] or "." for name in nearest})
-
-
-MOST_BYTES = 2 << 30
-"""Maximum number of bytes unpacked from one archive."""
-MOST_FILES = 5_000
-"""Maximum number of files unpacked from one archive."""
-_ENCRYPTED = 0x41  # bits 0 and 6 of the flags
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
-_DAMAGE = (*DAMAGE, NotImplementedError)
-_QUOTED = re.compile(r"""'.*'|".*\"""", re.DOTALL)  # names in messages
-
-# Parts of the messages of zipfile and zlib, and what they mean.
-_REASONS = {
-    "not a zip file": "zip-end",
-    "truncated": "zip-short",
-    "crc": "zip-checksum",
-    "magic number": "zip-header",
-    "differ": "zip-header",
-    "overlap": "zip-overlap",
-}
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,18 +14,6 @@ import numpy as np
 from viewer.batching.items import Result
 from viewer.media.saving import save_bytes
 
-__all__ = [
-    "MEASURES",
-    "Cell",
-    "comparisons",
-    "figures_of",
-    "mismatches_of",
-    "ordered",
-    "row_message",
-    "save_table",
-    "worst_measure",
-]
-
 Cell = str | int | float | None
 
 MEASURES = {
@@ -38,6 +26,13 @@ MEASURES = {
 
 _FIRST = ("name", "status", "exit_code")
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
+
+_LENGTHS = ("joints", "vertices")
+
+_FIGURE = (
+    *("figure", "figures", "frames", "present_frames", "frame_rate", "duration", "gender"),
+    *("model", "joints", "vertices", "triangles", "animations", "size", "unit"),
+)
 
 
 def ordered(results: Iterable[Result]) -> list[Result]:
@@ -198,9 +193,6 @@ def _measure_cells(
     return [most, mean, *([relative] if group in _LENGTHS else []), *place]
 
 
-_LENGTHS = ("joints", "vertices")
-
-
 def _measure_columns(group: str) -> list[str]:
     unit = "_degrees" if group == "orientations" else ""
     percent = [f"{group}_max_percent_of_size"] if group in _LENGTHS else []
@@ -253,10 +245,6 @@ def _output_rows(result: Result) -> list[list[Cell]]:
     return [[result.attempts, "; ".join(result.outputs)]]
 
 
-_FIGURE = (
-    *("figure", "figures", "frames", "present_frames", "frame_rate", "duration", "gender"),
-    *("model", "joints", "vertices", "triangles", "animations", "size", "unit"),
-)
 _COLUMNS: dict[str, Sequence[str]] = {
     "diff": [
         *("within", "mismatches"),

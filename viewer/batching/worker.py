@@ -5,8 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import re
 
-__all__ = ["name_worker", "worker_rank"]
-
 _name = ""
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["COMMANDS"]
-
 COMMANDS = {
     "view": "open files in a window (the default)",
     "render": "render files to an image or video, without a window",

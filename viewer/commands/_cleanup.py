@@ -13,8 +13,6 @@ from viewer.phrases import printable
 if TYPE_CHECKING:
     from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay
 
-__all__ = ["add_cleanup_arguments", "clean_up_of"]
-
 _LONGEST_WINDOW = 9999
 _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "order")}
 

@@ -27,6 +27,7 @@ from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning, file_method
 
 _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
+_LISTED = 12  # maximum number of names listed in a message
 
 
 def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
@@ -340,9 +341,6 @@ def _dof_value(setting: str, text: str, is_rotation: bool) -> float:
     except (ValueError, argparse.ArgumentTypeError):
         raise ViewerError(f'--dof: expected a number after "=", found "{setting}"') from None
     return math.radians(value) if found[2] == "deg" and is_rotation else value
-
-
-_LISTED = 12  # maximum number of names listed in a message
 
 
 def is_named(text: str) -> bool:

@@ -1,4 +1,8 @@
-"""Options that choose the files to open and their pose, shared by several commands."""
+"""Options that choose the files to open and their pose, shared by several commands.
+
+Files, captures, driven characters, clean-up and ``--gaps``; then the scene that these options
+describe, opened with a progress bar, and the warnings about it.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,28 @@ _LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts with the same number of points as another one."""
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # maximum number of names in a message
-_UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
+_UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}  # suffixes of sizes, bytes
+# Values of --gaps, by the use of the command: pattern, help and metavariable.
+_ONE_SECOND = 1.0  # the longest gap if the deprecated --fill-gaps has no value
+_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|[0-9]{1,6}(?:\.[0-9]{1,6})?s)%s)?"
+_PATTERNS = {
+    "view": _LIMIT % "",
+    "check": "interpolate",
+    "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
+}
+_WHAT = {
+    "view": "gaps in captures: interpolate all, or those of up to N frames or N seconds (2s)",
+    "check": "gaps in captures: interpolate all",
+    "write": "gaps in captures: hold the pose before the gap (at the start, the first pose), split "
+    "the file, or interpolate all or those of up to N frames or N seconds (2s), as in "
+    "interpolate:10,split (default: missing frames are omitted from EasyMocap, .obj and arrays; "
+    "other formats hold poses)",
+}
+_METAVAR = {
+    "view": "interpolate[:N|:Ns]",
+    "check": "interpolate",
+    "write": "hold|split|interpolate[:N|:Ns]",
+}
 
 
 def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
@@ -370,28 +395,6 @@ def print_warnings(warnings: Iterable[str | Diagnostic], plain: str = "warning")
         if not note_found(warning, plain):
             severity = warning.severity if isinstance(warning, Diagnostic) else plain
             print(f"{'note' if severity == 'note' else 'warning'}: {warning}", file=sys.stderr)
-
-
-_ONE_SECOND = 1.0
-_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|[0-9]{1,6}(?:\.[0-9]{1,6})?s)%s)?"
-_PATTERNS = {
-    "view": _LIMIT % "",
-    "check": "interpolate",
-    "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
-}
-_WHAT = {
-    "view": "gaps in captures: interpolate all, or those of up to N frames or N seconds (2s)",
-    "check": "gaps in captures: interpolate all",
-    "write": "gaps in captures: hold the pose before the gap (at the start, the first pose), split "
-    "the file, or interpolate all or those of up to N frames or N seconds (2s), as in "
-    "interpolate:10,split (default: missing frames are omitted from EasyMocap, .obj and arrays; "
-    "other formats hold poses)",
-}
-_METAVAR = {
-    "view": "interpolate[:N|:Ns]",
-    "check": "interpolate",
-    "write": "hold|split|interpolate[:N|:Ns]",
-}
 
 
 def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:

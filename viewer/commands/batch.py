@@ -19,8 +19,6 @@ from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.streams import summary_stream
 
-__all__ = ["add_arguments", "parser_of", "run"]
-
 _FAILED = 1  # exit code if an item failed or has findings
 
 

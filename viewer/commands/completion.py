@@ -11,8 +11,6 @@ from viewer.commands._batch.jobs import JOBS, add_all_arguments
 from viewer.commands._usage import Parser
 from viewer.models.download import ADDABLE
 
-__all__ = ["add_arguments", "command_line", "run"]
-
 _SHELLS = ("bash", "zsh", "tcsh", "fish")
 
 _FIGURES = {

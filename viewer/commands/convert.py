@@ -1,4 +1,10 @@
-"""Conversion of figures, poses and motions to other formats."""
+"""Conversion of figures, poses and motions to other formats.
+
+The files are opened as one scene, which is cleaned up and posed as requested, and written: a pose,
+a motion, or figures with their animations, in one file, or in one for each actor if the name has
+``{person}``. All files are written or none. A long BVH file that is written as BVH again is
+converted part by part (``convert_streamed``), if no option needs the whole motion in memory.
+"""
 
 from __future__ import annotations
 
@@ -81,6 +87,26 @@ if TYPE_CHECKING:
     from viewer.formats.bvh.streaming import BvhStream
 
 _OPTIMIZED = (".glb", ".gltf", ".vrm")
+# Streamed conversion.
+_PEEK = 1 << 16  # bytes that identify the format
+_LARGE = 8_000_000  # bytes; smaller files are read as a whole
+
+# Options that involve other files, or pose the figure: none of them can be streamed.
+_OTHERS = (
+    "body",
+    "model",
+    "motion",
+    "joint_map",
+    "save_joint_map",
+    "video",
+    "images",
+    "hands",
+    "pose",
+    "shape",
+    "expression",
+    "dof",
+    "mirror",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +123,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "walk_{person}.glb for a file per person",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
-    _add_joint_map_argument(group)
+    group.add_argument(
+        "--save-joint-map",
+        metavar="FILE",
+        help="also write which joint of the motion drives each joint of the figure, as a text file "
+        "for --joint-map (in a batch, a template such as maps/{stem}.txt)",
+    )
     add_motion_arguments(parser)
     add_vrm_arguments(parser, upgrades=True)
     add_frame_arguments(parser, "A:B")
@@ -270,16 +301,6 @@ def _write_motions(
     )
 
 
-def _add_joint_map_argument(group: argparse._ArgumentGroup) -> None:
-    """Add ``--save-joint-map``."""
-    group.add_argument(
-        "--save-joint-map",
-        metavar="FILE",
-        help="also write which joint of the motion drives each joint of the figure, as a text file "
-        "for --joint-map (in a batch, a template such as maps/{stem}.txt)",
-    )
-
-
 @contextmanager
 def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[None]:
     """Write the requested joint map before the block; remove it if the block fails.
@@ -314,27 +335,6 @@ def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[N
         for file, text in zip(files, texts, strict=True):
             save_text(file, text)
         yield
-
-
-_PEEK = 1 << 16  # bytes that identify the format
-_LARGE = 8_000_000  # bytes; smaller files are read as a whole
-
-# Options that involve other files, or pose the figure.
-_OTHERS = (
-    "body",
-    "model",
-    "motion",
-    "joint_map",
-    "save_joint_map",
-    "video",
-    "images",
-    "hands",
-    "pose",
-    "shape",
-    "expression",
-    "dof",
-    "mirror",
-)
 
 
 def convert_streamed(

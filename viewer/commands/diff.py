@@ -1,4 +1,10 @@
-"""Comparison of figures or motions with a reference."""
+"""Comparison of figures or motions with a reference.
+
+Each input is opened like the reference, its actors are paired with those of the reference
+(``pair_actors``), and each pair is compared. One input is printed in full, several as a table, all
+data as JSON; the distances may be drawn as heat maps with a common scale. The exit code is 1 if
+anything differs, and 2 if an input cannot be read.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +34,6 @@ from viewer.loading import MotionSettings, load
 from viewer.phrases import printable, rounded
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Bytes
 from viewer.rig.comparison import Difference, Measure, compare
 from viewer.rig.comparison.steps import FrameRange
 from viewer.rig.motion.clip import Clip, suits
@@ -40,6 +45,18 @@ from viewer.streams import require_stdout, summary_stream
 
 _DIFFERS = 1  # exit code if there are differences
 _UNREADABLE = 2
+_N_RANKS = 3  # ranks of clips for an actor: same name, the actor's own clip, any other clip
+# Columns of the table, and the names of the measures that they show.
+_COLUMNS = {
+    "joints": ("joint positions", "captured points"),
+    "orientations": ("joint orientations",),
+    "vertices": ("vertices", "surface, from the first", "surface, from the second"),
+    "weights": ("weights",),
+}
+# Heat maps: size of one, size of a sheet of several, pixels; measures that colour a mesh.
+_SIZE = (1280, 960)
+_SHEET = (2400, 1800)
+_COLORED = ("vertices", "surface, from the first")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -242,10 +259,6 @@ def _print(arguments: argparse.Namespace, rows: Sequence[_Compared], stream: Tex
     else:
         print_warnings(rows[0].diagnostics)
         print("\n".join(_lines_of(rows[0], tolerance)), file=stream)
-
-
-# Ranks of clips for an actor: same name, the actor's own clip, any other clip.
-_N_RANKS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -451,14 +464,6 @@ def _line(measure: Measure, difference: Difference) -> str:
     return f"    {measure.name}: at most {most}{where}, mean {mean}"
 
 
-_COLUMNS = {
-    "joints": ("joint positions", "captured points"),
-    "orientations": ("joint orientations",),
-    "vertices": ("vertices", "surface, from the first", "surface, from the second"),
-    "weights": ("weights",),
-}
-
-
 def _table_of(rows: Sequence[_Compared], tolerance: float | None) -> list[str]:
     """Return one line per comparison: the largest differences over all its actors."""
     heads = ["", *_COLUMNS, "result"]
@@ -536,11 +541,6 @@ def _actor(name: str, difference: Difference) -> dict[str, object]:
     }
 
 
-_SIZE = (1280, 960)
-_SHEET = (2400, 1800)
-_COLORED = ("vertices", "surface, from the first")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Heat:
     """Heat map of the reference, coloured by its distance to another figure.
@@ -583,6 +583,7 @@ def _save_heat(heats: Sequence[_Heat], output: Path, skinning: Skinning) -> str:
     Raises ViewerError if there is nothing to colour, or too many heat maps for one sheet.
     Raises OutputError if it cannot be written.
     """
+    from viewer.formats import save_image
     from viewer.media.picture_sinks import SheetSink
     from viewer.rendering.offscreen import render
 
@@ -602,14 +603,8 @@ def _save_heat(heats: Sequence[_Heat], output: Path, skinning: Skinning) -> str:
     for number, heat in enumerate(heats):
         pixels = render(Scene(list(heat.actors)), sink.cell, None, options)
         if len(heats) == 1:
-            return _save_one(output, pixels)
+            save_image(output, pixels)
+            return f"{printable(output)}: the largest distance at each vertex"
         sink.write(number, pixels)
     sink.close()
     return f"{printable(output)}: {len(heats)} heat maps with a common scale"
-
-
-def _save_one(output: Path, pixels: Bytes) -> str:
-    from viewer.formats import save_image
-
-    save_image(output, pixels)
-    return f"{printable(output)}: the largest distance at each vertex"

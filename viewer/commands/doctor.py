@@ -1,4 +1,8 @@
-"""Report about this machine: packages, OpenGL, EGL and display, with remedies."""
+"""Report about this machine: packages, OpenGL, EGL and display, with remedies.
+
+``--bench`` also measures whole programs from start to end, frames, and the parts of a frame other
+than drawing. Times that are compared with each other are measured alternately.
+"""
 
 from __future__ import annotations
 
@@ -48,8 +52,15 @@ _EXTRAS = {
     "distributed": "viewer batch on clusters",
     "dask-jobqueue": "viewer batch on SLURM clusters",
 }
-_WINDOW_SECONDS = 20
+_WINDOW_SECONDS = 20  # time limit for opening a window
 _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
+# Measurements.
+_SIZE = 1280, 720  # pixels
+_STARTS, _FRAMES = 5, 9  # numbers of repetitions; the median is used
+_INSTANCES, _ROUNDS_OF_MANY = 100, 3  # bodies in a crowd, and repetitions of its frame
+
+# A minimal program that draws: it imports numpy and creates an OpenGL context.
+_LEAST = "from viewer.rendering.gpu.context import headless_context; headless_context()"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,15 +96,10 @@ def run(arguments: argparse.Namespace) -> int:
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
     if arguments.bench and not code:
-        _print_measurements()
+        for measurement in measured():
+            print_line(f"{'bench':<8}", str(measurement))
+            sys.stdout.flush()
     return code
-
-
-def _print_measurements() -> None:
-    """Print the speed of this machine; all times are medians."""
-    for found in measured():
-        print_line(f"{'bench':<8}", str(found))
-        sys.stdout.flush()
 
 
 def examine() -> Iterator[_Finding]:
@@ -239,14 +245,6 @@ def _examine_cache() -> _Finding:
     count, size = cache_use()
     used = f"{counted(count, 'array')}, {size / 1e6:.1f} of at most {LIMIT / 1e6:.0f} MB"
     return _Finding("cache", "ok", f"{folder}: {used} ({VARIABLE}=off for none)")
-
-
-_SIZE = 1280, 720
-_STARTS, _FRAMES = 5, 9  # numbers of repetitions; the median is used
-_INSTANCES, _ROUNDS_OF_MANY = 100, 3
-
-# A minimal program that draws: it imports numpy and creates an OpenGL context.
-_LEAST = "from viewer.rendering.gpu.context import headless_context; headless_context()"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,6 @@ from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
 from viewer.manual import PAGES, page_text
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""

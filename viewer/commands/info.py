@@ -1,4 +1,8 @@
-"""Description of files: joints, DOFs, limits, vertices, triangles, influences, warnings."""
+"""Description of files: joints, DOFs, limits, vertices, triangles, influences, warnings.
+
+``describe`` collects everything as JSON data; the printed lines are made from that data, so both
+say the same.
+"""
 
 from __future__ import annotations
 
@@ -35,10 +39,10 @@ if TYPE_CHECKING:
     from viewer.rig.material import Material
     from viewer.rig.skin import Skin
 
-
 # If more unlimited DOFs than this differ from 0, only their number is printed.
 _MOST_FREE_DOFS = 24
 _BOX_DIGITS = 4  # digits of a size; those of the corners of a box have the same precision
+_LIMITS = (4, 8)  # influences per vertex in common engines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -370,9 +374,6 @@ def _point(values: list[float], finest: float) -> str:
     """Return coordinates as text, rounded to multiples of ``finest``, a power of ten."""
     rows = [value if finest == 0.0 else finest * round(value / finest) for value in values]
     return f"({', '.join(number_text(row, '.10g') for row in rows)})"
-
-
-_LIMITS = (4, 8)  # influences per vertex in common engines
 
 
 def _describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:

@@ -37,8 +37,6 @@ from viewer.lint import (
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 
-__all__ = ["add_arguments", "run"]
-
 _FOUND = 1  # exit code if there are findings
 _STYLES = {"error": "red", "warning": "yellow"}
 

@@ -16,8 +16,6 @@ from viewer.models.download import ADDABLE, add_model, pip_command
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 
-__all__ = ["add_arguments", "run"]
-
 _STYLES = {"found": "green", "missing": "yellow", "bundled": "green"}
 
 

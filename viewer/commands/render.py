@@ -1,4 +1,9 @@
-"""Rendering to images and videos, without a display or window."""
+"""Rendering to images and videos, without a display or window.
+
+One pose is drawn as an image, with or without the window's panels; a motion as a video, numbered
+images or a contact sheet, frame by frame; with ``--onion``, several of its poses in one image.
+Options that have no effect on the requested kind of output are refused before anything is read.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +58,12 @@ if TYPE_CHECKING:
     from viewer.rendering.recorder import Recording
 
 _SIZE = "1280x720"
-_OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
+_OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")  # formats without transparency
+# Sequences.
+_FIELD = re.compile(r"\{frame[:!}]")  # the frame number in the name of an image
+_MOST_CELLS = 1000  # of a contact sheet
+_MOST_POSES = 100  # in one image
+_NARROW, _WIDE = 0.4, 2.5  # aspect ratios of the cells of contact sheets
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -293,12 +303,6 @@ def _grid_step(points: Floats) -> float:
     from viewer.rendering.passes.ground_pass import grid_step
 
     return grid_step(bounding_box(points))
-
-
-_FIELD = re.compile(r"\{frame[:!}]")
-_MOST_CELLS = 1000
-_MOST_POSES = 100
-_NARROW, _WIDE = 0.4, 2.5  # aspect ratios of the cells of contact sheets
 
 
 def _add_sequence_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,15 @@
-"""Rig transfer from a figure to an unrigged mesh."""
+"""Rig transfer from a figure to an unrigged mesh.
+
+``--landmarks`` names a text file with pairs of corresponding points, one pair per line: three
+numbers of the posed template and three of the target, or the name of a joint of the template and
+three numbers of the target; ``#`` begins a comment::
+
+    0.0 1.62 0.1      0.0 162.0 9.5
+    left_wrist        71.2 140.0 -3.0
+
+Motions of the template (``--clip``) are transferred too, and written next to the result. All output
+files are checked before the transfer, which takes long, and written together or not at all.
+"""
 
 from __future__ import annotations
 
@@ -47,6 +58,9 @@ from viewer.rig.skinning import joint_matrices, posed_mesh
 from viewer.streams import require_stdout, summary_stream
 
 _SMOOTHING = 10  # number of iterations if --smooth has no value
+# Landmarks.
+_FARTHEST = 1e9  # largest coordinate, in any unit
+_LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +91,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig", metavar="NAME", help="rig of the template, for Anny (default: default)"
     )
-    _add_clip_argument(parser)
+    parser.add_argument(
+        "--clip",
+        dest="clips",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a motion of the template: it is transferred to the target, with its path scaled to "
+        "the figure, and written next to the result as NAME-FILE.anim (.skel-style rigs) or "
+        ".bvh; may be repeated",
+    )
     parser.add_argument("--view", action="store_true", help="open the result in a window")
     _add_method_arguments(parser)
     _add_alignment_arguments(parser)
@@ -243,7 +266,8 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
 
 def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     """Return the figure whose rig is transferred, posed and shaped as requested."""
-    scene = load(*_files(arguments), motion=_template_settings(arguments))
+    settings = MotionSettings(frame_rate=arguments.fps, rig=arguments.rig or "")
+    scene = load(*_files(arguments), motion=settings)
     inputs += scene.files
     _check_frame(scene, arguments)
     print_warnings([*scene.diagnostics, *apply_pose(scene, arguments)])
@@ -256,10 +280,6 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     if not attached[0].is_present:
         raise RigError("--from: expected a frame of the template, found a gap")
     return attached[0]
-
-
-def _template_settings(arguments: argparse.Namespace) -> MotionSettings:
-    return MotionSettings(frame_rate=arguments.fps, rig=arguments.rig or "")
 
 
 def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
@@ -355,18 +375,6 @@ def _show(rigged: Rigged, target: Figure) -> None:
     show(Scene([result, Actor(target, visible=False)], world_up=rigged.figure.up))
 
 
-# Landmark files: pairs of corresponding points on two meshes.
-#
-# One pair per line: three numbers of the posed template and three of the target, or the name of a
-# joint of the template and three numbers of the target; ``#`` begins a comment::
-#
-#     0.0 1.62 0.1      0.0 162.0 9.5
-#     left_wrist        71.2 140.0 -3.0
-
-_FARTHEST = 1e9  # largest coordinate, in any unit
-_LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
-
-
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     """Read pairs of points.
 
@@ -434,20 +442,6 @@ class _TransferredClip:
 
     clip: Clip | SampledClip
     path: Path
-
-
-def _add_clip_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--clip``."""
-    parser.add_argument(
-        "--clip",
-        dest="clips",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="a motion of the template: it is transferred to the target, with its path scaled to "
-        "the figure, and written next to the result as NAME-FILE.anim (.skel-style rigs) or "
-        ".bvh; may be repeated",
-    )
 
 
 def _read_clips(

@@ -50,7 +50,6 @@ from viewer.rig.scene import Scene, scene_points
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-__all__ = ["add_arguments", "run"]
 
 SIZE = (1280, 720)
 """Size of the image that is rendered if no window can be opened."""

@@ -21,7 +21,7 @@ from viewer.export._losses.posed import PoseLosses, look_at_mesh
 from viewer.export._motion_paths import numbered_paths
 from viewer.formats import Source, all_or_none, free_path, save_bytes, save_parts
 from viewer.formats._text.number_text import Digits, integers, row_texts, shortest, significant
-from viewer.media.image import encode_png
+from viewer.media.png import encode_png
 from viewer.phrases import printable
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.figure import Figure

@@ -17,7 +17,7 @@ from viewer.export._losses.posed import PoseLosses
 from viewer.formats import Source, all_or_none, free_path, keeping_written, read, write
 from viewer.formats.skel import KEYWORDS
 from viewer.formats.skin import lost_parts
-from viewer.media.image import encode_png
+from viewer.media.png import encode_png
 from viewer.media.saving import as_words
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure

@@ -30,8 +30,6 @@ from numpy.typing import NDArray
 
 from viewer.version import VERSION
 
-__all__ = ["LIMIT", "VARIABLE", "Slot", "cache_folder", "cache_use", "slot_of", "without_cache"]
-
 VARIABLE = "VIEWER_CACHE"
 """Environment variable: a folder for the cache, or ``off``."""
 

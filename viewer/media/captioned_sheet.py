@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
 
-__all__ = ["CaptionedCell", "captioned_sheet", "elided", "wrapped"]
 
 _WIDTH = 240  # width of a cell, pixels
 _HEIGHTS = 120, 320  # minimum and maximum height of a cell's picture

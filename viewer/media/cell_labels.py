@@ -6,8 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Bytes
 
-__all__ = ["write_label"]
-
 _SMALLEST = 9  # minimum legible height of letters, pixels
 _LETTERS = 1 / 10  # height of letters, relative to the cell's shorter side
 _INK, _PAPER = 255.0, 16.0  # grey levels of the letters and of the tag behind them

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["file_stem", "folder_name", "opened_text"]
-
 _LONGEST = 100  # maximum length of a stem in characters
 _INSIDE = ("smpl_full", "smplfull", "smpl", "keypoints3d", "core_txt_files")
 """Names of folders that exist in every EasyMocap recording or copy of the PIG model."""

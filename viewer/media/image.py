@@ -21,15 +21,6 @@ from viewer.rig.arrays import Bytes
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = [
-    "decode_picture",
-    "decode_pictures",
-    "decoding_pictures",
-    "encode_png",
-    "is_picture",
-    "picture_dimensions",
-    "save_image",
-]
 
 _MAX_PIXELS = 16384 * 16384  # limit for one image, and for all images that are decoded together
 # Small files may hold huge images of one colour: images that are decoded together may have this

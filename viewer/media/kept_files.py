@@ -13,16 +13,6 @@ from viewer.errors import OutputError
 from viewer.media.saving import save_bytes
 from viewer.phrases import printable
 
-__all__ = [
-    "as_json",
-    "checked",
-    "has_checksum",
-    "load_kept",
-    "save_kept",
-    "to_stderr",
-    "with_checksum",
-]
-
 Content = TypeVar("Content")
 
 _LARGEST = 1 << 22  # bytes; all kept files are far smaller

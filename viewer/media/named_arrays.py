@@ -15,8 +15,6 @@ from viewer.interrupts import poll
 from viewer.media.saving import save_parts
 from viewer.progress import report_bytes
 
-__all__ = ["save_arrays"]
-
 _BLOCK = 1 << 22  # bytes that are compressed or written between reports of progress
 
 

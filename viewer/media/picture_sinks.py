@@ -14,8 +14,6 @@ from viewer.media.cell_labels import write_label
 from viewer.media.image import save_image
 from viewer.rig.arrays import Bytes
 
-__all__ = ["PictureSink", "SheetSink", "sheet_layout"]
-
 _MOST_WORKERS = 4  # maximum number of images compressed at the same time
 _SMALLEST_CELL = 16  # minimum side of a cell, pixels
 _CELL_ASPECT = 4.0 / 3.0

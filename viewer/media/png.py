@@ -14,8 +14,6 @@ import numpy as np
 
 from viewer.rig.arrays import Bytes
 
-__all__ = ["encode_png"]
-
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _SUB = 1
 _RGB, _RGBA = 2, 6  # colour types

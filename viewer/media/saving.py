@@ -19,17 +19,6 @@ from viewer.phrases import printable
 from viewer.progress import report, report_bytes
 from viewer.streams import is_stdout, write_stdout
 
-__all__ = [
-    "Replacement",
-    "all_or_none",
-    "as_words",
-    "free_path",
-    "keeping_written",
-    "save_bytes",
-    "save_parts",
-    "save_text",
-]
-
 
 def as_words(name: str) -> list[bytes] | None:
     """Return the words of a name as bytes, or None if joining them would not give the same name.

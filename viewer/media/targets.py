@@ -13,8 +13,6 @@ from viewer.errors import OutputError
 from viewer.phrases import printable
 from viewer.streams import is_stdout, require_stdout
 
-__all__ = ["check_folder_target", "check_targets", "replacing_since"]
-
 _FORCE = "--force replaces it"
 _CLOCKS = 1.0  # seconds by which the clocks of machines and file servers may differ
 _Identity = tuple[int, int] | Path  # device and inode of an existing file, otherwise its path

@@ -17,8 +17,6 @@ from viewer.media.video_frames import VideoFrames
 from viewer.media.video_kinds import VIDEOS
 from viewer.rig.arrays import Bytes
 
-__all__ = ["data_uri", "thumbnail"]
-
 _QUALITY = 82  # JPEG quality
 _MOST_BYTES = 256 << 20  # maximum size of a file
 

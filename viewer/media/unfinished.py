@@ -18,20 +18,15 @@ from collections import defaultdict, deque
 from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = [
-    "new_prefix",
-    "note_unfinished",
-    "remove_leftovers",
-    "remove_unfinished",
-    "temporary_prefix",
-]
-
 _LONGEST = 40  # maximum number of characters of a file's name in that of its temporary file
 _MARK = ".tmp"  # distinguishes temporary files from hidden files of the user
 # Maximum number of registered files in all threads; far fewer are written simultaneously.
 _MOST = 64
 
 _unfinished: deque[Path] = deque(maxlen=_MOST)
+
+# The module tempfile appends a random part of eight characters.
+_LEFTOVER = re.compile(r"(\..+\.tmp)(?:([0-9a-f]{8})-([0-9]+)-)?[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
 
 
 def temporary_prefix(name: str) -> str:
@@ -124,10 +119,6 @@ def _is_alive(process: int) -> bool:
     except (OSError, OverflowError):  # of another user, or no number of a process
         return True
     return True
-
-
-# The module tempfile appends a random part of eight characters.
-_LEFTOVER = re.compile(r"(\..+\.tmp)(?:([0-9a-f]{8})-([0-9]+)-)?[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
 
 
 def remove_leftovers(targets: Iterable[str]) -> None:

@@ -3,6 +3,10 @@
 ``.mp4`` contains H.264, ``.webm`` VP9, ``.gif`` 256-colour images. Colours of the first two are
 those of BT.709 in limited range, converted and tagged as such (ITU-T H.273, tables 2 to 4, code
 point 1), so that players show the rendered colours.
+
+A GIF has one palette for the whole video, chosen from a few frames: static regions are then
+identical from frame to frame and not stored again, which makes the file five times smaller than
+with a palette per frame. The dither is ordered (a fixed pattern) for the same reason.
 """
 
 from __future__ import annotations
@@ -32,6 +36,9 @@ if TYPE_CHECKING:
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
 _QUALITY = 75.0
 _GIF_SAMPLES = 12  # number of frames from which the palette is chosen
+
+_HUNDREDTH = Fraction(1, 100)  # seconds, the time unit of GIF
+_PALETTE_SIDE = 16  # FFmpeg stores a palette as an image of 16 x 16
 
 
 class VideoSink:
@@ -314,15 +321,13 @@ def _bit_rate(size: tuple[int, int], rate: float, quality: float) -> int:
     return int(size[0] * size[1] * rate * 0.02 * 30.0 ** (quality / 100.0))
 
 
-# Output file of a video encoder, which stores write errors and hides them from FFmpeg.
-#
-# libavformat does not survive every failed write: if the header could not be written, the next
-# packet makes PyAV write it again, and ``avformat_init_output`` reads freed memory. So writes
-# always succeed for the library, and the owner of the file checks for an error after each step.
-
-
 class VideoFile:
     """A seekable file object for PyAV that drops everything after the first error.
+
+    FFmpeg hides write errors, and libavformat does not survive every failed write: if the header
+    could not be written, the next packet makes PyAV write it again, and ``avformat_init_output``
+    reads freed memory. So writes always succeed for the library, and the owner of the file checks
+    for an error after each step.
 
     Parameters
     ----------
@@ -405,16 +410,6 @@ class VideoFile:
         self.closed = True
         with contextlib.suppress(OSError):
             self._file.close()
-
-
-# The 256-colour palette of a GIF, chosen from a few frames; pixels get an ordered dither.
-#
-# With one palette for the whole video, static regions are identical from frame to frame and are
-# not stored again, which makes the file five times smaller than with a palette per frame. The
-# dither is ordered (a fixed pattern) for the same reason.
-
-_HUNDREDTH = Fraction(1, 100)  # seconds, the time unit of GIF
-_PALETTE_SIDE = 16  # FFmpeg stores a palette as an image of 16 x 16
 
 
 class _PaletteChooser:

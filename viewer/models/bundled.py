@@ -7,8 +7,6 @@ from pathlib import Path
 
 from viewer.resources import resource
 
-__all__ = ["BUNDLED", "bundled_body", "bundled_files"]
-
 
 def bundled_files() -> tuple[Path, Path]:
     """Return the skeleton and the skin of the bundled figure."""

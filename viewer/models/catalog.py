@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewer.data_classes import dataclass
 
-__all__ = ["CATALOG", "Publication"]
+_RESEARCH = "research only"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +28,6 @@ class Publication:
     licence: str
     address: str
 
-
-_RESEARCH = "research only"
 
 CATALOG = {
     "body": Publication("bundled body", "an adult in SMPL's layout", "CC0", "viewer --body"),

@@ -15,8 +15,6 @@ from viewer.models import data_folder
 from viewer.phrases import printable
 from viewer.progress import report
 
-__all__ = ["ADDABLE", "add_model", "pip_command"]
-
 ADDABLE = {"anny": "anny==0.6.2"}
 """Models that can be added, and the Python package of each, in a tested version."""
 

@@ -10,7 +10,7 @@ import pytest
 
 from viewer.formats import Source
 from viewer.formats.fbx.contents import materials_of
-from viewer.media.image import encode_png
+from viewer.media.png import encode_png
 
 GREY = encode_png(np.full((1, 1, 4), 128, dtype=np.uint8))
 NAMES = (

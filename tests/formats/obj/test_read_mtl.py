@@ -8,7 +8,7 @@ from faults import fault_of
 from numpy.testing import assert_array_equal
 
 from viewer.formats import Source, obj
-from viewer.media.image import encode_png
+from viewer.media.png import encode_png
 
 FACE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
 

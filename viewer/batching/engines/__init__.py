@@ -15,10 +15,15 @@ from typing import Protocol
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 
-__all__ = ["ENGINES", "Engine", "Job", "Limits", "load_engine"]
-
 IN_FLIGHT = 4
 """Number of items assigned to each worker, including the one that runs."""
+
+ENGINES = {
+    "sequential": "in this process",
+    "processes": "in worker processes of this machine, by pebble",
+    "dask_cluster": "on a Dask cluster",
+}
+"""Where the items of each engine run."""
 
 
 class Job(Protocol):
@@ -77,14 +82,6 @@ class Engine(Protocol):
     def run(self, items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         """Run items; yield one result per item that was started, as they finish."""
         ...
-
-
-ENGINES = {
-    "sequential": "in this process",
-    "processes": "in worker processes of this machine, by pebble",
-    "dask_cluster": "on a Dask cluster",
-}
-"""Where the items of each engine run."""
 
 
 def load_engine(name: str) -> Engine:

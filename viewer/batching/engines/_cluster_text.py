@@ -12,8 +12,6 @@ from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 
-__all__ = ["ClusterName", "parse_cluster"]
-
 _ADDRESS = re.compile(r"(tcp|tls)://.+:\d+")
 _NAME = re.compile(r"[a-z][a-z0-9-]*")
 _KINDS = ("local", "tcp://", "slurm")

@@ -7,8 +7,6 @@ import signal
 import sys
 from collections.abc import Iterator
 
-__all__ = ["limit_memory", "signals_blocked"]
-
 
 def limit_memory(size: int) -> None:
     """Limit the memory that this process may allocate, in bytes; further calls have no effect."""

@@ -19,8 +19,6 @@ from viewer.data_classes import dataclass
 from viewer.media.targets import replacing_since
 from viewer.version import VERSION
 
-__all__ = ["ENDED", "Call", "NoFolder", "OtherVersion", "Reply", "run_items"]
-
 ENDED = "viewer-ended"
 """Topic of events on the scheduler: attempts ended by their time limit."""
 

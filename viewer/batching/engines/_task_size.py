@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import deque
 from statistics import median
 
-__all__ = ["LONGEST", "TaskSize"]
-
 _SECONDS = 0.5  # duration of a task for which scheduling takes about 1 % of the time
 _MOST = 64  # maximum number of items per task
 _GROWTH = 8  # items that finish before tasks grow by one item

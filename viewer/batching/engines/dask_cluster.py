@@ -44,6 +44,26 @@ _PER_WORKER = 3  # tasks assigned to each worker: one runs while the next ones a
 _COUNT_EVERY = 1.0  # seconds between counts of the workers, which join and leave
 _ALONE = 60.0  # seconds without any worker before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
+_CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
+_ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+# The batch itself counts retries and tracks which items a worker had started.
+_CONFIG = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    # Without Dask's MALLOC_TRIM_THRESHOLD_: it returns freed memory, so new arrays cause page
+    # faults.
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
+    # These poll the workers many times a second, which takes at least a tenth of the time of short
+    # items.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.scheduler.active-memory-manager.start": False,
+}
 
 
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
@@ -320,26 +340,6 @@ def _lost() -> ViewerError:
     return ViewerError("--cluster: the scheduler disconnected; use --resume to continue")
 
 
-_CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
-_ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-
-# The batch itself counts retries and tracks which items a worker had started.
-_CONFIG = {
-    "distributed.scheduler.allowed-failures": 0,
-    "distributed.scheduler.worker-saturation": 1.0,
-    "distributed.worker.memory.target": False,
-    "distributed.worker.memory.spill": False,
-    "distributed.worker.memory.pause": False,
-    # Without Dask's MALLOC_TRIM_THRESHOLD_: it returns freed memory, so new arrays cause page
-    # faults.
-    "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
-    # These poll the workers many times a second, which takes at least a tenth of the time of short
-    # items.
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.system-monitor.interval": "10s",
-    "distributed.admin.tick.interval": "1s",
-    "distributed.scheduler.active-memory-manager.start": False,
-}
 Check = Callable[[Iterable[str]], None]
 """Called with the names of the connected workers; replaces workers that have ended."""
 

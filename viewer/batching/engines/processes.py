@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     from pebble import ProcessFuture, ProcessPool
 
-__all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _NO_MEMORY = 99  # exit code of a worker that reached its memory limit

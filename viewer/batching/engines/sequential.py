@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator
 from viewer.batching.engines import Job, Limits
 from viewer.batching.items import Item, Result
 
-__all__ = ["run"]
-
 
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     """Run items in order; time and memory are not limited, because the process cannot be killed."""

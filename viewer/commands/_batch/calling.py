@@ -33,6 +33,12 @@ if TYPE_CHECKING:
 
 _Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
+_OWN = (
+    *("files", "output", "force", "report", "resume", "shard", "workers", "cluster", "retries"),
+    *("timeout", "limit_memory", "from_list", "table", "overview"),
+)
+"""Arguments that are parameters of ``batch``; in ``options``, they would have no effect."""
+
 
 def batch(
     paths: _Paths,
@@ -197,13 +203,6 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
         )
     }
     return command, replace(request, **added)
-
-
-_OWN = (
-    *("files", "output", "force", "report", "resume", "shard", "workers", "cluster", "retries"),
-    *("timeout", "limit_memory", "from_list", "table", "overview"),
-)
-"""Arguments that are parameters of ``batch``; in ``options``, they would have no effect."""
 
 
 def _check_options(parser: Parser, job: str, options: Sequence[str]) -> None:

@@ -22,8 +22,6 @@ from viewer.loading import bundled_body, bundled_files
 from viewer.media.array_cache import without_cache
 from viewer.phrases import printable
 
-__all__ = ["JOBS", "CommandJob", "JobKind", "add_job_arguments", "job_parser"]
-
 
 @dataclass(frozen=True)
 class JobKind:

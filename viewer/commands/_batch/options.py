@@ -6,8 +6,6 @@ import argparse
 
 from viewer.commands._numbers import number
 
-__all__ = ["RETRIES", "TIMEOUT", "add_batch_arguments"]
-
 RETRIES = 2
 TIMEOUT = 600.0  # default time limit of an attempt, seconds
 

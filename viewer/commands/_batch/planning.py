@@ -29,8 +29,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import counted, listed, printable
 
-__all__ = ["Plan", "Request", "plan_of"]
-
 _SMALL = 50e6  # total bytes of inputs above which workers run even a few inputs
 _LISTED = 10  # maximum number of names in a message
 

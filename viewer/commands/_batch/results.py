@@ -13,8 +13,6 @@ from viewer.batching.tables import save_table
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
 from viewer.phrases import counted, printable
 
-__all__ = ["add_result_arguments", "check_results", "name_in_shard", "save_results"]
-
 _DRAWN = ("render", "diff")
 
 

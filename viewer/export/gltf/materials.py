@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.export.gltf.document import Document, text_of
-from viewer.media.image import encode_png
+from viewer.media.png import encode_png
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.material import MINIFICATIONS, Material, Texture
 from viewer.rig.mesh import Mesh
