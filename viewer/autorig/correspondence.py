@@ -3,6 +3,10 @@
 A vertex is matched if the closest point of the template is close enough and faces the same way
 (Abdrashitov et al. 2023). Skin that touches other skin, such as an arm at rest on the torso,
 is close to the wrong part but faces the other way: its weights are inpainted.
+
+Parts of a target whose triangles are wound the wrong way face the other way, too. Such a part may
+be a lining, which is correct. It is an error if it encloses a volume, or if it makes up most of the
+target.
 """
 
 from __future__ import annotations
@@ -31,6 +35,10 @@ _TOGETHER = math.radians(80.0)
 
 # Two sides of a sheet cancel out if less than this fraction of the area around a vertex remains.
 _CANCELLED = 1e-3
+
+# Squared number of border edges per triangle, below which the volume's sign is reliable.
+_CLOSED = 0.25
+_MOST_REVERSED = 0.5  # fraction of the target's area above which an island is reversed
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,16 +345,6 @@ def _keys(pairs: Ints, template: Welded) -> Ints:
     low, high = pairs.min(axis=1).astype(np.int64), pairs.max(axis=1)
     keys: Ints = low * len(template.positions) + high
     return keys
-
-
-# Detection and reversal of parts of a target whose triangles are wound the wrong way.
-#
-# A part whose normals are opposite to the template's may be a lining, which is correct. It is an
-# error if it encloses a volume, or if it makes up most of the target.
-
-# Squared number of border edges per triangle, below which the volume's sign is reliable.
-_CLOSED = 0.25
-_MOST_REVERSED = 0.5  # fraction of the target's area above which an island is reversed
 
 
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:

@@ -1,4 +1,9 @@
-"""Pipeline of a rig transfer: align, transfer weights and joints, invert the pose, and check."""
+"""Pipeline of a rig transfer: align, transfer weights and joints, invert the pose, and check.
+
+The robust method aligns template and target, validates closest points, moves the joints with the
+surface around them, and transforms the target to its rest pose. The seed method, provided for
+comparison, is in ``seed``.
+"""
 
 from __future__ import annotations
 
@@ -36,6 +41,8 @@ from viewer.rig.shape import pose_weights, shaped
 from viewer.rig.skeleton import Skeleton, joint_label
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.units import UNIT_NAMES, unit_of_scaled
+
+_JOINT_REACH = 0.08  # maximum distance between the two surfaces, as a fraction of the target's size
 
 
 def transfer(
@@ -95,22 +102,10 @@ def transfer(
     return with_fields(rigged)
 
 
-def _silent(fraction: float, what: str) -> None:
-    """Ignore progress."""
-
-
-def _parts(figure: Figure) -> str:
-    parts = {"mesh": figure.mesh, "skeleton": figure.skeleton, "skin": figure.skin}
-    return " and ".join(name for name, part in parts.items() if part is not None) or "none"
-
-
-_JOINT_REACH = 0.08  # maximum distance between the two surfaces, as a fraction of the target's size
-
-
 def robust(
     template: Figure, pose: Pose, target: Mesh, how: TransferSettings, report: Report, name: str
 ) -> Rigged:
-    """Transfer a rig; see ``pipeline.transfer``, which checks the arguments.
+    """Transfer a rig; see ``transfer``, which checks the arguments.
 
     Parameters
     ----------
@@ -311,3 +306,12 @@ def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> l
         key = "R013.correctives-too-large" if how.correctives else "R013.correctives"
         lines.append(Diagnostic(key))
     return lines
+
+
+def _silent(fraction: float, what: str) -> None:
+    """Ignore progress."""
+
+
+def _parts(figure: Figure) -> str:
+    parts = {"mesh": figure.mesh, "skeleton": figure.skeleton, "skin": figure.skin}
+    return " and ".join(name for name, part in parts.items() if part is not None) or "none"

@@ -238,7 +238,7 @@ def export_clips(
     Parameters
     ----------
     actor : Actor
-        See ``viewer.rig.motion.own_animations.has_own_animations``.
+        See ``viewer.rig.motion.animation_choice.has_own_animations``.
     path : str or Path
         As for ``export``; a format that ``writes_keys``.
     skinning : Skinning, optional

@@ -45,7 +45,7 @@ class VideoImages:
         self._faults: dict[str, None] = {}
 
     def at(self, camera: str, seconds: float) -> CameraImage | None:
-        """Return the frame at a time; see ``viewer.rig.captures.camera_images``."""
+        """Return the frame at a time; see ``viewer.rig.captures.cameras``."""
         if camera not in self.cameras:
             return None
         number = round((seconds + self._first) * self._video.rate)

@@ -17,6 +17,27 @@ _BLOCK = 9  # number of correctives per joint in SMPL
 _LONGEST = 252  # maximum number of rows in one range of correctives; a multiple of _BLOCK
 
 
+class ShapeSpace(Protocol):
+    """Displacement of the rest mesh and joints by weights; 0 for weights of 0. Immutable."""
+
+    def displacement(self, weights: Floats) -> Floats:
+        """Return the displacement of the rest vertices.
+
+        Parameters
+        ----------
+        weights : (N,)
+            N <= S; missing weights are treated as 0.
+
+        Returns
+        -------
+        (V, 3)
+            Figure units.
+        """
+
+    def joint_displacement(self, weights: Floats) -> Floats | None:
+        """Return the displacement of the rest joints, (J, 3); None if a regressor moves them."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BlendShapes:
     """Per-vertex offsets of the rest mesh, scaled by weights: v = v_rest + sum_s w_s d_s.
@@ -369,24 +390,3 @@ def _values(offsets: Floats | Deferred) -> Floats:
 def _check_shape(name: str, found: tuple[int, ...], wanted: tuple[int, ...]) -> None:
     if found != wanted:
         raise RigError(f"{name}: expected shape {wanted}, found {found}")
-
-
-class ShapeSpace(Protocol):
-    """Displacement of the rest mesh and joints by weights; 0 for weights of 0. Immutable."""
-
-    def displacement(self, weights: Floats) -> Floats:
-        """Return the displacement of the rest vertices.
-
-        Parameters
-        ----------
-        weights : (N,)
-            N <= S; missing weights are treated as 0.
-
-        Returns
-        -------
-        (V, 3)
-            Figure units.
-        """
-
-    def joint_displacement(self, weights: Floats) -> Floats | None:
-        """Return the displacement of the rest joints, (J, 3); None if a regressor moves them."""

@@ -1,4 +1,7 @@
-"""Expressions of a face: combinations of morph targets, which can suppress each other."""
+"""Expressions of a face: combinations of morph targets, which can suppress each other.
+
+They can also change properties of materials: colours, and the placement of textures.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +32,14 @@ OLD_PRESETS = {
 }
 """Names of expressions in VRM 0.x, in lower case, and their names in VRM 1.0."""
 _HALF = 0.5  # a binary expression is fully on above this weight, and off otherwise
+
+COLOR_KINDS = (
+    *("color", "emissionColor", "shadeColor", "rimColor", "matcapColor", "outlineColor"),
+)
+"""Colours that expressions change, by their names in VRM 1.0."""
+TRANSFORM = "transform"
+"""Kind of the placement of all textures of a material, except its matcap."""
+_STRAIGHT = 1e-9  # sine of the largest angle of a transform without rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,15 +105,6 @@ class ExpressionRules:
         weights = weights.copy()
         weights[self.rows[known]] = result[known]
         return weights
-
-
-COLOR_KINDS = (
-    *("color", "emissionColor", "shadeColor", "rimColor", "matcapColor", "outlineColor"),
-)
-"""Colours that expressions change, by their names in VRM 1.0."""
-TRANSFORM = "transform"
-"""Kind of the placement of all textures of a material, except its matcap."""
-_STRAIGHT = 1e-9  # sine of the largest angle of a transform without rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Caches of derived results with the lifetime of the objects from which they are derived."""
+"""Caches of derived results that live as long as what they derive from, and keys of arrays."""
 
 from __future__ import annotations
 

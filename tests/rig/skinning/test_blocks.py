@@ -12,7 +12,6 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import figure_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform, deform_frames, joint_matrices, lbs
-from viewer.rig.skinning import lbs as _blocks
 from viewer.rig.skinning.lbs import blocks_of
 
 ROUNDING = 2e-14  # for sums of about ten terms of size 10
@@ -74,7 +73,7 @@ def test_blocks_are_cached_unless_they_are_too_large(monkeypatch):
     _, skin = random_skin(4, 600, 20)
     first = [id(block) for block in blocks_of(skin)]
     assert [id(block) for block in blocks_of(skin)] == first
-    monkeypatch.setattr(_blocks, "_MOST", 600)
+    monkeypatch.setattr(lbs, "_MOST", 600)
     influences, other = random_skin(4, 600, 20)
     kept = list(blocks_of(other))
     again = list(blocks_of(other))

@@ -45,7 +45,7 @@ class ImageFolders:
         return tuple(name for name, files in self._files.items() if files)
 
     def at(self, camera: str, seconds: float) -> CameraImage | None:
-        """Return the image at a time; see ``viewer.rig.captures.camera_images``."""
+        """Return the image at a time; see ``viewer.rig.captures.cameras``."""
         files = self._files.get(camera, {})
         number = self._frames.start + round(seconds * self._rate)
         known = self._shown.get(camera)

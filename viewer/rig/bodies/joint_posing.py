@@ -1,4 +1,13 @@
-"""Joints whose DOFs are not Euler angles but parameters of other rules."""
+"""Joints whose DOFs are not Euler angles but parameters of other rules: those of SKEL.
+
+Keller et al. 2023, From Skin to Skeleton. A joint rotates about axes of its bone. The bone frame B
+relative to the T-pose follows the rest joints, so the rotation in the T-pose frame is::
+
+    R(q) = F (prod_i exp(q_i a_i)) F^T       F = B A^T, A: frame in the pose of the data
+
+The last DOF of a joint is multiplied from the left, as elsewhere. In addition, the shoulder blades
+slide on an ellipsoid, and each part of the spine bends into an arc of constant length.
+"""
 
 from __future__ import annotations
 
@@ -25,16 +34,7 @@ class JointPosing(Protocol):
         """Return the rules for other rest joints, (J, 3), figure units."""
 
 
-# Anatomical joints of SKEL: axes of bones, shoulder blades on the ribs, and a curved spine.
-#
-# Keller et al. 2023, From Skin to Skeleton. A joint rotates about axes of its bone. The bone
-# frame B relative to the T-pose follows the rest joints, so the rotation in the T-pose frame is::
-#
-#     R(q) = F (prod_i exp(q_i a_i)) F^T       F = B A^T, A: frame in the pose of the data
-#
-# The last DOF of a joint is multiplied from the left, as elsewhere. In addition, the shoulder
-# blades slide on an ellipsoid, and each part of the spine bends into an arc of constant length.
-
+# The table of joints: axes of their DOFs, in the order in which they are multiplied, and names.
 _Z, _MINUS_Z = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 _X, _Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 _PINS = {  # rotations about x, y, z that rotate z to the axis of a foot hinge in OpenSim

@@ -1,4 +1,8 @@
-"""Offsets of pose correctives that are mostly zero, stored without the zeros."""
+"""Offsets of blend shapes and pose correctives that are read on first use.
+
+Some are mostly zero and stored without the zeros; of others only weighted sums are needed, which
+the file computes without being read as a whole.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,14 @@
-"""Features: weights of a body model's correctives as functions of the pose."""
+"""Features: weights of a body model's correctives as functions of the pose.
+
+Every body model drives its pose correctives, offsets of the rest mesh, by other numbers:
+
+- SMPL by the nine entries of R - I of each joint (``None`` instead of a feature, see
+  ``Correctives``), SKEL by those of the joint nearest to SMPL's: ``MappedFeature``,
+- STAR and SUPR by the quaternions of the joints: ``QuaternionFeature``,
+- MHR by a sparse linear layer with a ReLU: ``NetworkFeature``.
+
+All numbers are 0 in the rest pose.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +22,9 @@ from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.skeleton import Skeleton
+
+_FIRST = 2  # joints of MHR before this index position the whole body
+_WIDTH = 6  # numbers per joint of MHR: two columns of its rotation
 
 
 class Feature(Protocol):
@@ -35,7 +48,7 @@ class Feature(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MappedFeature:
-    """Nine entries of R - I for each joint of another model, as in SMPL.
+    """SKEL: nine entries of R - I for each joint of SMPL, from SKEL's nearest joint.
 
     Attributes
     ----------
@@ -63,15 +76,12 @@ class MappedFeature:
         return found[1:].reshape(-1)
 
 
-# Feature of STAR and SUPR: a quaternion for each joint, and a shape coefficient in STAR.
-#
-# Osman et al. 2020 (STAR), eq. 3, and Osman et al. 2022 (SUPR), eq. 5: the correctives of a joint
-# are driven by the four numbers (x, y, z, w - 1) of its unit quaternion, which are 0 at rest.
-
-
 @dataclass(frozen=True, slots=True)
 class QuaternionFeature:
-    """Quaternions of joints, with w >= 0, and optionally the weight of one blend shape.
+    """STAR and SUPR: quaternions of joints, and in STAR the weight of a blend shape.
+
+    Osman et al. 2020 (STAR), eq. 3, and Osman et al. 2022 (SUPR), eq. 5: a joint contributes the
+    four numbers (x, y, z, w - 1) of its unit quaternion with w >= 0.
 
     Attributes
     ----------
@@ -104,21 +114,13 @@ class QuaternionFeature:
         return np.append(quaternions.reshape(-1), given if len(given) else 0.0)
 
 
-# Feature of MHR: a sparse linear layer of joint rotations with a ReLU.
-#
-# The input has six numbers for each joint from the third on: the first two columns of its
-# rotation relative to its rest, minus those of the identity. ``MHRPoseCorrectivesModel`` of the
-# Momentum Human Rig::
-#
-#     h = max(0, W x)
-
-_FIRST = 2  # joints before this index position the whole body
-_WIDTH = 6
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class NetworkFeature:
-    """The sparse layer.
+    """MHR: a sparse linear layer of joint rotations with a ReLU, h = max(0, W x).
+
+    The input x has six numbers for each joint from the third on: the first two columns of its
+    rotation relative to its rest, minus those of the identity (``MHRPoseCorrectivesModel`` of the
+    Momentum Human Rig).
 
     Attributes
     ----------

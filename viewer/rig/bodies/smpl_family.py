@@ -1,4 +1,8 @@
-"""Joint names and hierarchies of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME."""
+"""Joint names and hierarchies of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME, and animals.
+
+Animals are the four-legged models in SMPL's layout: SMAL, D-SMAL and hSMAL. Their files have no
+joint names, so a model is recognised by its hierarchy, and its up axis by its joints.
+"""
 
 from __future__ import annotations
 
@@ -145,7 +149,7 @@ def members_by_numbers() -> dict[int, tuple[str, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class Animal:
-    """One layout: title and joints.
+    """One model of an animal: title and joints.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Calibrated cameras: fixed, moving in frames, or carried by a joint of a figure."""
+"""Calibrated cameras: fixed, moving in frames, or carried by a joint of a figure; their images."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Captures: recordings of several people that are read in parts."""
+"""Captures: recordings of several people that are read in parts, and their frame rate."""
 
 from __future__ import annotations
 

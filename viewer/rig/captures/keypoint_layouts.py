@@ -1,7 +1,8 @@
-"""Layouts of captured keypoints, chosen by keypoint count: names, limbs and sides.
+"""Layouts of captured keypoints, chosen by keypoint count: names, limbs, sides and joints.
 
 body25 and the orders of hands and face are OpenPose's, panoptic is CMU's; the others come from
-COCO, Human3.6M as EasyMocap orders it (left first), the SMPL family and MediaPipe.
+COCO, Human3.6M as EasyMocap orders it (left first), the SMPL family and MediaPipe. The joints that
+correspond to keypoints show how well a body was fitted to them.
 """
 
 from __future__ import annotations

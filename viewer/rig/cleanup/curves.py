@@ -1,8 +1,13 @@
-"""Smooth curves through weighted targets: discrete smoothing splines (Whittaker 1923).
+"""Curves of corrections: smooth ones through weighted targets, and ones that fade in and out.
 
-A curve c minimises sum(w (c - t)^2) + s^4 sum((c[k - 1] - 2 c[k] + c[k + 1])^2). Where the weights
-are 1 and the targets 0, it decays within a few multiples of s rows. Its slope never changes
-suddenly.
+``smooth_curves`` are discrete smoothing splines (Whittaker 1923). A curve c with targets t and
+weights w minimises::
+
+    sum_k w_k (c_k - t_k)^2  +  s^4 sum_k (c_(k-1) - 2 c_k + c_(k+1))^2
+
+Setting the derivative by each c_k to zero gives (W + s^4 D^T D) c = W t with the second differences
+D: a symmetric matrix with two diagonals on either side. Where the weights are 1 and the targets 0,
+a curve decays within a few multiples of s rows. Its slope never changes suddenly.
 """
 
 from __future__ import annotations

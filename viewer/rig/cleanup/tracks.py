@@ -1,4 +1,4 @@
-"""Interpolation of missing frames inside clips."""
+"""Interrupted tracks of people: short gaps interpolated, tracks of one person joined."""
 
 from __future__ import annotations
 

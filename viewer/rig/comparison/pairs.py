@@ -1,4 +1,4 @@
-"""Matching of joints by name, and the angle between rotations."""
+"""Pairs of joints with the same name, and the difference of their rotations and weights."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skinning of a few vertices of a posed figure."""
+"""Single vertices of a posed figure: their skinning, and all facts about one of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Selection of a figure's animation by name or number, and its playback."""
+"""Choice of a figure's animations: by name or number, for playback, for export of their keys."""
 
 from __future__ import annotations
 

@@ -219,7 +219,7 @@ _tables: Memo[Clip, _Table] = Memo(kept=1)
 
 
 def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
-    """Return the values of all curves of a clip at many times; see ``clip_sampling.evaluate``.
+    """Return the values of all curves of a clip at many times; see ``evaluate``.
 
     Parameters
     ----------

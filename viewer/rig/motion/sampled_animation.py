@@ -1,4 +1,4 @@
-"""Sampled animations: an actor's poses at a fixed rate, ready for export."""
+"""Sampled animations: an actor's poses at a fixed rate, for export; keys baked to frames."""
 
 from __future__ import annotations
 

@@ -1,10 +1,13 @@
-"""Keyed transforms: keys of translation, rotation, scale and shape weights, as in glTF and FBX."""
+"""Keyed transforms: keys of translation, rotation, scale and shape weights, as in glTF and FBX.
+
+An ``Animation`` names such a clip before its keys are read, on first playback.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -116,10 +119,6 @@ class TransformClip:
         object.__setattr__(self, "end", float(self.end))
         if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
             raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
-
-
-if TYPE_CHECKING:
-    pass
 
 
 class Animation:

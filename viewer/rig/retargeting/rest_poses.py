@@ -1,4 +1,4 @@
-"""Alignment of two skeletons' rest poses, joint by joint."""
+"""Rest poses of two skeletons, aligned joint by joint, and the postures of a body in its motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The quantity of body parts."""
+"""Quantities that a figure is annotated with: body parts, and fields such as distances."""
 
 from __future__ import annotations
 

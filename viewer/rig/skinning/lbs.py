@@ -1,4 +1,10 @@
-"""Linear blend skinning, in float64: v' = sum_i w_i M_i [v 1]."""
+"""Linear blend skinning, in float64: v' = sum_i w_i M_i [v 1].
+
+Many vertices are blended by dense blocks of weights: a few hundred vertices times the joints that
+influence any of them. Vertices that are close to each other in a file usually have the same joints,
+so the blocks stay small, and one product of two dense matrices per block is several times faster
+than summing a flat list in numpy.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +21,12 @@ from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
 
 # Number of matrices per chunk, which fits into the processor's cache and limits the memory.
 _CHUNK = 1 << 14
+
+# Vertices per block: smaller blocks need more calls, larger ones contain more zeros (bench_deform).
+_VERTICES = 512
+
+# Weights cached per skin (128 MB); only files with a random vertex order need more.
+_MOST = 1 << 24
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 
@@ -150,19 +162,6 @@ def _product(matrices: Floats, vectors: Floats) -> Floats:
     product += matrices[:, 1] * y
     product += matrices[:, 2] * z
     return product
-
-
-# Weights as dense blocks: a few hundred vertices times the joints that influence any of them.
-#
-# Vertices that are close to each other in a file usually have the same joints, so the blocks stay
-# small, and one product of two dense matrices per block is several times faster than summing a
-# flat list in numpy.
-
-# Vertices per block: smaller blocks need more calls, larger ones contain more zeros (bench_deform).
-_VERTICES = 512
-
-# Weights cached per skin (128 MB); only files with a random vertex order need more.
-_MOST = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,13 @@ _Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""
 _STEEPEST = math.radians(90.0)  # limit of the middle angle, beyond which angles are ambiguous
 
+# Tolerances of times: seconds, and the relative rounding error of single precision in files.
+_SAME, _SINGLE = 1e-6, 2.0**-22
+_UNCHANGED = 1e-9  # tolerance within which lengths, factors and weights equal their curves
+
+# Tolerance of the difference of unit quaternions, about half the angle in radians.
+_SAME_ROTATION = 1e-9
+
 
 def _with_transform_channel(
     clip: TransformClip, index: int, channel: TransformChannel | None
@@ -214,10 +221,6 @@ def _with_value(
     return replace(channel, values=values, tangents=tangents)
 
 
-# Tolerances of times: seconds, and the relative rounding error of single precision in files.
-_SAME, _SINGLE = 1e-6, 2.0**-22
-
-
 def _key_at(channel: TransformChannel, time: float) -> int:
     """Return the key at a time, within the rounding errors of files; -1 if there is none."""
     near = int(np.abs(channel.times - time).argmin())
@@ -340,12 +343,6 @@ def with_interpolation(channel: TransformChannel, mode: Interpolation) -> Transf
     slopes = _smooth(channel.times, values)
     tangents = np.stack([slopes, slopes], axis=1)
     return replace(channel, values=values, interpolation=mode, tangents=tangents)
-
-
-_UNCHANGED = 1e-9  # tolerance within which lengths, factors and weights equal their curves
-
-# Tolerance of the difference of unit quaternions, about half the angle in radians.
-_SAME_ROTATION = 1e-9
 
 
 def joint_values(skeleton: Skeleton, pose: Pose) -> dict[TransformPath, Floats]:

@@ -99,6 +99,70 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
     )  # fmt: skip
 
 
+def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
+    """Set the values that the channels animate, in place; all others are unchanged.
+
+    Parameters
+    ----------
+    samples : TransformSamples
+        Values of all channels at some times.
+    row : int
+        Index of the time.
+    skeleton : Skeleton
+        Provides the DOF table and the rest pose.
+    pose : Pose
+        Rotations become DOFs of ball joints, and quaternions elsewhere, as in
+        ``set_joint_rotations``.
+    """
+    if len(samples.rotated):
+        rotations = quaternion_to_matrix(samples.rotations[row])
+        set_joint_rotations(skeleton, pose, samples.rotated, rotations)
+    apply_placements(samples, row, skeleton, pose)
+
+
+def apply_placements(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
+    """Set all values that the channels animate except rotations; see ``apply_transforms``."""
+    if len(samples.translated):
+        _set_joint_translations(skeleton, pose, samples.translated, samples.translations[row])
+    pose.scales[samples.scaled] = samples.scales[row]
+    pose.shape_weights[samples.weighted] = samples.weights[row]
+
+
+def _set_joint_translations(
+    skeleton: Skeleton, pose: Pose, joints: Ints, translations: Floats
+) -> None:
+    """Set the translations of joints relative to their parents, in place.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Provides the DOF table.
+    pose : Pose
+        A joint's translation DOFs receive the offset from rest, within their limits; the pose's
+        translations receive the remainder.
+    joints : (N,)
+        Joints to move.
+    translations : (N, 3)
+        Relative to the parent joint, rest translation included; lengths.
+    """
+    offsets = translations - skeleton.rest_translations[joints]
+    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
+    moves = moves[np.isin(skeleton.dof_joints[moves], joints)]
+    if not len(moves):
+        pose.translations[joints] = offsets
+        return
+    wanted = np.zeros((skeleton.n_joints, 3))
+    wanted[joints] = offsets
+    owners, axes = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
+    # Of several DOFs along one axis, the first receives the offset.
+    _, first = np.unique(owners * FIRST_ROTATION + axes, return_index=True)
+    values = np.zeros(len(moves))
+    values[first] = wanted[owners[first], axes[first]]
+    pose.dofs[moves] = np.clip(values, *skeleton.dof_limits[moves].T)
+    np.subtract.at(wanted, (owners, axes), pose.dofs[moves])
+    pose.translations[joints] = wanted[joints]
+
+
 def _places(timelines: _Timelines, times: Floats) -> tuple[Ints, Floats]:
     """Return the key before each time, and the fraction of the span elapsed since: (T, U)."""
     passed = np.searchsorted(timelines.union, times, side="right")
@@ -376,67 +440,3 @@ def _components(path: str, channels: list[TransformChannel]) -> slice:
     place = TRANSFORM_PATHS.index
     start = sum(width for other, width in widths if place(other) < place(path))
     return slice(start, start + sum(width for other, width in widths if other == path))
-
-
-def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
-    """Set the values that the channels animate, in place; all others are unchanged.
-
-    Parameters
-    ----------
-    samples : TransformSamples
-        Values of all channels at some times.
-    row : int
-        Index of the time.
-    skeleton : Skeleton
-        Provides the DOF table and the rest pose.
-    pose : Pose
-        Rotations become DOFs of ball joints, and quaternions elsewhere, as in
-        ``set_joint_rotations``.
-    """
-    if len(samples.rotated):
-        rotations = quaternion_to_matrix(samples.rotations[row])
-        set_joint_rotations(skeleton, pose, samples.rotated, rotations)
-    apply_placements(samples, row, skeleton, pose)
-
-
-def apply_placements(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
-    """Set all values that the channels animate except rotations; see ``apply_transforms``."""
-    if len(samples.translated):
-        _set_joint_translations(skeleton, pose, samples.translated, samples.translations[row])
-    pose.scales[samples.scaled] = samples.scales[row]
-    pose.shape_weights[samples.weighted] = samples.weights[row]
-
-
-def _set_joint_translations(
-    skeleton: Skeleton, pose: Pose, joints: Ints, translations: Floats
-) -> None:
-    """Set the translations of joints relative to their parents, in place.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    pose : Pose
-        A joint's translation DOFs receive the offset from rest, within their limits; the pose's
-        translations receive the remainder.
-    joints : (N,)
-        Joints to move.
-    translations : (N, 3)
-        Relative to the parent joint, rest translation included; lengths.
-    """
-    offsets = translations - skeleton.rest_translations[joints]
-    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
-    moves = moves[np.isin(skeleton.dof_joints[moves], joints)]
-    if not len(moves):
-        pose.translations[joints] = offsets
-        return
-    wanted = np.zeros((skeleton.n_joints, 3))
-    wanted[joints] = offsets
-    owners, axes = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
-    # Of several DOFs along one axis, the first receives the offset.
-    _, first = np.unique(owners * FIRST_ROTATION + axes, return_index=True)
-    values = np.zeros(len(moves))
-    values[first] = wanted[owners[first], axes[first]]
-    pose.dofs[moves] = np.clip(values, *skeleton.dof_limits[moves].T)
-    np.subtract.at(wanted, (owners, axes), pose.dofs[moves])
-    pose.translations[joints] = wanted[joints]
