@@ -16,8 +16,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import deform, joint_matrices
 
-__all__ = ["check_lines", "newly_outside", "residual_of", "with_joint_name"]
-
 _EXACT = 1e-4  # ratio of residual to size above which a warning is given
 
 

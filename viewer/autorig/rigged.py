@@ -18,8 +18,6 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose
 
-__all__ = ["CONFIDENCE", "Rigged", "clip_for", "with_fields"]
-
 CONFIDENCE = ("matched", "inpainted", "rigid")
 """Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours,
 or the rigid attachment of its island."""

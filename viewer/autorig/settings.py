@@ -10,8 +10,6 @@ from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 
-__all__ = ["JOINTS", "METHODS", "Report", "TransferSettings"]
-
 Report = Callable[[float, str], None]
 """Called with the completed fraction and the current step; may raise to cancel."""
 

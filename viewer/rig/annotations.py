@@ -8,8 +8,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = ["BodyParts", "Keypoints", "ReducedMesh", "VertexField", "keypoint_positions"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyParts:

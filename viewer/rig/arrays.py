@@ -11,8 +11,6 @@ from numpy.typing import DTypeLike, NDArray
 from viewer.errors import RigError
 from viewer.phrases import printable
 
-__all__ = ["Bools", "Bytes", "Deferred", "Floats", "Ints", "freeze", "frozen"]
-
 Item = TypeVar("Item", bound=np.generic)
 
 Floats = NDArray[np.float64]

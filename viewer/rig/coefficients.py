@@ -11,8 +11,6 @@ from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 
-__all__ = ["apply_coefficients", "space_misfit", "unused_coefficients"]
-
 _MOST_SIGMA = 1e6  # largest plausible coefficient, standard deviations
 
 

@@ -9,8 +9,6 @@ from typing import Any
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["FileRecord", "StoredImage", "StoredTextures", "VrmRecord"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredImage:

@@ -8,8 +8,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = ["Hand", "hand_coefficients", "hand_vectors"]
-
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Hand:

@@ -6,8 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["cycle_members", "depth_first"]
-
 
 def cycle_members(parents: Floats | Ints) -> Bools:
     """Return a mask of the joints that are their own ancestors.

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 from viewer.data_classes import dataclass
 
-__all__ = ["HUMAN_BONES", "REQUIRED_BONES", "SPINE_BONES", "Humanoid"]
-
 SPINE_BONES = ("spine", "chest", "upperChest")
 """Bones of the spine, from the hips upwards; all but the first may be missing."""
 

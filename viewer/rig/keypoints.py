@@ -19,8 +19,6 @@ from viewer.rig.shape import shaped
 from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
-__all__ = ["posed_keypoints", "some_vertices"]
-
 _parts: Memo[Figure, tuple[Figure, Keypoints]] = Memo()
 
 

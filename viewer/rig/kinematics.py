@@ -12,17 +12,6 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.pose import Pose, PosedSkeleton, local_matrices
 from viewer.rig.skeleton import Skeleton
 
-__all__ = [
-    "are_alike",
-    "forward_kinematics",
-    "is_posed",
-    "is_rigid",
-    "posed_skeleton",
-    "rigid_sizes",
-    "skinning_matrices",
-    "world_matrices",
-]
-
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
 # normals by at most half of it, in radians.
 _RIGID = 1e-5

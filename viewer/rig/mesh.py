@@ -14,24 +14,6 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 if TYPE_CHECKING:
     from viewer.rig.material import Material
 
-__all__ = [
-    "Mesh",
-    "PartView",
-    "area_vectors",
-    "bounding_box",
-    "box_size",
-    "flat_triangles",
-    "hidden_parts",
-    "split_seams",
-    "triangle_areas",
-    "typical_place",
-    "vertex_normals",
-    "visible_triangles",
-    "visible_vertices",
-    "volume",
-    "without_seams",
-]
-
 PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person", "hidden"]
 """Whether a part is drawn from outside, from the character's eyes, in both views, or in none.
 

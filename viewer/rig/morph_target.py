@@ -17,8 +17,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 
-__all__ = ["MORPH_GROUP", "MorphTarget", "on_one_joint", "with_morphs"]
-
 MORPH_GROUP = "morph"
 """Group of blend shapes: weight 0 is the unchanged mesh, and weight 1 the target."""
 

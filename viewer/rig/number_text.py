@@ -6,8 +6,6 @@ import math
 
 from viewer.phrases import rounded
 
-__all__ = ["angle_text", "number_text", "short_number"]
-
 _NOT_ZERO = set("123456789n")  # "inf" and "nan" contain an n
 
 

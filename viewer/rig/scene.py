@@ -20,19 +20,6 @@ from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped_skeleton
 
-__all__ = [
-    "Actor",
-    "Motion",
-    "Scene",
-    "Swinging",
-    "actor_points",
-    "figure_pose",
-    "free_title",
-    "scene_box",
-    "scene_points",
-    "scene_unit",
-]
-
 if TYPE_CHECKING:
     from pathlib import Path
 

@@ -20,18 +20,6 @@ if TYPE_CHECKING:
     from viewer.rig.blendshapes import Correctives
     from viewer.rig.skin import Skin
 
-__all__ = [
-    "joint_directions",
-    "joint_shifts",
-    "moved_rest_translations",
-    "pose_weights",
-    "rest_joints",
-    "rest_positions",
-    "shaped",
-    "shaped_skeleton",
-    "with_rest_mesh",
-]
-
 _shaped: Memo[Figure, Figure] = Memo(kept=32)  # maximum number of shapes in use at a time
 
 

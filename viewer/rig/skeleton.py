@@ -18,23 +18,6 @@ if TYPE_CHECKING:
     from viewer.rig.humanoid import Humanoid
     from viewer.rig.springs.springs import Springs
 
-__all__ = [
-    "DOF_KINDS",
-    "FIRST_ROTATION",
-    "Skeleton",
-    "ball_skeleton",
-    "clamp_dofs",
-    "dof_label",
-    "dof_labels",
-    "find_dof",
-    "find_joint",
-    "joint_label",
-    "joint_labels",
-    "shown_joint_of",
-    "shown_joints",
-    "shown_parents",
-]
-
 DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
 """Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""
 

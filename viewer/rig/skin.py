@@ -12,24 +12,6 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.skeleton import Skeleton, shown_joint_of, shown_joints
 
-__all__ = [
-    "Skin",
-    "bind_positions",
-    "has_influence",
-    "idle_joints",
-    "influence_counts",
-    "limit_influences",
-    "merged",
-    "normalized",
-    "owners",
-    "row_norms",
-    "skin_from_entries",
-    "skin_from_lists",
-    "skin_rows",
-    "strongest_first",
-    "weight_sums",
-]
-
 _NO_SUM = 1e-12  # minimum sum of weights that can be scaled to 1
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["decode_color", "decode_srgb", "encode_color", "encode_srgb"]
-
 Color = tuple[float, float, float]
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["METRES", "SIZES", "UNIT_NAMES", "is_metres", "unit_of_scaled"]
-
 _ALIKE = 2.5  # largest plausible ratio of the sizes of similar figures, such as adult and child
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}

@@ -9,8 +9,6 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 
-__all__ = ["fit_axes"]
-
 
 def fit_axes(
     template: Side,

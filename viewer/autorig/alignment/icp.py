@@ -22,23 +22,6 @@ from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.geometry.vectors import unit
 
-__all__ = [
-    "FEWEST",
-    "HOLD",
-    "SETTLED",
-    "Cloud",
-    "Gaps",
-    "Pairs",
-    "Side",
-    "Triangles",
-    "capped_rms",
-    "gaps_between",
-    "iterate",
-    "pairs_between",
-    "slide",
-    "trimmed_rms",
-]
-
 _FAR = 3.0  # multiple of the median distance, above which pairs are rejected
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end

@@ -14,16 +14,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 
-__all__ = [
-    "AXES",
-    "Candidate",
-    "axis_direction",
-    "axis_rotations",
-    "in_place",
-    "search",
-    "unit_scale",
-]
-
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 """Allowed values of an up axis or a facing."""
 

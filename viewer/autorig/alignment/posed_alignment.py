@@ -38,8 +38,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import deform
 
-__all__ = ["PosedAlignment", "align_posed"]
-
 _CLOSE = 0.002  # ratio of misfit to size up to which joints are not rotated
 # Fraction of the misfit that rotated joints may leave to be accepted: clothes fit a little better
 # with a bent body, but only a figure in a different pose fits much better.

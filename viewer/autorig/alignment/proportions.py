@@ -22,8 +22,6 @@ from viewer.rig.retargeting.mirror import joint_partners
 from viewer.rig.skin import Skin, influence_counts, weight_sums
 from viewer.rig.skinning.lbs import move
 
-__all__ = ["Limbs", "limbs_of", "resized"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limbs:

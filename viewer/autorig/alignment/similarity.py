@@ -10,8 +10,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
 
-__all__ = ["Similarity", "fit_similarity"]
-
 # Ratio of the second to the first extent below which points are collinear, so that the rotation is
 # undetermined.
 _ON_LINE = 1e-6

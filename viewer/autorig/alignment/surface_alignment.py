@@ -26,19 +26,6 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = [
-    "PART",
-    "SAMPLES",
-    "SCALES",
-    "Alignment",
-    "AlignmentSettings",
-    "Posed",
-    "align",
-    "alignment_lines",
-    "misfit",
-    "similarity_of",
-]
-
 SCALES = ("uniform", "axes", "none")
 """One common scale, one scale along each axis of the target, or the template's size unchanged."""
 

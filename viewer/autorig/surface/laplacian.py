@@ -10,8 +10,6 @@ from viewer.autorig.surface.welding import Welded, edges, non_manifold_edges
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["cotangent_laplacian", "graph_laplacian", "laplacian", "voronoi_areas"]
-
 # Cotangent of 0.6 degrees; triangles with smaller angles are treated as equilateral.
 _STEEPEST = 100.0
 _FLAT = 1e-12  # minimum of twice a triangle's area over its squared longest edge

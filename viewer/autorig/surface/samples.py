@@ -10,8 +10,6 @@ from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import triangle_areas
 
-__all__ = ["SurfaceSamples", "even_vertices", "sample_surface", "triangle_normals"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceSamples:

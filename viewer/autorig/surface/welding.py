@@ -14,8 +14,6 @@ from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["Welded", "edges", "islands", "non_manifold_edges", "weld"]
-
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
 # less.
 _NEAR = 1e-4

@@ -12,8 +12,6 @@ from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
-__all__ = ["transfer_clip"]
-
 
 def transfer_clip(
     clip: Clip | SampledClip,

@@ -9,8 +9,6 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 
-__all__ = ["MOST_NUMBERS", "transfer_correctives"]
-
 MOST_NUMBERS = 120_000_000
 """Maximum size of all transferred correctives, 1 GB: larger ones are dropped."""
 

@@ -14,8 +14,6 @@ from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.skin import Skin
 from viewer.rig.skinning.lbs import blended_matrices
 
-__all__ = ["SMALLEST_STRETCH", "InvertedSkinning", "invert_skinning", "repair_tears"]
-
 SMALLEST_STRETCH = 0.2
 """Singular value below which a blended matrix is treated as singular: with equal weights, two
 joints rotated apart by an angle a have the value cos(a / 2), and here a = 157 degrees."""

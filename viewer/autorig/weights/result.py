@@ -11,15 +11,6 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.skin import Skin
 
-__all__ = [
-    "RigidIslands",
-    "WeightTransfer",
-    "match_lines",
-    "nothing_matched",
-    "rigid_lines",
-    "template_lines",
-]
-
 _LISTED = 5  # maximum number of islands that are listed individually
 _FEW = 0.75  # fraction of matched vertices below which too many weights are estimates
 

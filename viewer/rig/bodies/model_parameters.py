@@ -16,8 +16,6 @@ from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["PER_JOINT", "ModelParameters", "driven_dofs"]
-
 PER_JOINT = 7
 """Number of parameters of a joint."""
 

@@ -16,8 +16,6 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.transform_keys.sampling import apply_transforms, sample_transforms
 
-__all__ = ["carrier_of", "moving_alone", "played_with", "view_in"]
-
 
 def carrier_of(view: CameraView, actors: Sequence[Actor]) -> Actor | None:
     """Return the actor that moves a camera with its joint or clip; None if no actor does."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["is_tracked", "person_label", "person_name"]
-
 
 def is_tracked(person: int | None) -> bool:
     """Return whether a number identifies a track that follows one person from frame to frame.

@@ -9,8 +9,6 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.motion.timing import Timing
 
-__all__ = ["PointClip", "PointLayout", "sample_points"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLayout:

@@ -14,8 +14,6 @@ from viewer.rig.motion.sampled_animation import frame_range
 from viewer.rig.motion.upright import own_up
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["SampledPoints", "sample_upright_points"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledPoints:

@@ -10,8 +10,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 
-__all__ = ["Displacement", "joint_displacement", "point_displacement"]
-
 _TOGETHER = 1000  # frames per batch, which limits the memory for matrices
 
 

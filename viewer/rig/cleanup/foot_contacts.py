@@ -7,8 +7,6 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
 
-__all__ = ["contacts", "mean_speeds"]
-
 # Heights and speeds are relative to the figure's height at rest: 0.02 is 34 mm for a person.
 _LOW, _HIGH = 0.02, 0.035  # heights above the lowest positions at which a contact begins and ends
 _SLOW, _FAST = 0.3, 0.5  # speeds per second at which a contact begins and ends

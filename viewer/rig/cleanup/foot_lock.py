@@ -23,8 +23,6 @@ from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["FootLock", "legs_of", "lock_feet"]
-
 _FARTHEST = 0.15  # maximum horizontal correction of a foot, relative to the figure's height at rest
 
 

@@ -18,8 +18,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton, dof_labels
 
-__all__ = ["FrameRange", "Steps", "steps_of"]
-
 FrameRange = tuple[int | None, int | None]
 """First frame and end frame (exclusive), in the numbering of the first motion."""
 

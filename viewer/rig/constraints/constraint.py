@@ -6,8 +6,6 @@ from typing import Literal, TypeAlias
 
 from viewer.data_classes import dataclass
 
-__all__ = ["Constraint", "ConstraintKind"]
-
 ConstraintKind: TypeAlias = Literal["roll", "aim", "rotation"]
 
 

@@ -27,8 +27,6 @@ from viewer.rig.skeleton import Skeleton
 if TYPE_CHECKING:
     from viewer.rig.constraints.constraint import Constraint
 
-__all__ = ["constrained", "constrained_matrices"]
-
 _NONE = np.array([0.0, 0.0, 0.0, 1.0])
 _SHORT = 1e-12
 

@@ -19,8 +19,6 @@ from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["Surface", "SurfacePoints", "interpolate"]
-
 _PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
 _LONG = 3.0  # multiple of the median radius above which pieces are split
 # Pieces in the first query; if more pieces may lie within the bound, a second query finds all of

@@ -7,15 +7,6 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
 
-__all__ = [
-    "align_signs",
-    "between",
-    "conjugate",
-    "multiply",
-    "rotation_vector_to_quaternion",
-    "slerp",
-]
-
 _OPPOSITE = 1e-12  # 1 plus the cosine of the angle between vectors that are treated as opposite
 _PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u to the last digit
 

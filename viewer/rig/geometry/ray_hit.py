@@ -7,8 +7,6 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["RayHit", "first_hit", "surface_point"]
-
 _AT_ONCE = 1 << 18  # triangles per batch, about 300 bytes each
 _EDGE = 1e-9  # barycentric tolerance: no ray may pass between two adjacent triangles
 

@@ -6,16 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = [
-    "axis_rotations",
-    "matrix_to_euler",
-    "matrix_to_quaternion",
-    "matrix_to_rotation_vector",
-    "nearest_rotations",
-    "quaternion_to_matrix",
-    "rotation_vector_to_matrix",
-]
-
 _SMALL = 1e-8  # squared angle below which the Taylor series are exact to the last digit
 
 

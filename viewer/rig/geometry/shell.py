@@ -15,8 +15,6 @@ from viewer.rig.geometry.topology import components, welded
 from viewer.rig.mesh import Mesh, area_vectors
 from viewer.rig.skin import Skin, skin_rows
 
-__all__ = ["Shell", "shell_of"]
-
 # Maximum number of triangles, above which the check takes longer than it saves.
 _MOST_TRIANGLES = 500_000
 _MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image

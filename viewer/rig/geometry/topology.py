@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["Edges", "components", "edges_of", "orientations", "welded"]
-
 Indices = NDArray[np.int64]
 
 

@@ -7,8 +7,6 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations
 
-__all__ = ["apply_transform", "rotation_transform", "translation_matrix"]
-
 
 def translation_matrix(offset: Floats) -> Floats:
     """Return the matrices that translate by ``offset``.

@@ -6,8 +6,6 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["moved_tangents", "unit"]
-
 
 def unit(vectors: Floats) -> Floats:
     """Return vectors of length 1; a vector of length 0 stays 0.

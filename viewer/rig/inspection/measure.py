@@ -10,8 +10,6 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, triangle_areas, volume
 
-__all__ = ["DENSITY", "Measures", "measure"]
-
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
 

@@ -15,8 +15,6 @@ from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, owners
 
-__all__ = ["Soles", "extent", "soles_of", "soles_of_feet"]
-
 _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
 # Tilts of a foot, from walking to lying on its instep.
 _TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])

@@ -20,8 +20,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.shape import joint_shifts, rest_joints
 
-__all__ = ["BodyMotion", "body_clip", "rest_roots", "root_positions"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyMotion:

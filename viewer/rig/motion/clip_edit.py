@@ -26,22 +26,6 @@ from viewer.rig.motion.clip import (
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = [
-    "add_key",
-    "clip_from_frames",
-    "clip_from_pose",
-    "delete_keys",
-    "empty_clip",
-    "key_pose",
-    "move_keys",
-    "set_extrapolation",
-    "set_key",
-    "set_range",
-    "set_tangent",
-    "slope_at",
-    "with_channel",
-]
-
 _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
 _UNCHANGED = 1e-9  # tolerance, in radians or lengths, within which a DOF equals its curve
 

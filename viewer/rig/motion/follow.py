@@ -9,8 +9,6 @@ from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import joint_matrices
 
-__all__ = ["followed_point"]
-
 
 def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
     """Return a joint's position, or the mean of all joints or captured points.

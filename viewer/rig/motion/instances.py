@@ -30,15 +30,6 @@ from viewer.rig.shape import shaped
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 from viewer.rig.transform_keys.sampling import apply_placements, apply_transforms, sample_transforms
 
-__all__ = [
-    "local_rotations",
-    "palettes",
-    "placements",
-    "pose_actors",
-    "posed_worlds",
-    "worlds",
-]
-
 
 def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
     """Pose actors by their clips at one time of the scene's clock, in place.

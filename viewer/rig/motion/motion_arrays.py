@@ -14,8 +14,6 @@ from viewer.rig.motion.evaluation import Frames, world_frames
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.scene import Actor
 
-__all__ = ["MotionArrays", "motion"]
-
 _SPACES = ("world", "figure")
 
 

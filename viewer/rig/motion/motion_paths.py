@@ -16,8 +16,6 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Motion
 
-__all__ = ["MotionPath", "motion_path", "path_times", "segments"]
-
 _KEYED_RATE = 60.0  # points per second along curves, which have no frames
 _MOST = 20_000  # maximum number of points of a path along curves
 _BLOCK = 1 << 14  # number of matrices per batch, which limits the memory for long captures

@@ -11,8 +11,6 @@ from viewer.errors import RigError
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["FAINTEST", "onion"]
-
 FAINTEST = 0.22
 """Opacity of the earliest pose."""
 

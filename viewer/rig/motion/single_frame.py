@@ -20,8 +20,6 @@ from viewer.rig.motion.upright import own_up, upright_actor
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["pose_frames", "single_frame", "upright_single_frame"]
-
 
 def single_frame(
     actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: float = 0.0

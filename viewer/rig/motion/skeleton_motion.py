@@ -11,8 +11,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 
-__all__ = ["SkeletonMotion"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkeletonMotion:

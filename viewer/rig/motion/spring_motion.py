@@ -30,14 +30,6 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.springs.simulation import STEPS_PER_SECOND, PosedJoints, SpringTrack
 from viewer.rig.springs.springs import Springs
 
-__all__ = [
-    "SpringMotion",
-    "has_springs",
-    "release_springs",
-    "springs_for",
-    "with_baked_springs",
-]
-
 _MOST_TRACKS = 4
 
 

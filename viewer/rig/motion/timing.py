@@ -10,17 +10,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = [
-    "DEFAULT_RATE",
-    "FASTEST",
-    "RATES",
-    "SLOWEST",
-    "Timing",
-    "frame_at",
-    "frame_times",
-    "is_rate",
-]
-
 SLOWEST, FASTEST = 1e-6, 1e6
 """Limits of the frame rate, outside which the times of long motions lose precision."""
 

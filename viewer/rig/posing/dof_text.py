@@ -8,8 +8,6 @@ from viewer.diagnostics import Phrase
 from viewer.rig.number_text import number_text
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, dof_label
 
-__all__ = ["beyond_text", "dof_value_text"]
-
 _MOST_DIGITS = 9  # maximum number of decimals; more would show rounding errors of float64
 
 

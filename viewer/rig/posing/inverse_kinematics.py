@@ -21,8 +21,6 @@ from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
-__all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
-
 _CLOSE = 1e-7  # error below which the target is reached, as a fraction of the chain's length
 _STILL = 1e-10  # step in radians below which the search ends
 _LARGEST_STEP = 0.5  # maximum step in radians for which the linearisation is accurate

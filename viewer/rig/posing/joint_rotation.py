@@ -21,8 +21,6 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quater
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
-__all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
-
 _SWEEPS = 200
 _STILL = 1e-10  # largest change in the last sweep, radians
 _ROUNDING = 1e-9  # tolerance in radians for a value that exceeds its limit

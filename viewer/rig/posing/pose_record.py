@@ -28,8 +28,6 @@ from viewer.rig.retargeting.pose_transfer import (
 )
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
 
-__all__ = ["PARTS", "PosePartError", "PoseRecord", "apply_record", "record_of"]
-
 PARTS = {
     "global_orient": ("pelvis", "wrist", "global"),
     "neck_pose": ("neck",),

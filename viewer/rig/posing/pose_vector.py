@@ -18,15 +18,6 @@ from viewer.rig.geometry.rotation import (
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = [
-    "PoseLayout",
-    "own_numbers",
-    "read_vector",
-    "rotation_rows",
-    "set_joint_rotations",
-    "write_vector",
-]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseLayout:

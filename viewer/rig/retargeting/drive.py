@@ -9,8 +9,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_map import JointMap
 
-__all__ = ["Drive"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:

@@ -16,8 +16,6 @@ from viewer.rig.retargeting.source_contacts import (
     step_height,
 )
 
-__all__ = ["FootPlan", "foot_plan"]
-
 _SUNK = 0.015  # maximum depth of the source's feet below the ground, relative to the body
 
 

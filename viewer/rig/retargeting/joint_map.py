@@ -14,8 +14,6 @@ from viewer.near_names import name_hint
 from viewer.rig.arrays import Ints
 from viewer.rig.skeleton import Skeleton, joint_labels, shown_joints
 
-__all__ = ["UNMAPPED", "JointMap", "joint_map_of", "map_from_pairs", "mapped_partners"]
-
 UNMAPPED = -2
 """Entry of ``mapped_partners`` for joints that are not in the map."""
 

@@ -17,8 +17,6 @@ from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, map_from_pairs,
 from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place
 from viewer.rig.skeleton import Skeleton, joint_labels
 
-__all__ = ["Matches", "match_joints"]
-
 _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
           "right_shoulder right_elbow")  # fmt: skip
 

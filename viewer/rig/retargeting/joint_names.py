@@ -22,8 +22,6 @@ from viewer.rig.arrays import Ints
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["canonical_names", "joint_meanings", "joints_by_place", "sided_words"]
-
 _ARM = ("collar", "shoulder", "elbow", "wrist", "hand")
 _LEG = ("hip", "knee", "ankle", "foot")
 

@@ -11,8 +11,6 @@ from viewer.rig.retargeting.joint_matches import Matches
 from viewer.rig.retargeting.rest_poses import rest_of, up_rotation
 from viewer.rig.retargeting.source_rest import with_source_rest, with_upright_rest
 
-__all__ = ["front_axes", "rest_positions"]
-
 _SIDES = ("hip", "shoulder", "knee", "collar", "elbow")
 _SHORT = 1e-6  # minimum distance with a reliable direction, as a fraction of the skeleton's size
 

@@ -7,8 +7,6 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.cleanup.leg_ik import Leg
 
-__all__ = ["animal_legs"]
-
 # Lengths are relative to the height of the skeleton.
 _FOOT = 0.12  # maximum height of the last joint of a leg
 _TOE = 0.05  # maximum height of the joint on which a foot stands

@@ -27,8 +27,6 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_legs import DrivenLegs
 from viewer.rig.retargeting.foot_plan import FootPlan
 
-__all__ = ["levelled"]
-
 _NOISE = 0.04  # seconds below which changes of a standing foot's rotation are noise
 _EASE = 0.06  # seconds over which a correction falls to 40 % outside contacts
 _EXACT = 6.0  # decimal exponent of the weight of a standing foot

@@ -17,8 +17,6 @@ from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose", "posing_partners"]
-
 # Maximum distance of a joint from its counterpart's mirror image, relative to the figure's size.
 _NEAR = 0.02
 

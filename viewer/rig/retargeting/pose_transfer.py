@@ -38,17 +38,6 @@ from viewer.rig.posing.joint_rotation import nearest_dofs
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton
 
-__all__ = [
-    "JointRotations",
-    "dof_layout",
-    "has_layout_of",
-    "joints_by_name",
-    "left_of",
-    "relative_rotations",
-    "restore_beneath",
-    "rotate_joints",
-]
-
 _INEXACT = 1e-4  # error in radians below which a rotation is treated as reached
 _REST_DIGITS = 5  # number of decimals to which equal rest rotations agree
 

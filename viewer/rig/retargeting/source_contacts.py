@@ -19,8 +19,6 @@ from viewer.rig.cleanup.curves import falling
 from viewer.rig.cleanup.foot_contacts import mean_speeds
 from viewer.rig.cleanup.frames import runs_of
 
-__all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"]
-
 # Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
 _SLOW, _FAST = 0.08, 0.2  # speeds per second at which a contact begins and ends
 # Heights above the foot's lower point at which a contact begins and ends.

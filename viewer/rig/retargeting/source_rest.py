@@ -22,8 +22,6 @@ from viewer.rig.retargeting.anatomical_rest import anatomical_rest, limb_axes, u
 from viewer.rig.retargeting.rest_poses import SIDES, Postures, postures_of, rest_posture
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["SourceRest", "rest_fault", "with_source_rest", "with_upright_rest"]
-
 SourceRest = int | str
 """A frame number, ``"zero"`` for the zero pose, or ``"auto"``."""
 

@@ -11,8 +11,6 @@ from viewer.rig.retargeting.mirror import mirror_axis
 from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.skinning import PURE, Skinning, deform
 
-__all__ = ["asymmetry", "correctives", "methods", "normalized", "pruning"]
-
 
 def pruning(asked: Asked) -> Floats:
     """Return the distance between skinning with all and with few influences: (V,), figure units."""

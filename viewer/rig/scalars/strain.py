@@ -18,8 +18,6 @@ from viewer.rig.scalars._asked import Asked
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 
-__all__ = ["area", "stretch", "stretch_mean"]
-
 # Minimum length of edges with a meaningful ratio, as a fraction of the figure's size.
 _NO_LENGTH = 1e-9
 _PERCENT = 100.0

@@ -17,8 +17,6 @@ from viewer.rig.skin import (
     weight_sums,
 )
 
-__all__ = ["dominant", "entropy", "influences", "sums", "weight"]
-
 _ROUNDING = 1e-14  # rounding error of sums of weights near 1, a few units in the last place
 
 

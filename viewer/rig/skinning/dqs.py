@@ -21,8 +21,6 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.skin import Skin, bind_positions, strongest_first
 from viewer.rig.skinning._normals import inverse_transposed
 
-__all__ = ["deform", "linear_maps", "split_palette"]
-
 _CHUNK = 1 << 16  # number of vertices per chunk, which limits the memory for large meshes
 _RIGID = 1e-12  # tolerance within which a stretch is treated as the identity
 _TINY = 1e-12  # minimum length of a blended quaternion that defines a rotation

@@ -10,8 +10,6 @@ from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import dqs, lbs
 from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
 
-__all__ = ["deform"]
-
 
 def deform(
     positions: Floats,

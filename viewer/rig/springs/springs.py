@@ -10,8 +10,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = ["INSIDE", "OUTSIDE", "PLANE", "Colliders", "Springs"]
-
 OUTSIDE, INSIDE, PLANE = 0, 1, 2
 """Kinds of colliders."""
 
