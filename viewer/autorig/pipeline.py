@@ -32,7 +32,6 @@ from viewer.autorig.weights.weight_transfer import transferred_weights
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
@@ -126,7 +125,14 @@ def robust(
     alignment, pose, posed = met.alignment, met.pose, met.positions
     original, template = template.skeleton, met.figure
     aligned = alignment.similarity.apply(posed)
-    weights = _weighed(template, aligned, target, how, report)
+    weights = transferred_weights(
+        Template(aligned, template.require_mesh().triangles),
+        template.require_skin(),
+        target.positions,
+        target.triangles,
+        how.weights,
+        _within(report, 0.4, 0.8),
+    )
     report(0.8, "joints")
     rest, transferred, lines = _transferred_skeleton(
         template, original, pose, alignment, aligned, target, how
@@ -161,21 +167,6 @@ def robust(
         figure_scale=pose.figure_scale,
         path_scale=rest.root_scale / pose.figure_scale,
         lines=tuple(lines),
-    )
-
-
-def _weighed(
-    template: Figure, aligned: Floats, target: Mesh, how: TransferSettings, report: Report
-) -> WeightTransfer:
-    """Transfer the weights of a template aligned with the target."""
-    mesh, skin = template.require_mesh(), template.require_skin()
-    return transferred_weights(
-        Template(aligned, mesh.triangles),
-        skin,
-        target.positions,
-        target.triangles,
-        how.weights,
-        _within(report, 0.4, 0.8),
     )
 
 
@@ -244,7 +235,17 @@ def _at_rest(
     posed = target.positions - pose.figure_translation
     found = invert_skinning(posed, skin, palette)
     positions = repair_tears(found, posed, target.triangles) if how.repairs else found.positions
-    correctives = _correctives(template, weights, target, scale) if how.correctives else None
+    correctives = None
+    if how.correctives and template.correctives is not None and weights.points is not None:
+        correctives = transfer_correctives(
+            template.correctives,
+            weights.points,
+            template.require_mesh().triangles,
+            weights.matched,
+            target.positions,
+            target.triangles,
+            scale,
+        )
     if correctives is not None:
         # The pose's effect on the rest mesh is removed here, and added back when posing.
         weights_there = pose_weights(correctives, skeleton, pose)
@@ -264,22 +265,6 @@ def _at_rest(
         facts=(("rig", f"transferred from {template.name}"),),
     )
     return figure, found.guarded
-
-
-def _correctives(
-    template: Figure, weights: WeightTransfer, target: Mesh, scale: float
-) -> Correctives | None:
-    if template.correctives is None or template.mesh is None or weights.points is None:
-        return None
-    return transfer_correctives(
-        template.correctives,
-        weights.points,
-        template.mesh.triangles,
-        weights.matched,
-        target.positions,
-        target.triangles,
-        scale,
-    )
 
 
 def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:

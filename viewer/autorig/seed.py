@@ -22,6 +22,8 @@ from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import deform
 
+_FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
+
 
 def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: str) -> Rigged:
     """Apply the steps of Tex-An Mesh: the target is changed; the template's joints are not.
@@ -99,9 +101,6 @@ def _figure(template: Figure, skin: Skin, target: Mesh, rest: Floats, name: str)
         pose_layout=template.pose_layout,
         facts=(("rig", f"transferred from {template.name} by nearest vertices"),),
     )
-
-
-_FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:

@@ -1,4 +1,7 @@
-"""Materials: the surface appearance of triangles, in the metallic-roughness model of glTF 2.0."""
+"""Materials: the surface appearance of triangles, in the metallic-roughness model of glTF 2.0.
+
+In addition, there is toon shading with rim light and outline, as in ``VRMC_materials_mtoon`` 1.0.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,24 @@ from viewer.rig.arrays import Bytes, Floats, frozen
 ALPHA_MODES = ("opaque", "mask", "blend")
 """Alpha is ignored; surfaces are cut out below the cutoff; or they are blended with the
 background."""
+
+TEXTURES = (
+    *("base_texture", "metallic_texture", "roughness_texture"),
+    *("normal_texture", "occlusion_texture", "emissive_texture", "shade_texture"),
+)
+"""Fields of a material that contain textures."""
+
+_WRAPS = ("clamp", "repeat", "mirror")
+"""Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
+MINIFICATIONS = (
+    *("nearest", "linear", "nearest_mipmap_nearest"),
+    *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
+)
+"""Filters of minified images, with their names in OpenGL and glTF."""
+
+_OUTLINE_MODES = ("world", "screen")
+"""Units of outline widths: lengths, or fractions of the image height."""
+Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,34 +161,6 @@ class Material:
         return None if self.base_texture is None else self.base_texture.image
 
 
-TEXTURES = (
-    *("base_texture", "metallic_texture", "roughness_texture"),
-    *("normal_texture", "occlusion_texture", "emissive_texture", "shade_texture"),
-)
-"""Fields of a material that contain textures."""
-
-
-def _check_numbers(
-    name: str, values: tuple[float, ...], most: float = float("inf"), count: int = 1
-) -> None:
-    """Raise RigError unless ``count`` numbers are finite, at least 0, and at most ``most``."""
-    if len(values) != count:
-        raise RigError(f"{name}: expected {count} numbers, found {len(values)}")
-    for value in values:
-        if not (0.0 <= value <= most and np.isfinite(value)):
-            limits = "at least 0" if most == float("inf") else f"0 to {most:g}"
-            raise RigError(f"{name}: expected {limits}, found {value}")
-
-
-_WRAPS = ("clamp", "repeat", "mirror")
-"""Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
-MINIFICATIONS = (
-    *("nearest", "linear", "nearest_mipmap_nearest"),
-    *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
-)
-"""Filters of minified images, with their names in OpenGL and glTF."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
     """An image, and its placement and sampling.
@@ -230,17 +223,6 @@ class Texture:
     def is_placed_plainly(self) -> bool:
         """Whether the image covers texture coordinates from 0 to 1."""
         return np.array_equal(self.matrix, np.eye(2, 3))
-
-
-def _check_choice(name: str, value: object, choices: range | tuple[str, ...]) -> None:
-    """Raise RigError unless a value is one of the choices."""
-    if value not in choices:
-        raise RigError(f"{name}: expected one of {', '.join(map(str, choices))}, found {value}")
-
-
-_OUTLINE_MODES = ("world", "screen")
-"""Units of outline widths: lengths, or fractions of the image height."""
-Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -315,3 +297,21 @@ class Outline:
         numbers = (self.width, *self.color, self.mix)
         if not np.isfinite(numbers).all() or self.width < 0.0:
             raise RigError(f"outline: expected finite numbers and a width of at least 0: {numbers}")
+
+
+def _check_numbers(
+    name: str, values: tuple[float, ...], most: float = float("inf"), count: int = 1
+) -> None:
+    """Raise RigError unless ``count`` numbers are finite, at least 0, and at most ``most``."""
+    if len(values) != count:
+        raise RigError(f"{name}: expected {count} numbers, found {len(values)}")
+    for value in values:
+        if not (0.0 <= value <= most and np.isfinite(value)):
+            limits = "at least 0" if most == float("inf") else f"0 to {most:g}"
+            raise RigError(f"{name}: expected {limits}, found {value}")
+
+
+def _check_choice(name: str, value: object, choices: range | tuple[str, ...]) -> None:
+    """Raise RigError unless a value is one of the choices."""
+    if value not in choices:
+        raise RigError(f"{name}: expected one of {', '.join(map(str, choices))}, found {value}")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from viewer.rig.skin import Skin
 
 _orders: Memo[Skeleton, _AxisProducts] = Memo()
+_Indices = NDArray[np.intp]
 
 
 @dataclass(slots=True, eq=False)
@@ -213,9 +214,6 @@ def _order_of(skeleton: Skeleton) -> _AxisProducts:
         return axis_products(skeleton.n_joints, skeleton.dof_joints[rows], axes, rows)
 
     return _orders.get(skeleton, None, order)
-
-
-_Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

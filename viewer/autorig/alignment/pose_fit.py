@@ -2,8 +2,26 @@
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
-moves all joints simultaneously (``pose_step``). Corresponding points may be far apart at first, as
+moves all joints simultaneously (``solve_step``). Corresponding points may be far apart at first, as
 for lowered and outstretched arms, and come closer with every iteration.
+
+One iteration solves a linear problem for joint rotations and limb scales. With x a vertex aligned
+with the target, m the mean of all x, c_j a joint, w_vj the weight of vertex v, s_vj the sum of its
+weights for joint j and all below it, and P_j the projection onto the limb's axis::
+
+    e_j = w_vj (x - c_j) + sum over joints k directly below j of s_vk (c_k - c_j)
+    x'  = x + w x (x - m) + t + u (x - m) + sum_j s_vj w_j x (x - c_j)
+            + sum_j (l_j P_j + g_j (1 - P_j)) e_j
+
+The rotations w_j, the growths l_j along and g_j across the limbs, and w, t and u of the whole
+figure minimise the mean of::
+
+    (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
+    h |x' - q|^2        over vertices and the target's points closest to them, in any direction
+
+The second sum constrains the ends of limbs, which planes do not. All lengths are divided by the
+target's size. Small penalties on rotations and growths, per step and in total, preserve what
+the surface does not determine, such as the rotation of a limb about its own axis.
 """
 
 from __future__ import annotations
@@ -35,7 +53,7 @@ from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 from viewer.rig.skinning.lbs import move
 
-_ROUNDS = 32
+_ROUNDS = 32  # number of iterations
 _NEARING = 16  # number of iterations over which the search radius shrinks
 _VERTICES = 1500  # number of template vertices that are matched with the target
 _FAR, _NEAR = 0.25, 0.03  # ratio of the search radius to the size, at the start and at the end
@@ -43,6 +61,17 @@ _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 _STILL = 2e-3  # rotation in radians; iterations end when no joint rotates by more
 _FEWEST = 50  # minimum number of pairs for fitting a pose
 _SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # limits of the logarithms of limb scales
+_HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
+
+# Penalties on the squares of total rotations (radians) and total growths (logarithms).
+_ROTATED, _GROWN = 3e-6, 3e-5
+_NOW = 1e-5  # penalty on rotations and growths within one iteration
+_WHOLE = 1e-7  # penalty on moving the whole figure, as a surface may slide along itself
+
+# Maximum rotation of a joint per iteration for which the linearisation is valid, radians.
+_MOST = 0.3
+_GROWTH = 0.2  # maximum growth (logarithm) of the whole figure or a limb per iteration
+_FIXED = 1e6  # penalty on fixed unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,7 +182,7 @@ def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -
     )
 
 
-def _moved(template: Figure, limbs: Limbs, state: Fitted, step: _PoseStep) -> Fitted:
+def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fitted:
     """Return the state after an iteration. The whole figure moves by x' = e^u R (x - m) + m + t."""
     similarity, skeleton = state.similarity, state.figure.require_skeleton()
     growths = state.grown + step.limb_growths
@@ -200,39 +229,6 @@ def _put_rotations(skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floa
     pose.rotations[joints] = matrix_to_quaternion(rotations @ np.swapaxes(held, 1, 2))
 
 
-# One iteration of fitting a template: the linear problem for joint rotations and limb scales.
-#
-# With x a vertex aligned with the target, m the mean of all x, c_j a joint, w_vj the weight of
-# vertex v, s_vj the sum of its weights for joint j and all below it, and P_j the projection onto
-# the limb's axis::
-#
-#     e_j = w_vj (x - c_j) + sum over joints k directly below j of s_vk (c_k - c_j)
-#     x'  = x + w x (x - m) + t + u (x - m) + sum_j s_vj w_j x (x - c_j)
-#             + sum_j (l_j P_j + g_j (1 - P_j)) e_j
-#
-# The rotations w_j, the growths l_j along and g_j across the limbs, and w, t and u of the whole
-# figure minimise the mean of
-#
-#     (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
-#     h |x' - q|^2        over vertices and the target's points closest to them, in any direction
-#
-# The second sum constrains the ends of limbs, which planes do not. All lengths are divided by the
-# target's size. Small penalties on rotations and growths, per step and in total, preserve what
-# the surface does not determine, such as the rotation of a limb about its own axis.
-
-_HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
-
-# Penalties on the squares of total rotations (radians) and total growths (logarithms).
-_ROTATED, _GROWN = 3e-6, 3e-5
-_NOW = 1e-5  # penalty on rotations and growths within one iteration
-_WHOLE = 1e-7  # penalty on moving the whole figure, as a surface may slide along itself
-
-# Maximum rotation of a joint per iteration for which the linearisation is valid, radians.
-_MOST = 0.3
-_GROWTH = 0.2  # maximum growth (logarithm) of the whole figure or a limb per iteration
-_FIXED = 1e6  # penalty on fixed unknowns
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignedTemplate:
     """A template's vertices and joints in the target's frame.
@@ -275,7 +271,7 @@ class Pairs:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _PoseStep:
+class PoseStep:
     """Result of an iteration, in the target's frame.
 
     Attributes
@@ -320,7 +316,7 @@ def solve_step(
     rotated: Floats,
     grown: Floats,
     scales: bool,
-) -> _PoseStep:
+) -> PoseStep:
     """Solve the linear problem above.
 
     Parameters
@@ -373,7 +369,7 @@ def solve_step(
     rotations = rotations * (_MOST / np.maximum(angles, _MOST))
     growths = np.clip(solved[-2 * n_joints :].reshape(2, -1), -_GROWTH, _GROWTH)
     growth = min(max(float(solved[6]), -_GROWTH), _GROWTH)
-    return _PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
+    return PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
 
 
 def _penalties(n_rotating: int, n_joints: int) -> Floats:

@@ -14,10 +14,11 @@ from viewer.rig.skin import Skin, influence_counts
 _ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched
 _SAME_WAY = 0.5  # minimum cosine of the angle between the surfaces, 60 degrees
 _INSIDE = 0.5  # winding number that separates outside from inside
+_BLOCK = 1 << 20  # point-triangle pairs per batch, about 200 bytes each
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _TransferredJoints:
+class TransferredJoints:
     """Joint positions in the target's frame.
 
     Attributes
@@ -112,7 +113,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
 
 def transfer_joints(
     joints: Floats, parents: Ints, regressor: JointRegressor, shifts: Floats, matched: Bools
-) -> _TransferredJoints:
+) -> TransferredJoints:
     """Move joints by the displacement of the surface around them.
 
     J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the vector d_v to the
@@ -151,7 +152,7 @@ def transfer_joints(
     for joint in np.flatnonzero(~transferred).tolist():
         # Parents come first, so the parent's shift is already final.
         moves[joint] = moves[parents[joint]] if parents[joint] >= 0 else 0.0
-    return _TransferredJoints(joints + moves, transferred, whole > 0.0)
+    return TransferredJoints(joints + moves, transferred, whole > 0.0)
 
 
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
@@ -168,9 +169,6 @@ def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
     """
     outer: Bools = np.abs(winding_numbers(positions, triangles, joints)) < _INSIDE
     return outer
-
-
-_BLOCK = 1 << 20  # point-triangle pairs per batch, about 200 bytes each
 
 
 def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Floats:

@@ -19,6 +19,12 @@ from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.retargeting.mirror import joint_partners, mirror_axis
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
+# Maximum distance of feet from the lowest joint, as a fraction of the joints' vertical extent.
+_LOW = 0.1
+
+# Minimum distance of the root from the feet of a figure with legs, as a fraction of that extent.
+_LEGS = 0.2
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestSkeleton:
@@ -274,21 +280,12 @@ def _bind_matrices(parents: Ints, inverse_bind: Floats, longer: Floats, scale: f
     return result
 
 
-# Ratio of the leg lengths of two figures, by which paths and heights are scaled.
-#
-# The root's height above the feet is roughly the leg length, and step length is proportional
-# to it. If limbs were scaled or the whole figure was stretched, root heights and translations
-# therefore scale with the legs.
-
-# Maximum distance of feet from the lowest joint, as a fraction of the joints' vertical extent.
-_LOW = 0.1
-
-# Minimum distance of the root from the feet of a figure with legs, as a fraction of that extent.
-_LEGS = 0.2
-
-
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
     """Return the ratio of the heights of two skeletons' roots above the feet, both at rest.
+
+    The root's height above the feet is roughly the leg length, and step length is proportional to
+    it. If limbs were scaled or the whole figure was stretched, root heights and translations
+    therefore scale with the legs.
 
     Parameters
     ----------

@@ -1,4 +1,14 @@
-"""Transfer of skin weights to another mesh: matched where they meet, inpainted elsewhere."""
+"""Transfer of skin weights to another mesh: matched where they meet, inpainted elsewhere.
+
+Inpainted weights are as smooth as the surface allows: between known weights W_m, the unknown
+weights W_u minimise trace(W^T Q W), Q = L + L M^-1 L, with the Laplacian L and vertex areas M
+(Abdrashitov et al. 2023)::
+
+    Q_uu W_u = -Q_um W_m
+
+Constants have zero energy, so rows still sum to 1. The second term makes transitions smooth,
+but overshoots; negative weights are clipped and rows rescaled to a sum of 1.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +37,21 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.skin import Skin, limit_influences, skin_rows
+
+Report = Callable[[float, str], None]
+_Solve = Callable[[Floats], Floats]
+
+# Weight below which 0 is used: solutions decay without reaching 0, and each iteration of smoothing
+# spreads weights by one edge.
+_NEGLIGIBLE = 1e-6
+_BLOCK = 1 << 22  # number of unknowns per batch, 32 MB
+_TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
+_SHIFT = 1e-10  # fraction of the mean diagonal that is added to a matrix that cannot be factorised
+_STEPS = 2000  # maximum iterations of conjugate gradients
+_CONVERGED = 1e-9  # relative residual at which iterations end
+_ROUNDS = 10  # number of smoothing iterations
+_FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
+_NO_SUM = 1e-12  # minimum sum of weights that can be normalised
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +153,7 @@ def transferred_weights(
 
 def _without_residue(points: SurfacePoints) -> SurfacePoints:
     """Return points snapped to edges and corners, without small coordinates caused by rounding."""
-    kept = np.where(points.barycentric < NEGLIGIBLE, 0.0, points.barycentric)
+    kept = np.where(points.barycentric < _NEGLIGIBLE, 0.0, points.barycentric)
     return replace(points, barycentric=kept / kept.sum(axis=1, keepdims=True))
 
 
@@ -247,26 +272,6 @@ def _in_vertices(
     )
 
 
-# Inpainting of missing weights, as smooth as the surface allows.
-#
-# Between known weights W_m, the unknown weights W_u minimise trace(W^T Q W), Q = L + L M^-1 L,
-# with the Laplacian L and vertex areas M (Abdrashitov et al. 2023)::
-#
-#     Q_uu W_u = -Q_um W_m
-#
-# Constants have zero energy, so rows still sum to 1. The second term makes transitions smooth,
-# but overshoots; negative weights are clipped and rows rescaled to a sum of 1.
-
-Report = Callable[[float, str], None]
-NEGLIGIBLE = 1e-6  # solved weight below which 0 is used, as solutions decay without reaching 0
-_BLOCK = 1 << 22  # number of unknowns per batch, 32 MB
-_TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
-_SHIFT = 1e-10  # fraction of the mean diagonal that is added to a matrix that cannot be factorised
-_STEPS = 2000  # maximum iterations of conjugate gradients
-_CONVERGED = 1e-9  # relative residual at which iterations end
-_Solve = Callable[[Floats], Floats]
-
-
 def inpaint(
     laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools, report: Report
 ) -> tuple[Any, str]:
@@ -332,7 +337,7 @@ def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
     for start in range(0, len(joints), step):
         report(start / len(joints), "inpainting weights")
         values = solve(right[:, joints[start : start + step]].toarray())
-        values[values < NEGLIGIBLE] = 0.0
+        values[values < _NEGLIGIBLE] = 0.0
         parts.append(sparse.csc_array(values))
     found = sparse.csr_array(sparse.hstack(parts))
     sums = np.asarray(found.sum(axis=1)).ravel()
@@ -397,13 +402,6 @@ def _iterative(matrix: Any) -> _Solve:
 def _ratio(a: Floats, b: Floats) -> Floats:
     """Return a / b, 0 if b is not positive: columns already solved are unchanged."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)
-
-
-_ROUNDS = 10
-_FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
-
-# Each iteration spreads weights by one edge; weights below this are dropped at the end.
-_NEGLIGIBLE = 1e-6
 
 
 def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) -> Any:
@@ -478,9 +476,6 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
         matrix, directed=False, indices=np.nonzero(sources)[0], limit=reach, min_only=True
     )
     return np.isfinite(distances)
-
-
-_NO_SUM = 1e-12  # minimum sum of weights that can be normalised
 
 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:

@@ -17,7 +17,7 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
 
-_BLOCK = 32
+_BLOCK = 32  # rows that are solved together, with one call for all curves
 
 
 def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
@@ -42,6 +42,9 @@ def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
     full = np.pad(weights, ((0, 0), (0, padding)), constant_values=1.0)
     main, next_, second = _bands(full, count, span**4)
     right = np.pad(weights[..., None] * targets, ((0, 0), (0, padding), (0, 0)))
+    # Only neighbouring blocks depend on each other: E couples the last two rows of one with the
+    # first two of the next. Forwards, each block is solved for its own sums and for the two
+    # unknowns y that follow it: x = A^-1 b - A^-1 E y. Backwards, these are known.
     solved: list[Floats] = []
     coupling = np.zeros((_BLOCK, 2))
     for block in range(n_blocks):

@@ -18,6 +18,10 @@ from viewer.rig.geometry.vectors import unit
 _FORWARDS = 0.1
 _REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 
+# Sine of the bend at which a leg and the direction across the body determine the axis of its knee
+# equally.
+_FLEXED = np.sin(np.radians(15.0))
+
 
 @dataclass(frozen=True, slots=True)
 class Leg:
@@ -37,10 +41,57 @@ class Leg:
     toe: int
 
 
-def reach(hips: Floats, knees: Floats, ankles: Floats) -> Floats:
-    """Return the longest distance from hip to ankle in each frame: (F,) for (F, 3) each."""
-    thigh = np.linalg.norm(knees - hips, axis=1)
-    return _REACH * (thigh + np.linalg.norm(ankles - knees, axis=1))
+def leg_rotations(
+    rotations: Floats,
+    world: Floats,
+    parents: Ints,
+    legs: Sequence[Leg],
+    drop: Floats,
+    shifts: Sequence[Floats],
+) -> Floats:
+    """Return local rotations that bring the ankles of all legs to their targets.
+
+    Feet keep their orientation in the world.
+
+    Parameters
+    ----------
+    rotations : (N, J, 4)
+        Local rotations, unit quaternions.
+    world : (N, J, 4, 4)
+        World matrices of the same poses.
+    parents : (J,)
+        -1 for a root.
+    legs : sequence of Leg
+        The legs, from left to right.
+    drop : (N, 3)
+        Translation of the whole body.
+    shifts : sequence of (N, 3)
+        Translation of each leg's ankle, instead of ``drop``.
+    """
+    result = rotations.copy()
+    across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
+    old = matrix_to_quaternion(_unscaled(world[..., :3, :3]))
+    for leg, shift in zip(legs, shifts, strict=True):
+        moves = (shift - drop).any(axis=1)
+        if not moves.any():
+            continue
+        hips, knees, ankles = (world[:, j, :3, 3] + drop for j in (leg.hip, leg.knee, leg.ankle))
+        axis = hinges(_unscaled(world[:, leg.hip, :3, :3]), (hips, knees, ankles), across)
+        thigh, shin = bend(hips, knees, ankles, ankles - drop + shift, axis)
+        above = int(parents[leg.hip])
+        parent = old[:, above] if above >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
+        new_hip = multiply(thigh, old[:, leg.hip])
+        under_knee = multiply(thigh, old[:, int(parents[leg.knee])])
+        under_ankle = multiply(shin, old[:, int(parents[leg.ankle])])
+        for joint, outer, inner in (
+            (leg.hip, parent, new_hip),
+            (leg.knee, under_knee, multiply(shin, old[:, leg.knee])),
+            (leg.ankle, under_ankle, old[:, leg.ankle]),
+        ):
+            # World rotations R = P L, so L = P^-1 R, with P the new rotation of the parent.
+            local = multiply(conjugate(np.broadcast_to(outer, inner.shape)), inner)
+            result[moves, joint] = local[moves]
+    return result
 
 
 def bend(
@@ -86,76 +137,6 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return np.einsum("fa,fa->f", a, b)
 
 
-# Sine of the bend at which a leg and ``across`` determine the axis of its knee equally.
-_FLEXED = np.sin(np.radians(15.0))
-
-
-def leg_rotations(
-    rotations: Floats,
-    world: Floats,
-    parents: Ints,
-    legs: Sequence[Leg],
-    drop: Floats,
-    shifts: Sequence[Floats],
-) -> Floats:
-    """Return local rotations that bring the ankles of all legs to their targets.
-
-    Feet keep their orientation in the world.
-
-    Parameters
-    ----------
-    rotations : (N, J, 4)
-        Local rotations, unit quaternions.
-    world : (N, J, 4, 4)
-        World matrices of the same poses.
-    parents : (J,)
-        -1 for a root.
-    legs : sequence of Leg
-        The legs, from left to right.
-    drop : (N, 3)
-        Translation of the whole body.
-    shifts : sequence of (N, 3)
-        Translation of each leg's ankle, instead of ``drop``.
-    """
-    result = rotations.copy()
-    across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
-    old = matrix_to_quaternion(_unscaled(world[..., :3, :3]))
-    for leg, shift in zip(legs, shifts, strict=True):
-        _reach_for(result, world, old, parents, leg, drop, shift, across)
-    return result
-
-
-def _reach_for(
-    rotations: Floats,
-    world: Floats,
-    old: Floats,
-    parents: Ints,
-    leg: Leg,
-    drop: Floats,
-    shift: Floats,
-    across: Floats,
-) -> None:
-    """Rotate a leg in place so that its ankle is at its previous position plus a shift."""
-    hips, knees, ankles = (world[:, j, :3, 3] + drop for j in (leg.hip, leg.knee, leg.ankle))
-    moves = (shift - drop).any(axis=1)
-    if not moves.any():
-        return
-    axis = hinges(_unscaled(world[:, leg.hip, :3, :3]), (hips, knees, ankles), across)
-    thigh, shin = bend(hips, knees, ankles, ankles - drop + shift, axis)
-    above = int(parents[leg.hip])
-    parent = old[:, above] if above >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
-    new_hip = multiply(thigh, old[:, leg.hip])
-    under_knee = multiply(thigh, old[:, int(parents[leg.knee])])
-    under_ankle = multiply(shin, old[:, int(parents[leg.ankle])])
-    for joint, outer, inner in (
-        (leg.hip, parent, new_hip),
-        (leg.knee, under_knee, multiply(shin, old[:, leg.knee])),
-        (leg.ankle, under_ankle, old[:, leg.ankle]),
-    ):
-        local = multiply(conjugate(np.broadcast_to(outer, inner.shape)), inner)
-        rotations[moves, joint] = local[moves]
-
-
 def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats) -> Floats:
     """Return the axis of a knee in every frame, a unit vector fixed to the thigh: (N, 3).
 
@@ -182,6 +163,12 @@ def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats
 
 def _unscaled(linear: Floats) -> Floats:
     return linear / np.maximum(np.linalg.norm(linear, axis=-2, keepdims=True), 1e-30)
+
+
+def reach(hips: Floats, knees: Floats, ankles: Floats) -> Floats:
+    """Return the longest distance from hip to ankle in each frame: (F,) for (F, 3) each."""
+    thigh = np.linalg.norm(knees - hips, axis=1)
+    return _REACH * (thigh + np.linalg.norm(ankles - knees, axis=1))
 
 
 def lowering(

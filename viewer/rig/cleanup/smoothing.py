@@ -1,4 +1,9 @@
-"""Smoothing of clips: filters of rotations in their tangent space, and of positions."""
+"""Smoothing of clips: filters of rotations in their tangent space, and of positions.
+
+``OneEuro`` adapts its cutoff to the speed: still poses are smoothed strongly, quick motions hardly.
+``SavitzkyGolay`` fits polynomials, which keeps the height and width of peaks. Both filter rotations
+as rotation vectors relative to a nearby rotation, so that uniform rotations are unchanged.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +24,14 @@ from viewer.rig.geometry.quaternion import (
     multiply,
     rotation_vector_to_quaternion,
 )
+
+# One Euro filter.
+_SETTLED = 1e-4  # weight below which the first value is negligible
+_LONGEST = 1000  # maximum number of frames added at each end
+
+# Savitzky-Golay filter.
+_SECONDS = 0.2  # default length of the window, seconds
+_PASSES = 2  # the second pass fits relative to the result of the first, which is less noisy
 
 
 class Filter(Protocol):
@@ -109,10 +122,6 @@ def _points(
             seen = part[start:stop, numbers, :3]
             part[start:stop, numbers, :3] = chosen.positions(seen, rate, metres)
     return result
-
-
-_SETTLED = 1e-4  # weight below which the first value is negligible
-_LONGEST = 1000  # maximum number of frames added at each end
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,10 +228,6 @@ def _factor(cutoff: Floats | float, rate: float) -> Floats:
     return turns / (turns + rate)
 
 
-_SECONDS = 0.2  # default length of the window, seconds
-_PASSES = 2  # the second pass fits relative to the result of the first, which is less noisy
-
-
 @dataclass(frozen=True, slots=True)
 class SavitzkyGolay:
     """Least-squares fit of a polynomial to a window of frames, evaluated at its middle.
@@ -304,6 +309,12 @@ def _continuous(quaternions: Floats) -> Floats:
     return result
 
 
+def moved(base: Floats, vectors: Floats) -> Floats:
+    """Return b exp(v) of unit quaternions (..., 4) and rotation vectors (..., 3), normalised."""
+    found = multiply(base, rotation_vector_to_quaternion(vectors))
+    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+
+
 def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
     """Return the rotation vectors v with q = b exp(v), for rotations by less than 2 pi.
 
@@ -330,9 +341,3 @@ def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
     is_tiny = sine < np.finfo(float).tiny ** 0.5
     factor = np.divide(angle, sine, out=np.full(sine.shape, 2.0), where=~is_tiny)
     return factor[..., None] * found[..., :3]
-
-
-def moved(base: Floats, vectors: Floats) -> Floats:
-    """Return b exp(v) of unit quaternions (..., 4) and rotation vectors (..., 3), normalised."""
-    found = multiply(base, rotation_vector_to_quaternion(vectors))
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)

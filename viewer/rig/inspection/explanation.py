@@ -24,6 +24,8 @@ from viewer.rig.skinning import METHODS, Skinning, skin_used, skinned
 from viewer.rig.skinning.dqs import split_palette
 
 _TINY = 1e-12  # sums of weights or quaternions below this define no rotation
+_LONGEST = 40  # maximum number of characters of a joint's name
+_RIGID = 1e-9  # tolerance within which a stretch is treated as the identity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,36 +193,6 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     )
 
 
-def _dual_terms(row: Skin, palette: Floats, rest: Floats) -> DualTerms:
-    """Return the terms of dual quaternion skinning for one vertex, as in ``dqs.deform``."""
-    duals, stretches = (
-        values[row.joints] for values in split_palette(palette, bind_positions(row))
-    )
-    total = float(row.weights.sum())
-    is_moved = abs(total) > _TINY
-    fractions = row.weights / (total if is_moved else 1.0)
-    signs = np.where(duals[:, :4] @ duals[0, :4] < 0.0, -1.0, 1.0) if len(duals) else np.ones(0)
-    blended = (fractions * signs) @ duals
-    length = float(np.linalg.norm(blended[:4]))
-    stretch = np.einsum("k,kab->ab", fractions, stretches)
-    if not is_moved or length <= _TINY:
-        return DualTerms(fractions, duals, signs, stretches, blended, length, rest, rest)
-    stretched = stretch[:, :3] @ rest + stretch[:, 3]
-    position = _moved(blended / length, stretched)
-    return DualTerms(fractions, duals, signs, stretches, blended, length, stretched, position)
-
-
-def _moved(dual: Floats, point: Floats) -> Floats:
-    """Rotate, then translate by 2 (w_r v_d - w_d v_r + v_r x v_d) (Kavan 2008, algorithm 1)."""
-    real, other = dual[:4], dual[4:]
-    shift = real[3] * other[:3] - other[3] * real[:3] + np.cross(real[:3], other[:3])
-    return quaternion_to_matrix(real) @ point + 2.0 * shift
-
-
-_LONGEST = 40  # maximum number of characters of a joint's name
-_RIGID = 1e-9  # tolerance within which a stretch is treated as the identity
-
-
 def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
     """Return the values of an explanation as lines, in the order of computation.
 
@@ -248,6 +220,32 @@ def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
         text.dual(explanation.dual)
     text.end()
     return text.lines
+
+
+def _dual_terms(row: Skin, palette: Floats, rest: Floats) -> DualTerms:
+    """Return the terms of dual quaternion skinning for one vertex, as in ``dqs.deform``."""
+    duals, stretches = (
+        values[row.joints] for values in split_palette(palette, bind_positions(row))
+    )
+    total = float(row.weights.sum())
+    is_moved = abs(total) > _TINY
+    fractions = row.weights / (total if is_moved else 1.0)
+    signs = np.where(duals[:, :4] @ duals[0, :4] < 0.0, -1.0, 1.0) if len(duals) else np.ones(0)
+    blended = (fractions * signs) @ duals
+    length = float(np.linalg.norm(blended[:4]))
+    stretch = np.einsum("k,kab->ab", fractions, stretches)
+    if not is_moved or length <= _TINY:
+        return DualTerms(fractions, duals, signs, stretches, blended, length, rest, rest)
+    stretched = stretch[:, :3] @ rest + stretch[:, 3]
+    position = _moved(blended / length, stretched)
+    return DualTerms(fractions, duals, signs, stretches, blended, length, stretched, position)
+
+
+def _moved(dual: Floats, point: Floats) -> Floats:
+    """Rotate, then translate by 2 (w_r v_d - w_d v_r + v_r x v_d) (Kavan 2008, algorithm 1)."""
+    real, other = dual[:4], dual[4:]
+    shift = real[3] * other[:3] - other[3] * real[:3] + np.cross(real[:3], other[:3])
+    return quaternion_to_matrix(real) @ point + 2.0 * shift
 
 
 class _Text:

@@ -1,4 +1,10 @@
-"""The facing direction of a figure or scene: a horizontal axis."""
+"""The facing direction of a figure or scene: a horizontal axis, from several kinds of evidence.
+
+Each kind (sides, toes, faces, heads and tails, soles, travel) yields a horizontal vector towards
+the front. Its length is the confidence: 1 for complete and consistent evidence, 0 for none. The
+weighted sum is the vote of a figure, and the axis nearest to the mean vote of all figures is the
+front.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +34,21 @@ _WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
 Joint names state left and right explicitly; the other kinds are heuristics and outvote names
 only if they agree. Travel has the smallest weight, as a person may walk backwards.
 """
+
+# Minimum length of offsets with a reliable direction, as a fraction of the figure's size.
+_LEAST = 0.01
+
+# Minimum distance from the centre, as a fraction of the figure's size, of a head in front of the
+# body.
+_CLEAR = 0.2
+_TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
+
+# Height of the soles and range of the ankles, as fractions of the figure's height.
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)
+
+# Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
+_MIRRORED = 0.98
+_LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
 
 
 def usual_front(up: str) -> Front:
@@ -85,8 +106,9 @@ def _vote(actor: Actor, up: Floats) -> Floats:
         return _unit(way, _SURE)
     found = {
         "sides": _from_sides(names, places, up),
-        "toes": _from_toes(names, parents, places, up),
-        "face": _from_face(names, parents, places, up),
+        # Toes are in front of their parent joints, eyes and jaws in front of the head joint.
+        "toes": _by_word(_TOES, names, parents, places, up),
+        "face": _by_word(_FACE, names, parents, places, up),
         "ends": _from_ends(names, places, up),
         "travel": _from_travel(_path(actor), box_size(bounding_box(places)), up),
     }
@@ -140,27 +162,6 @@ def _path(actor: Actor) -> Floats:
     return apply_transform(actor.placement, places.reshape(-1, 3))
 
 
-# Evidence of a figure's facing direction: sides, toes, faces, heads and tails, soles, travel.
-#
-# Each kind yields a horizontal vector towards the front. Its length is the confidence: 1 for
-# complete and consistent evidence, 0 for none.
-
-# Minimum length of offsets with a reliable direction, as a fraction of the figure's size.
-_LEAST = 0.01
-
-# Minimum distance from the centre, as a fraction of the figure's size, of a head in front of the
-# body.
-_CLEAR = 0.2
-_TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
-
-# Height of the soles and range of the ankles, as fractions of the figure's height.
-_SLAB, _ABOVE = 0.015, (0.05, 0.09)
-
-# Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
-_MIRRORED = 0.98
-_LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
-
-
 def _from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     """Return evidence from left and right: the front is left x up.
 
@@ -191,14 +192,17 @@ def _from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     return _agreement(np.cross(across, up), _size(places))
 
 
-def _from_toes(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
-    """Return evidence from the feet: toes are in front of their parent joints."""
-    return _by_word(_TOES, names, parents, places, up)
-
-
-def _from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
-    """Return evidence from the face: eyes and jaws are in front of the head joint."""
-    return _by_word(_FACE, names, parents, places, up)
+def _by_word(
+    words: tuple[str, ...], names: Sequence[str], parents: Ints, places: Floats, up: Floats
+) -> Floats:
+    """Return the mean direction from parents to joints whose names contain a word."""
+    chosen = [
+        joint
+        for joint, (_, word) in enumerate(sided_words(names))
+        if parents[joint] >= 0 and any(part in word for part in words)
+    ]
+    ways = places[chosen] - places[parents[chosen]]
+    return _agreement(_horizontal(ways, up), _size(places))
 
 
 def _from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
@@ -302,19 +306,6 @@ def _cells(places: Floats) -> Ints:
     """Return the index of the unit cell that contains each position: (N,)."""
     x, y, z = np.floor(places).astype(np.int64).T + 2
     return np.asarray((x * 1000 + y) * 1000 + z)
-
-
-def _by_word(
-    words: tuple[str, ...], names: Sequence[str], parents: Ints, places: Floats, up: Floats
-) -> Floats:
-    """Return the mean direction from parents to joints whose names contain a word."""
-    chosen = [
-        joint
-        for joint, (_, word) in enumerate(sided_words(names))
-        if parents[joint] >= 0 and any(part in word for part in words)
-    ]
-    ways = places[chosen] - places[parents[chosen]]
-    return _agreement(_horizontal(ways, up), _size(places))
 
 
 def _agreement(ways: Floats, size: float) -> Floats:

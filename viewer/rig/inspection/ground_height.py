@@ -32,6 +32,8 @@ _ROLLS = 0.02  # minimum distance from the longest level, as rolling feet create
 
 # Maximum distance of the ground below the longest level, which may be a step or a seat.
 _STEP = 0.06
+_MOST_FRAMES = 4000  # maximum number of evaluated frames
+_LOW = 0.02  # quantile of the heights, for feet that never rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,22 @@ class Ground:
     def is_guess(self) -> bool:
         """Whether feet never rest, and the height is only close to their lowest positions."""
         return not self.levels
+
+
+@dataclass(frozen=True, slots=True)
+class RestingHeight:
+    """Height of the ground under an actor.
+
+    Attributes
+    ----------
+    height : float
+        Along the scene's up axis, scene units.
+    is_clear : bool
+        Whether feet rest at this height; otherwise it is the height of the lowest positions.
+    """
+
+    height: float
+    is_clear: bool
 
 
 def ground_of(
@@ -89,6 +107,34 @@ def ground_of(
     if ground is None or sum(height < ground - _APART * size for height, _ in levels) > 1:
         return Ground(None, levels)
     return Ground(ground, levels)
+
+
+def resting_height(actor: Actor, up: str) -> RestingHeight | None:
+    """Return the height at which an actor's feet rest; None unless two feet are found by name.
+
+    Parameters
+    ----------
+    actor : Actor
+        Placed actor with a motion of joints.
+    up : "y" or "z"
+        Up axis of the scene.
+    """
+    figure, motion = actor.figure, actor.clip
+    if figure.skeleton is None or not isinstance(motion, JointMotion):
+        return None
+    rate = frame_rate(motion)
+    times = frame_times(motion.start, motion.end, rate)[:_MOST_FRAMES]
+    frames = frames_of(figure, motion, times, actor.pose)
+    soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)
+    if soles is None or not frames.present.any():
+        return None
+    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
+    axis = actor.placement[2 if up == "z" else 1]
+    heights = soles.heights(world_frames(figure, frames), axis, scale).min(axis=1)
+    found = ground_of(heights, frames.present, 1.0 / rate, scale * extent(figure)[1])
+    if found.height is not None and not found.is_guess:
+        return RestingHeight(found.height, True)
+    return RestingHeight(float(np.quantile(heights[frames.present], _LOW)), False)
 
 
 def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None:
@@ -165,51 +211,3 @@ def _levels(heights: Floats, size: float) -> tuple[_Level, ...]:
     # Of levels with the same number of frames, the upper one is first: at the lower one, feet have
     # sunk into the ground.
     return tuple(sorted(levels, key=lambda level: (-level[1], -level[0])))
-
-
-_MOST_FRAMES = 4000  # maximum number of evaluated frames
-_LOW = 0.02  # quantile of the heights, for feet that never rest
-
-
-@dataclass(frozen=True, slots=True)
-class _RestingHeight:
-    """Height of the ground under an actor.
-
-    Attributes
-    ----------
-    height : float
-        Along the scene's up axis, scene units.
-    is_clear : bool
-        Whether feet rest at this height; otherwise it is the height of the lowest positions.
-    """
-
-    height: float
-    is_clear: bool
-
-
-def resting_height(actor: Actor, up: str) -> _RestingHeight | None:
-    """Return the height at which an actor's feet rest; None unless two feet are found by name.
-
-    Parameters
-    ----------
-    actor : Actor
-        Placed actor with a motion of joints.
-    up : "y" or "z"
-        Up axis of the scene.
-    """
-    figure, motion = actor.figure, actor.clip
-    if figure.skeleton is None or not isinstance(motion, JointMotion):
-        return None
-    rate = frame_rate(motion)
-    times = frame_times(motion.start, motion.end, rate)[:_MOST_FRAMES]
-    frames = frames_of(figure, motion, times, actor.pose)
-    soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)
-    if soles is None or not frames.present.any():
-        return None
-    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
-    axis = actor.placement[2 if up == "z" else 1]
-    heights = soles.heights(world_frames(figure, frames), axis, scale).min(axis=1)
-    found = ground_of(heights, frames.present, 1.0 / rate, scale * extent(figure)[1])
-    if found.height is not None and not found.is_guess:
-        return _RestingHeight(found.height, True)
-    return _RestingHeight(float(np.quantile(heights[frames.present], _LOW)), False)

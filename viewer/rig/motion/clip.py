@@ -1,4 +1,12 @@
-"""Keyed clips: one curve of keys per DOF, with tangent rules and extrapolation."""
+"""Keyed clips: one curve of keys per DOF, with tangent rules and extrapolation.
+
+Between two keys with the values p0 and p1, h seconds apart, a curve is a cubic Hermite spline. With
+u from 0 to 1 across the span, v0 = h out0 and v1 = h in1, its value is (CSE169 course notes)::
+
+    ((a u + b) u + v0) u + p0      a = 2 p0 - 2 p1 + v0 + v1      b = -3 p0 + 3 p1 - 2 v0 - v1
+
+At a key it is exactly the key's value. A clip fits the skeletons whose DOFs are its channels.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +34,8 @@ _TangentRule = Literal["flat", "linear", "smooth"]
 TANGENT_RULES: tuple[_TangentRule, ...] = get_args(_TangentRule)
 Tangent = _TangentRule | float
 """A tangent rule, or a slope in value per second."""
+_MODES: dict[str, int] = {mode: index for index, mode in enumerate(EXTRAPOLATIONS)}
+_tables: Memo[Clip, _Table] = Memo(kept=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,6 +116,65 @@ class Clip:
             raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
 
 
+def evaluate(channel: Channel, times: Floats) -> Floats:
+    """Return a curve's values: cubic Hermite between the keys, extrapolated outside.
+
+    Parameters
+    ----------
+    channel : Channel
+        The curve; without keys it is 0 everywhere.
+    times : (...)
+        Seconds.
+
+    Returns
+    -------
+    (...)
+        Lengths or radians.
+    """
+    times = np.asarray(times, dtype=np.float64)
+    return _values(_table((channel,)), times.ravel())[:, 0].reshape(times.shape)
+
+
+def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
+    """Return the values of all curves of a clip at many times; see ``evaluate``.
+
+    Parameters
+    ----------
+    clip : Clip
+        Clip with C channels that have keys.
+    times : (T,)
+        Seconds.
+
+    Returns
+    -------
+    targets : (C,)
+        Rows of the skeleton's DOF table.
+    values : (T, C)
+        Lengths or radians; channels without keys are 0.
+    """
+    table = _tables.get(clip, (), lambda: _table(clip.channels))
+    return table.targets, _values(table, np.atleast_1d(times))
+
+
+def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
+    """Set a pose's DOFs to a clip's values at one time, clamped to their limits.
+
+    Parameters
+    ----------
+    clip : Clip
+        The motion.
+    skeleton : Skeleton
+        Provides the limits; the clip must fit the skeleton, see ``check_fit``.
+    time : float
+        Seconds; before ``start`` and after ``end`` the curves extrapolate.
+    out : Pose
+        Modified in place.
+    """
+    targets, values = evaluate_all(clip, np.array([time]))
+    out.dofs[targets] = values[0]
+    out.dofs[:] = clamp_dofs(skeleton, out.dofs)
+
+
 def slopes(channel: Channel) -> Floats:
     """Return the slopes on both sides of every key, according to their tangent rules.
 
@@ -144,65 +213,6 @@ def _ratio(rise: Floats, run: Floats) -> Floats:
     return np.divide(rise, run, out=np.zeros_like(rise), where=run > SHORTEST)
 
 
-def is_course_rig(skeleton: Skeleton) -> bool:
-    """Return whether a skeleton's DOFs are the DOFs of ``.anim`` channels, in that order.
-
-    These are translations x, y, z of the root, then rotations x, y, z of joints 0, 1, 2 and so on.
-    """
-    count = skeleton.n_joints
-    if skeleton.n_dofs != 3 + 3 * count:
-        return False
-    joints = np.concatenate([[0, 0, 0], np.repeat(np.arange(count), 3)])
-    kinds = np.concatenate([[0, 1, 2], np.tile([3, 4, 5], count)])
-    return bool((skeleton.dof_joints == joints).all() and (skeleton.dof_kinds == kinds).all())
-
-
-def suits(clip: Clip, skeleton: Skeleton) -> bool:
-    """Return whether a clip's channels are the DOFs of a skeleton; see ``check_fit``."""
-    return not misfit(clip, skeleton)
-
-
-def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
-    """Return the reason why a clip cannot move a skeleton, phrased to follow its name, or None."""
-    if not is_course_rig(skeleton):
-        return Phrase("not-course-rig", reason=_first_misfit(skeleton))
-    if len(clip.channels) != skeleton.n_dofs:
-        return Phrase("clip-needs", n=skeleton.n_dofs, joints=skeleton.n_joints)
-    return None
-
-
-def _first_misfit(skeleton: Skeleton) -> Phrase:
-    """Describe the first joint whose DOFs differ from the DOFs of a ``.skel``-style rig."""
-    for joint in range(skeleton.n_joints):
-        kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
-        if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
-            label = joint_label(skeleton, joint)
-            if not kinds:
-                return Phrase("joint-without-dofs", joint=label)
-            return Phrase("joint-with-dofs", joint=label, kinds=kinds)
-    return Phrase("dofs-unordered")
-
-
-def check_fit(clip: Clip, skeleton: Skeleton) -> None:
-    """Raise an error if a clip was made for a different skeleton.
-
-    Raises
-    ------
-    RigError
-        If the number of channels or the DOFs do not match; see ``is_course_rig``.
-    """
-    found = misfit(clip, skeleton)
-    if found is None:
-        return
-    values = {"clip": clip.name, "n": len(clip.channels), "misfit": found}
-    raise RigError(
-        Diagnostic("C009.channels" if is_course_rig(skeleton) else "C009.rig", values=values)
-    )
-
-
-_MODES: dict[str, int] = {mode: index for index, mode in enumerate(EXTRAPOLATIONS)}
-
-
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class _Table:
     """C channels with up to K keys; unused keys are at infinity."""
@@ -213,50 +223,6 @@ class _Table:
     edges: Floats  # (C, K, 2), incoming and outgoing slopes
     last: Ints  # (C,), index of the last key
     modes: Ints  # (C, 2)
-
-
-_tables: Memo[Clip, _Table] = Memo(kept=1)
-
-
-def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
-    """Return the values of all curves of a clip at many times; see ``evaluate``.
-
-    Parameters
-    ----------
-    clip : Clip
-        Clip with C channels that have keys.
-    times : (T,)
-        Seconds.
-
-    Returns
-    -------
-    targets : (C,)
-        Rows of the skeleton's DOF table.
-    values : (T, C)
-        Lengths or radians; channels without keys are 0.
-    """
-    table = _tables.get(clip, (), lambda: _table(clip.channels))
-    return table.targets, _values(table, np.atleast_1d(times))
-
-
-def _evaluate_channels(channels: Sequence[Channel], times: Floats) -> Floats:
-    """Return the values of some curves at many times, uncached: (T, C) for times (T,)."""
-    return _values(_table(channels), times)
-
-
-def _values(table: _Table, times: Floats) -> Floats:
-    times = np.asarray(times, dtype=np.float64)[:, None]
-    if not len(table.targets):
-        return np.zeros((len(times), 0))
-    every = np.arange(len(table.targets))
-    first, last = table.times[:, 0], table.times[every, table.last]
-    at_first, at_last = table.values[:, 0], table.values[every, table.last]
-    is_flat = last - first <= SHORTEST
-    inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, last - first))
-    # End values are returned unchanged; of simultaneous keys, the outermost is used.
-    values = np.where(inside >= last, at_last, _hermite(table, inside))
-    values = np.where((inside <= first) & (times < first), at_first, values) + shift
-    return np.where(is_flat, at_last, values)
 
 
 def _table(channels: Sequence[Channel]) -> _Table:
@@ -277,6 +243,21 @@ def _table(channels: Sequence[Channel]) -> _Table:
         modes[row] = [_MODES[mode] for mode in channel.extrapolation]
     targets = np.array([channel.target for channel in channels], dtype=np.int32)
     return _Table(targets, times, values, edges, last, modes)
+
+
+def _values(table: _Table, times: Floats) -> Floats:
+    times = np.asarray(times, dtype=np.float64)[:, None]
+    if not len(table.targets):
+        return np.zeros((len(times), 0))
+    every = np.arange(len(table.targets))
+    first, last = table.times[:, 0], table.times[every, table.last]
+    at_first, at_last = table.values[:, 0], table.values[every, table.last]
+    is_flat = last - first <= SHORTEST
+    inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, last - first))
+    # End values are returned unchanged; of simultaneous keys, the outermost is used.
+    values = np.where(inside >= last, at_last, _hermite(table, inside))
+    values = np.where((inside <= first) & (times < first), at_first, values) + shift
+    return np.where(is_flat, at_last, values)
 
 
 def _inside(
@@ -305,6 +286,19 @@ def _inside(
     return inside, shift
 
 
+def _hermite(table: _Table, times: Floats) -> Floats:
+    span = _spans(table, times)
+    every = np.arange(len(table.targets))
+    following = np.minimum(span + 1, table.last)
+    start = table.times[every, span]
+    duration = table.times[every, following] - start
+    u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > SHORTEST)
+    p0, p1 = table.values[every, span], table.values[every, following]
+    v0, v1 = duration * table.edges[every, span, 1], duration * table.edges[every, following, 0]
+    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
+    return ((a * u + b) * u + v0) * u + p0
+
+
 def _spans(table: _Table, times: Floats) -> Ints:
     """Return the index of the key before each time: (T, C)."""
     most = np.maximum(table.last - 1, 0)
@@ -319,56 +313,57 @@ def _spans(table: _Table, times: Floats) -> Ints:
     return np.clip(found, 0, most)
 
 
-def _hermite(table: _Table, times: Floats) -> Floats:
-    span = _spans(table, times)
-    every = np.arange(len(table.targets))
-    following = np.minimum(span + 1, table.last)
-    start = table.times[every, span]
-    duration = table.times[every, following] - start
-    u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > SHORTEST)
-    p0, p1 = table.values[every, span], table.values[every, following]
-    v0, v1 = duration * table.edges[every, span, 1], duration * table.edges[every, following, 0]
-    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
-    return ((a * u + b) * u + v0) * u + p0
+def suits(clip: Clip, skeleton: Skeleton) -> bool:
+    """Return whether a clip's channels are the DOFs of a skeleton; see ``check_fit``."""
+    return not misfit(clip, skeleton)
 
 
-def evaluate(channel: Channel, times: Floats) -> Floats:
-    """Return a curve's values: cubic Hermite between the keys, extrapolated outside.
+def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
+    """Return the reason why a clip cannot move a skeleton, phrased to follow its name, or None."""
+    if not is_course_rig(skeleton):
+        return Phrase("not-course-rig", reason=_first_misfit(skeleton))
+    if len(clip.channels) != skeleton.n_dofs:
+        return Phrase("clip-needs", n=skeleton.n_dofs, joints=skeleton.n_joints)
+    return None
 
-    With u in 0..1 across a span of h seconds, v0 = h out0 and v1 = h in1, the value is
-    ((a u + b) u + v0) u + p0, a = 2 p0 - 2 p1 + v0 + v1, b = -3 p0 + 3 p1 - 2 v0 - v1
-    (CSE169 course notes). At a key it is exactly the key's value.
 
-    Parameters
-    ----------
-    channel : Channel
-        The curve; without keys it is 0 everywhere.
-    times : (...)
-        Seconds.
+def check_fit(clip: Clip, skeleton: Skeleton) -> None:
+    """Raise an error if a clip was made for a different skeleton.
 
-    Returns
-    -------
-    (...)
-        Lengths or radians.
+    Raises
+    ------
+    RigError
+        If the number of channels or the DOFs do not match; see ``is_course_rig``.
     """
-    times = np.asarray(times, dtype=np.float64)
-    return _evaluate_channels((channel,), times.ravel())[:, 0].reshape(times.shape)
+    found = misfit(clip, skeleton)
+    if found is None:
+        return
+    values = {"clip": clip.name, "n": len(clip.channels), "misfit": found}
+    raise RigError(
+        Diagnostic("C009.channels" if is_course_rig(skeleton) else "C009.rig", values=values)
+    )
 
 
-def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
-    """Set a pose's DOFs to a clip's values at one time, clamped to their limits.
+def is_course_rig(skeleton: Skeleton) -> bool:
+    """Return whether a skeleton's DOFs are the DOFs of ``.anim`` channels, in that order.
 
-    Parameters
-    ----------
-    clip : Clip
-        The motion.
-    skeleton : Skeleton
-        Provides the limits; the clip must fit the skeleton, see ``check_fit``.
-    time : float
-        Seconds; before ``start`` and after ``end`` the curves extrapolate.
-    out : Pose
-        Modified in place.
+    These are translations x, y, z of the root, then rotations x, y, z of joints 0, 1, 2 and so on.
     """
-    targets, values = evaluate_all(clip, np.array([time]))
-    out.dofs[targets] = values[0]
-    out.dofs[:] = clamp_dofs(skeleton, out.dofs)
+    count = skeleton.n_joints
+    if skeleton.n_dofs != 3 + 3 * count:
+        return False
+    joints = np.concatenate([[0, 0, 0], np.repeat(np.arange(count), 3)])
+    kinds = np.concatenate([[0, 1, 2], np.tile([3, 4, 5], count)])
+    return bool((skeleton.dof_joints == joints).all() and (skeleton.dof_kinds == kinds).all())
+
+
+def _first_misfit(skeleton: Skeleton) -> Phrase:
+    """Describe the first joint whose DOFs differ from the DOFs of a ``.skel``-style rig."""
+    for joint in range(skeleton.n_joints):
+        kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
+        if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
+            label = joint_label(skeleton, joint)
+            if not kinds:
+                return Phrase("joint-without-dofs", joint=label)
+            return Phrase("joint-with-dofs", joint=label, kinds=kinds)
+    return Phrase("dofs-unordered")

@@ -1,4 +1,8 @@
-"""Up axis of an actor's own world, for exporters that ignore placements."""
+"""The up axis of an actor's own world: known from its placement, or guessed from its motion.
+
+Exporters ignore placements, so a figure is written upright along its own axis. Captures without a
+known world are upright along the axis on which heads are above pelvises.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +23,12 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.shape import shaped_skeleton
 
 _OVER = np.array([1.0, -1.0, -1.0])  # rotation by 180 degrees about x
+
+_CUSTOM = "z"
+"""Default up axis without evidence: EasyMocap's calibration board usually lies on the floor."""
+_ENOUGH = 64  # maximum number of frames per person, as more frames would not change the result
+_LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
+_HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
 
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
@@ -84,33 +94,6 @@ def upright_placement(scene: Scene, actor: Actor) -> Floats:
     return actor.placement @ np.diag([*_OVER, 1.0]) if hangs else actor.placement
 
 
-def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
-    """Return a pose rotated by 180 degrees, Q: R' = Q R and s l' + T' = Q (s l + T) at roots.
-
-    The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
-    """
-    skeleton = shaped_skeleton(figure, pose.shape_weights)
-    upright = pose.copy()
-    roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)
-    within = pose.figure_scale * local_matrices(skeleton, pose)[roots, :3, 3]
-    wanted = (within + pose.figure_translation) * _OVER
-    upright.figure_translation = wanted[0] - within[0]
-    if pose.figure_scale:
-        shifts = (wanted - upright.figure_translation - within) / pose.figure_scale
-        upright.translations[roots] += shifts
-    rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
-    # The limits apply to the figure's original world, which is upside down.
-    set_joint_rotations(skeleton, upright, roots, rotations, clamp=False)
-    return upright
-
-
-_CUSTOM = "z"
-"""Default up axis without evidence: EasyMocap's calibration board usually lies on the floor."""
-_ENOUGH = 64  # maximum number of frames per person, as more frames would not change the result
-_LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
-_HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
-
-
 def guess_up(actors: Iterable[Actor]) -> str:
     """Return the axis along which heads are above pelvises, on average.
 
@@ -139,6 +122,26 @@ def guess_up(actors: Iterable[Actor]) -> str:
     if axis == 0:  # the axis is also 0 if all sums are 0
         return _CUSTOM
     return ("-" if mean[axis] < 0.0 else "") + "xyz"[axis]
+
+
+def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
+    """Return a pose rotated by 180 degrees, Q: R' = Q R and s l' + T' = Q (s l + T) at roots.
+
+    The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
+    """
+    skeleton = shaped_skeleton(figure, pose.shape_weights)
+    upright = pose.copy()
+    roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)
+    within = pose.figure_scale * local_matrices(skeleton, pose)[roots, :3, 3]
+    wanted = (within + pose.figure_translation) * _OVER
+    upright.figure_translation = wanted[0] - within[0]
+    if pose.figure_scale:
+        shifts = (wanted - upright.figure_translation - within) / pose.figure_scale
+        upright.translations[roots] += shifts
+    rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
+    # The limits apply to the figure's original world, which is upside down.
+    set_joint_rotations(skeleton, upright, roots, rotations, clamp=False)
+    return upright
 
 
 def _of_body(actor: Actor, clip: SampledClip) -> Floats:

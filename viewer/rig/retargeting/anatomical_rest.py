@@ -37,7 +37,7 @@ _STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sol
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _AnatomicalRest:
+class AnatomicalRest:
     """A standing pose found from the anatomy.
 
     Attributes
@@ -66,7 +66,7 @@ def upright_frames(postures: Postures) -> Postures | None:
 
 def anatomical_rest(
     postures: Postures, skeleton: Skeleton, has_stances: bool = True
-) -> _AnatomicalRest:
+) -> AnatomicalRest:
     """Return the rotations of the joints in a standing pose.
 
     Parameters
@@ -89,11 +89,11 @@ def anatomical_rest(
         fixed |= foot
     result = _with_means(fixed, postures, skeleton, (body, stands))
     if _has_parallel_axes(limbs):
-        return _AnatomicalRest(_parallel_rest(result, postures, skeleton, stands), (), True)
+        return AnatomicalRest(_parallel_rest(result, postures, skeleton, stands), (), True)
     unseen = tuple(
         skeleton.names[postures.joints[limb.lower]] for limb in limbs if not limb.is_seen
     )
-    return _AnatomicalRest(result, unseen, False)
+    return AnatomicalRest(result, unseen, False)
 
 
 def _with_means(
@@ -133,6 +133,8 @@ def _body_axes(postures: Postures) -> Floats:
 
 def _mean(axes: Floats, rotations: Floats) -> Floats:
     """Return the mean of rotations relative to axes, both (F, 3, 3)."""
+    # The rotation nearest to the mean matrix has the smallest sum of squared chordal distances to
+    # all rotations (Hartley et al. 2013, Rotation Averaging).
     return nearest_rotations(np.einsum("fba,fbc->ac", axes, rotations) / len(axes))[0]
 
 
@@ -149,6 +151,8 @@ def _trunk(
     above = {joint for end in (top, *hips) for joint in _ancestors(skeleton.parents, end)}
     joints |= above - set(hips)
     found = {joint: stands @ _mean(body, postures.rotations[:, joint]) for joint in joints}
+    # The mean trunk may lean. As a whole, it is rotated until the line from the hips to the neck is
+    # vertical and the line between the hips sideways.
     place = {joint: _place(skeleton, found, joint) for joint in (top, *hips)}
     height = unit(place[top] - (place[hips[0]] + place[hips[1]]) / 2.0)
     side = place[hips[0]] - place[hips[1]]
@@ -174,7 +178,7 @@ def _place(skeleton: Skeleton, rotations: dict[int, Floats], joint: int) -> Floa
     return place
 
 
-def _limb(limb: _LimbAxes, stands: Floats, joints: dict[str, int]) -> dict[int, Floats]:
+def _limb(limb: LimbAxes, stands: Floats, joints: dict[str, int]) -> dict[int, Floats]:
     """Return the rotations of a limb's two joints, straight and with its axis as in a T-pose."""
     left, up, forward = stands.T
     if limb.upper.endswith("hip"):
@@ -182,6 +186,7 @@ def _limb(limb: _LimbAxes, stands: Floats, joints: dict[str, int]) -> dict[int, 
     else:
         side = left if limb.upper.startswith("left") else -left
         wanted = _axes_along(side, np.cross(side, forward))
+    # R B = W: bone and bending axis, B in the axes of the joint, point in the wanted directions W.
     return {
         joints[name]: wanted @ _axes_along(bone, bend).T
         for name, bone, bend in zip((limb.upper, limb.lower), limb.bones, limb.bends, strict=True)
@@ -202,7 +207,7 @@ def _foot(postures: Postures, side: str, stands: Floats) -> dict[int, Floats]:
     return {ankle: _axes_along(up, left) @ _axes_along(sole, np.cross(sole, front)).T}
 
 
-def _toes(postures: Postures, limb: _LimbAxes, stands: Floats) -> dict[int, Floats]:
+def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Floats]:
     """Return the rotation of a foot: side axis parallel to the knee's, toes forward."""
     side = limb.upper.partition("_")[0]
     ankle, toes = postures.joints[f"{side}_ankle"], postures.joints.get(f"{side}_foot")
@@ -275,7 +280,7 @@ _PARALLEL_SLOPE = np.radians(15.0)  # maximum difference between two estimates o
 _CHAINS = ("spine2", "spine3", "neck", "head", "wrist")
 
 
-def _has_parallel_axes(limbs: Sequence[_LimbAxes]) -> bool:
+def _has_parallel_axes(limbs: Sequence[LimbAxes]) -> bool:
     """Return whether bones and bending axes of all limbs are close to axes of their joints.
 
     The bending axis is the same axis of both joints of a limb. Limbs with arbitrary roll, which a
@@ -291,7 +296,7 @@ def _has_parallel_axes(limbs: Sequence[_LimbAxes]) -> bool:
     return bool((bones > _BONE).all() and len(seen) >= _SEEN and all(map(_has_one_axis, seen)))
 
 
-def _has_one_axis(limb: _LimbAxes) -> bool:
+def _has_one_axis(limb: LimbAxes) -> bool:
     """Return whether a limb bends about the same axis of both joints."""
     largest = np.abs(limb.bends).argmax(axis=-1)
     cosines = np.take_along_axis(limb.bends, largest[:, None], axis=-1)[:, 0]
@@ -442,7 +447,7 @@ _COHERENT = 0.7  # minimum ratio of the length of the mean normal to the mean le
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _LimbAxes:
+class LimbAxes:
     """Directions of a limb's two bones and its bending axis, in the axes of two joints.
 
     Attributes
@@ -464,7 +469,7 @@ class _LimbAxes:
     is_seen: bool
 
 
-def limb_axes(postures: Postures) -> list[_LimbAxes]:
+def limb_axes(postures: Postures) -> list[LimbAxes]:
     """Return the axes of both legs and both arms.
 
     Parameters
@@ -479,7 +484,7 @@ def limb_axes(postures: Postures) -> list[_LimbAxes]:
     ]
 
 
-def _axes_of_limb(postures: Postures, names: tuple[str, ...], front: float) -> _LimbAxes:
+def _axes_of_limb(postures: Postures, names: tuple[str, ...], front: float) -> LimbAxes:
     upper, lower, end = names
     bones = postures.direction(upper, lower), postures.direction(lower, end)
     normals = np.cross(*bones)
@@ -492,7 +497,7 @@ def _axes_of_limb(postures: Postures, names: tuple[str, ...], front: float) -> _
         sideways = [np.cross(bone, front * postures.forward()) for bone in bones]
         bends = [_mean_direction(axes, side) for axes, side in zip(frames, sideways, strict=True)]
     means = [_mean_direction(axes, bone) for axes, bone in zip(frames, bones, strict=True)]
-    return _LimbAxes(upper, lower, unit(np.array(means)), unit(np.array(bends)), is_seen)
+    return LimbAxes(upper, lower, unit(np.array(means)), unit(np.array(bends)), is_seen)
 
 
 def _mean_direction(axes: Floats, vectors: Floats) -> Floats:

@@ -20,6 +20,7 @@ from viewer.rig.retargeting.retarget import Retargeted, retargeted
 from viewer.rig.scalars import length_text
 
 _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
@@ -98,9 +99,6 @@ def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip
         translations=shifts if shifts.any() else None,
         figure_translations=place,
     )
-
-
-_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
 def _feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:

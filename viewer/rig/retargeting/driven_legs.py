@@ -34,7 +34,7 @@ _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 
 
 @dataclass(frozen=True, slots=True)
-class _LegPair:
+class LegPair:
     """A leg of the figure, and the joints of the source's foot that drives it.
 
     Attributes
@@ -84,7 +84,7 @@ class DrivenLegs:
         Translation relative to moving ground in each row; None if the ground does not move.
     """
 
-    chains: _Chains
+    chains: Chains
     legs: tuple[Leg, ...]
     soles: Soles
     heels: Floats
@@ -139,7 +139,7 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
     return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
 
 
-def leg_pairs(found: Retargeted, figure: Figure) -> list[_LegPair]:
+def leg_pairs(found: Retargeted, figure: Figure) -> list[LegPair]:
     """Return the legs of the figure whose hips and ankles are driven, left before right."""
     source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
     partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
@@ -151,7 +151,7 @@ def leg_pairs(found: Retargeted, figure: Figure) -> list[_LegPair]:
         if min(hip, ankle) < 0:
             continue
         chosen = (toe if toe >= 0 else ankle) if animal else toes.get(ankle, ankle)
-        pairs.append(_LegPair(leg, hip, ankle, chosen, bool(animal)))
+        pairs.append(LegPair(leg, hip, ankle, chosen, bool(animal)))
     return pairs
 
 
@@ -236,7 +236,7 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
 
 
 def has_source_proportions(
-    found: Retargeted, figure: Figure, pairs: list[_LegPair], size: float
+    found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
 ) -> bool:
     """Return whether the legs of a figure are as long as the scaled legs of the source.
 
@@ -269,7 +269,7 @@ def has_source_proportions(
 def foot_paths(
     found: Retargeted,
     clip: SampledClip,
-    pairs: list[_LegPair],
+    pairs: list[LegPair],
     vectors: list[tuple[Floats, Floats]],
     up: Floats,
 ) -> list[FootPath]:
@@ -320,7 +320,7 @@ def foot_paths(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Chains:
+class Chains:
     """Some joints of a skeleton and all their ancestors, renumbered.
 
     Attributes
@@ -338,7 +338,7 @@ class _Chains:
     place: Ints
 
 
-def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> _Chains:
+def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
     """Return the given joints of a skeleton and all their ancestors."""
     parents = skeleton.parents
     chosen = np.zeros(skeleton.n_joints, dtype=np.bool_)
@@ -351,11 +351,11 @@ def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> _Chains:
     place = np.full(skeleton.n_joints, -1, dtype=np.int32)
     place[joints] = np.arange(len(joints))
     above = np.where(parents[joints] >= 0, place[parents[joints]], -1).astype(np.int32)
-    return _Chains(joints, above, place)
+    return Chains(joints, above, place)
 
 
 def _chain_worlds(
-    clip: SampledClip, chains: _Chains, translations: Floats, scales: Floats
+    clip: SampledClip, chains: Chains, translations: Floats, scales: Floats
 ) -> Floats:
     """Return the world matrices of some joints in every row of a clip: (N, K, 4, 4).
 

@@ -36,6 +36,9 @@ _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "
 _SPINE = ("spine", "neck", "head")
 _FACE = ("eye", "jaw")  # joints that do not indicate the direction of the head
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
+SIDES = ("left", "right")
+_LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+_MOST = 4000  # maximum number of frames; for longer motions, every n-th frame is used
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -269,9 +272,10 @@ def shortest_arc(start: Floats, end: Floats) -> Floats:
     return quaternion_to_matrix(between(start, end))
 
 
-SIDES = ("left", "right")
-_LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_MOST = 4000  # maximum number of frames; for longer motions, every n-th frame is used
+def unit(vectors: Floats) -> Floats:
+    """Return normalised vectors; zero vectors are unchanged."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(lengths > 0.0, lengths, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -355,12 +359,6 @@ def postures_of(motion: SkeletonMotion) -> Postures | None:
 def rest_posture(skeleton: Skeleton, up: str) -> Postures | None:
     """Return the rest pose of a skeleton, with all DOFs at 0, as a single pose."""
     return _postures(skeleton, up, np.zeros(1, dtype=np.int32), skeleton.rest_rotations[None])
-
-
-def unit(vectors: Floats) -> Floats:
-    """Return normalised vectors; zero vectors are unchanged."""
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _postures(skeleton: Skeleton, up: str, rows: Ints, local: Floats) -> Postures | None:

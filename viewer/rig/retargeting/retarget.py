@@ -49,83 +49,12 @@ _SIDES = ("left", "right")
 # Largest rotation of a joint that never moves, and least one of a joint that moves, in radians.
 _NEVER, _MOVING = np.radians(0.01), np.radians(5.0)
 _STILL = 1e-6  # minimum motion of used position channels, as a fraction of the skeleton's size
+_FEET = ("left_foot", "right_foot", "left_ankle", "right_ankle")
 
-
-def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
-    """Return a skeleton and its motion with all lengths scaled, for instance from cm to m.
-
-    Parameters
-    ----------
-    motion : SkeletonMotion
-        Motion in any unit.
-    factor : float
-        Scale factor, positive.
-    unit : str
-        Unit of the scaled lengths, as in ``Figure.unit``.
-
-    Raises
-    ------
-    RigError
-        If the factor is not positive.
-    """
-    if not 0.0 < factor < np.inf:
-        raise RigError(f"expected a factor above 0, found {factor:g}")
-    figure, clip = motion.figure, motion.clip
-    skeleton = figure.skeleton
-    if skeleton is not None:
-        boxes = None if skeleton.boxes is None else skeleton.boxes * factor
-        moved = skeleton.rest_translations * factor
-        skeleton = replace(skeleton, rest_translations=moved, boxes=boxes)
-    shifts, place = clip.translations, clip.figure_translations
-    return replace(
-        motion,
-        figure=replace(figure, skeleton=skeleton, unit=unit),
-        clip=replace(
-            clip,
-            translations=None if shifts is None else shifts * factor,
-            figure_translations=None if place is None else place * factor,
-        ),
-    )
-
-
-def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
-    """Return the same motion of a skeleton in the unit of its path, such as metres for MHR."""
-    clip, scales = motion.clip, motion.clip.figure_scales
-    usual = 1.0 if scales is None or len(scales) == 0 else float(np.median(scales))
-    if scales is None or usual == 1.0 or not 0.0 < usual < np.inf:
-        return motion
-    found = scaled_motion(motion, usual)
-    left = None if (scales == usual).all() else scales / usual
-    place = clip.figure_translations
-    return replace(found, clip=replace(found.clip, figure_translations=place, figure_scales=left))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Retargeted:
-    """Result of a retargeting, and how the two skeletons relate.
-
-    Attributes
-    ----------
-    clip : SampledClip
-        Motion of the figure.
-    notes : list of Diagnostic
-        Messages as returned by ``retarget``.
-    source : SkeletonMotion
-        The motion, with the rest pose that was used.
-    matches : Matches
-        Joints of the source for joints of the figure.
-    to_target : (3, 3)
-        Rotation from the source's axes to the figure's.
-    scale : float
-        Scale of the path.
-    """
-
-    clip: SampledClip
-    notes: list[Diagnostic]
-    source: SkeletonMotion
-    matches: Matches
-    to_target: Floats
-    scale: float
+# Cosine of the maximum angle between the up axis and the legs of a standing person, from the pelvis
+# to the feet. The legs of some files, such as those of CMU, are 20 degrees apart in the zero pose.
+_UPRIGHT = np.cos(np.radians(40.0))
+_ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
 
 
 def retarget(
@@ -217,6 +146,71 @@ def retargeted(
     return Retargeted(clip, notes, motion, matches, job.to_target, scale)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Retargeted:
+    """Result of a retargeting, and how the two skeletons relate.
+
+    Attributes
+    ----------
+    clip : SampledClip
+        Motion of the figure.
+    notes : list of Diagnostic
+        Messages as returned by ``retarget``.
+    source : SkeletonMotion
+        The motion, with the rest pose that was used.
+    matches : Matches
+        Joints of the source for joints of the figure.
+    to_target : (3, 3)
+        Rotation from the source's axes to the figure's.
+    scale : float
+        Scale of the path.
+    """
+
+    clip: SampledClip
+    notes: list[Diagnostic]
+    source: SkeletonMotion
+    matches: Matches
+    to_target: Floats
+    scale: float
+
+
+def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
+    """Return a skeleton and its motion with all lengths scaled, for instance from cm to m.
+
+    Parameters
+    ----------
+    motion : SkeletonMotion
+        Motion in any unit.
+    factor : float
+        Scale factor, positive.
+    unit : str
+        Unit of the scaled lengths, as in ``Figure.unit``.
+
+    Raises
+    ------
+    RigError
+        If the factor is not positive.
+    """
+    if not 0.0 < factor < np.inf:
+        raise RigError(f"expected a factor above 0, found {factor:g}")
+    figure, clip = motion.figure, motion.clip
+    skeleton = figure.skeleton
+    if skeleton is not None:
+        boxes = None if skeleton.boxes is None else skeleton.boxes * factor
+        moved = skeleton.rest_translations * factor
+        skeleton = replace(skeleton, rest_translations=moved, boxes=boxes)
+    shifts, place = clip.translations, clip.figure_translations
+    return replace(
+        motion,
+        figure=replace(figure, skeleton=skeleton, unit=unit),
+        clip=replace(
+            clip,
+            translations=None if shifts is None else shifts * factor,
+            figure_translations=None if place is None else place * factor,
+        ),
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _Job:
     """Inputs common to all steps of a retargeting."""
@@ -239,6 +233,18 @@ def _job(
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)
     is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
     return _Job(motion.clip, source, target, rests, matches, to_target, is_same)
+
+
+def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
+    """Return the same motion of a skeleton in the unit of its path, such as metres for MHR."""
+    clip, scales = motion.clip, motion.clip.figure_scales
+    usual = 1.0 if scales is None or len(scales) == 0 else float(np.median(scales))
+    if scales is None or usual == 1.0 or not 0.0 < usual < np.inf:
+        return motion
+    found = scaled_motion(motion, usual)
+    left = None if (scales == usual).all() else scales / usual
+    place = clip.figure_translations
+    return replace(found, clip=replace(found.clip, figure_translations=place, figure_scales=left))
 
 
 def _source_rotations(job: _Job) -> Floats:
@@ -275,6 +281,58 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
     return local
 
 
+def _unit(quaternions: Floats) -> Floats:
+    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
+
+
+def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[float, Phrase]:
+    """Return the ratio of the target's lengths to the source's, and the kind of lengths compared.
+
+    Legs are compared if both have them, otherwise arms, otherwise all matched joints.
+
+    Parameters
+    ----------
+    source, target : RestPose
+        Rest poses in common axes.
+    matches : Matches
+        Joints of the source for joints of the target.
+    """
+    partners, names = matches.partners, matches.names
+    place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
+
+    def length(pairs: list[tuple[int, int]]) -> tuple[float, float]:
+        ends = np.array(pairs, dtype=np.int32).reshape(-1, 2).T
+        mine = target.points[ends[1]] - target.points[ends[0]]
+        theirs = source.points[partners[ends[1]]] - source.points[partners[ends[0]]]
+        return float(np.linalg.norm(mine, axis=1).sum()), float(
+            np.linalg.norm(theirs, axis=1).sum()
+        )
+
+    matched = np.flatnonzero(partners >= 0)
+    bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
+    choices = [
+        ("ratio-of-legs", _pairs(_LIMBS[0], place)),
+        ("ratio-of-arms", _pairs(_LIMBS[1], place)),
+        ("ratio-of-bones", bones),
+    ]
+    for what, pairs in choices:
+        mine, theirs = length(pairs)
+        if mine > 0.0 and theirs > 0.0:
+            ratio = mine / theirs
+            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), Phrase(what)
+    return 1.0, Phrase("ratio-of-nothing")
+
+
+def _pairs(limb: tuple[str, ...], place: dict[str, int]) -> list[tuple[int, int]]:
+    """Return the bones of a limb on both sides, as pairs of joints that are matched."""
+    return [
+        (place[start], place[end])
+        for side in _SIDES
+        for start, end in pairwise(f"{side}_{part}" for part in limb)
+        if start in place and end in place
+    ]
+
+
 def _shifts(
     job: _Job, worlds: Floats, rotations: Floats, scale: float
 ) -> tuple[Floats, list[Diagnostic]]:
@@ -303,17 +361,21 @@ def _shifts(
     return shifts, _dropped_translations(job)
 
 
-def _ground_offset(job: _Job, scale: float) -> Floats:
-    """Return ``ground_offset`` of the two skeletons, both in the source's rest pose."""
-    still = matrix_to_quaternion(job.rests[0].rotations)[None]
-    local = np.zeros((job.target.n_joints, 4, 4))
-    rotations = quaternion_to_matrix(_target_rotations(job, still)[0])
-    local[:, :3, :3] = rotations * job.target.rest_scales[:, None, :]
-    local[:, :3, 3] = job.target.rest_translations
-    local[:, 3, 3] = 1.0
-    points = forward_kinematics(job.target.parents, local)[:, :3, 3]
-    source, _ = job.rests
-    return ground_offset(source.points, points, job.matches, source.up, scale)
+def _anchor(job: _Job) -> int:
+    """Return the joint that follows the source's path: the pelvis, or the first matched joint."""
+    matched = job.matches.partners >= 0
+    names = job.matches.names
+    if "pelvis" in names and matched[names.index("pelvis")]:
+        return names.index("pelvis")
+    return int(np.flatnonzero(matched)[0])
+
+
+def _path(parents: Ints, joint: int) -> list[int]:
+    """Return the joints from the root to one joint."""
+    path = [joint]
+    while parents[path[-1]] >= 0:
+        path.append(int(parents[path[-1]]))
+    return path[::-1]
 
 
 def _source_places(job: _Job, worlds: Floats) -> Floats:
@@ -382,25 +444,101 @@ def _dropped_translations(job: _Job) -> list[Diagnostic]:
     return [Diagnostic("F007.joint-positions-left-out", values=values)]
 
 
-def _anchor(job: _Job) -> int:
-    """Return the joint that follows the source's path: the pelvis, or the first matched joint."""
-    matched = job.matches.partners >= 0
-    names = job.matches.names
-    if "pelvis" in names and matched[names.index("pelvis")]:
-        return names.index("pelvis")
-    return int(np.flatnonzero(matched)[0])
+def _ground_offset(job: _Job, scale: float) -> Floats:
+    """Return ``ground_offset`` of the two skeletons, both in the source's rest pose."""
+    still = matrix_to_quaternion(job.rests[0].rotations)[None]
+    local = np.zeros((job.target.n_joints, 4, 4))
+    rotations = quaternion_to_matrix(_target_rotations(job, still)[0])
+    local[:, :3, :3] = rotations * job.target.rest_scales[:, None, :]
+    local[:, :3, 3] = job.target.rest_translations
+    local[:, 3, 3] = 1.0
+    points = forward_kinematics(job.target.parents, local)[:, :3, 3]
+    source, _ = job.rests
+    return ground_offset(source.points, points, job.matches, source.up, scale)
 
 
-def _path(parents: Ints, joint: int) -> list[int]:
-    """Return the joints from the root to one joint."""
-    path = [joint]
-    while parents[path[-1]] >= 0:
-        path.append(int(parents[path[-1]]))
-    return path[::-1]
+def ground_offset(
+    source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
+) -> Floats:
+    """Return the offset that moves the target's feet to the feet of the scaled source.
+
+    The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
+    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
+
+    Parameters
+    ----------
+    source, target : (J', 3), (J, 3)
+        Joints of both skeletons in the source's rest pose, in common axes.
+    matches : Matches
+        Joints of the source for joints of the target.
+    up : (3,)
+        The up axis.
+    scale : float
+        Scale of the path.
+
+    Returns
+    -------
+    (3,)
+        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
+        source does not stand in its rest pose.
+    """
+    place = {
+        name: joint for joint, name in enumerate(matches.names) if matches.partners[joint] >= 0
+    }
+    feet = [place[name] for name in _FEET if name in place]
+    if "pelvis" not in place or not feet:
+        return 0.0 * up
+    pelvis, partners = place["pelvis"], matches.partners
+    legs = source[partners[pelvis]] - source[partners[feet]]
+    theirs = (legs @ up).max()
+    if theirs < _UPRIGHT * np.linalg.norm(legs, axis=1).max():
+        return 0.0 * up
+    mine = ((target[pelvis] - target[feet]) @ up).max()
+    return (mine - scale * theirs) * up
 
 
-def _unit(quaternions: Floats) -> Floats:
-    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
+def expression_weights(
+    expressions: Mapping[str, Floats], figure: Figure
+) -> tuple[Floats | None, list[Diagnostic]]:
+    """Return a figure's blend shape weights over time; other shapes keep their rest weights.
+
+    Parameters
+    ----------
+    expressions : mapping of str to (N,)
+        Weights by the names of VRM 1.0.
+    figure : Figure
+        Its blend shapes may have the names of VRM 0.x.
+
+    Returns
+    -------
+    weights : (N, S) or None
+        None if no expression moves a shape of the figure.
+    notes : list of Diagnostic
+        The expressions that the figure does not have.
+    """
+    shapes = figure.blend_shapes
+    names = () if shapes is None else shapes.names
+    # Expressions come after the morph targets, whose names they may share.
+    columns = {_plain(name): column for column, name in enumerate(names)}
+    rules = None if shapes is None else shapes.rules
+    for row, preset in zip(rules.rows, rules.presets, strict=False) if rules is not None else ():
+        if preset:
+            columns[_plain(preset)] = int(row)
+    found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
+    missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
+    notes = [Diagnostic("F007.expressions-unmatched", values={"names": missing})] if missing else []
+    if not found:
+        return None, notes
+    count = len(next(iter(expressions.values())))
+    weights = np.tile(figure_pose(figure).shape_weights, (count, 1))
+    for name, column in found.items():
+        weights[:, column] = expressions[name]
+    return weights, notes
+
+
+def _plain(name: str) -> str:
+    lower = name.lower()
+    return OLD_PRESETS.get(lower, lower).lower()
 
 
 def _limbs_at_rest(
@@ -462,149 +600,3 @@ def _extent(rotations: Floats) -> tuple[Bools, Bools]:
         np.linalg.norm(rotations - first, axis=2), np.linalg.norm(rotations + first, axis=2)
     ).max(axis=0)
     return chords < 0.5 * _NEVER, chords > 0.5 * _MOVING
-
-
-def expression_weights(
-    expressions: Mapping[str, Floats], figure: Figure
-) -> tuple[Floats | None, list[Diagnostic]]:
-    """Return a figure's blend shape weights over time; other shapes keep their rest weights.
-
-    Parameters
-    ----------
-    expressions : mapping of str to (N,)
-        Weights by the names of VRM 1.0.
-    figure : Figure
-        Its blend shapes may have the names of VRM 0.x.
-
-    Returns
-    -------
-    weights : (N, S) or None
-        None if no expression moves a shape of the figure.
-    notes : list of Diagnostic
-        The expressions that the figure does not have.
-    """
-    shapes = figure.blend_shapes
-    names = () if shapes is None else shapes.names
-    # Expressions come after the morph targets, whose names they may share.
-    columns = {_plain(name): column for column, name in enumerate(names)}
-    rules = None if shapes is None else shapes.rules
-    for row, preset in zip(rules.rows, rules.presets, strict=False) if rules is not None else ():
-        if preset:
-            columns[_plain(preset)] = int(row)
-    found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
-    missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
-    notes = [Diagnostic("F007.expressions-unmatched", values={"names": missing})] if missing else []
-    if not found:
-        return None, notes
-    count = len(next(iter(expressions.values())))
-    weights = np.tile(figure_pose(figure).shape_weights, (count, 1))
-    for name, column in found.items():
-        weights[:, column] = expressions[name]
-    return weights, notes
-
-
-def _plain(name: str) -> str:
-    lower = name.lower()
-    return OLD_PRESETS.get(lower, lower).lower()
-
-
-_FEET = ("left_foot", "right_foot", "left_ankle", "right_ankle")
-
-# Cosine of the maximum angle between the up axis and the legs of a standing person, from the pelvis
-# to the feet. The legs of some files, such as those of CMU, are 20 degrees apart in the zero pose.
-_UPRIGHT = np.cos(np.radians(40.0))
-
-
-def ground_offset(
-    source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
-) -> Floats:
-    """Return the offset that moves the target's feet to the feet of the scaled source.
-
-    The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
-    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
-
-    Parameters
-    ----------
-    source, target : (J', 3), (J, 3)
-        Joints of both skeletons in the source's rest pose, in common axes.
-    matches : Matches
-        Joints of the source for joints of the target.
-    up : (3,)
-        The up axis.
-    scale : float
-        Scale of the path.
-
-    Returns
-    -------
-    (3,)
-        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
-        source does not stand in its rest pose.
-    """
-    place = {
-        name: joint for joint, name in enumerate(matches.names) if matches.partners[joint] >= 0
-    }
-    feet = [place[name] for name in _FEET if name in place]
-    if "pelvis" not in place or not feet:
-        return 0.0 * up
-    pelvis, partners = place["pelvis"], matches.partners
-    legs = source[partners[pelvis]] - source[partners[feet]]
-    theirs = (legs @ up).max()
-    if theirs < _UPRIGHT * np.linalg.norm(legs, axis=1).max():
-        return 0.0 * up
-    mine = ((target[pelvis] - target[feet]) @ up).max()
-    return (mine - scale * theirs) * up
-
-
-_ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
-_LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
-_ARMS = (
-    ("left_shoulder", "left_elbow", "left_wrist"),
-    ("right_shoulder", "right_elbow", "right_wrist"),
-)
-
-
-def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and the kind of lengths compared.
-
-    Legs are compared if both have them, otherwise arms, otherwise all matched joints.
-
-    Parameters
-    ----------
-    source, target : RestPose
-        Rest poses in common axes.
-    matches : Matches
-        Joints of the source for joints of the target.
-    """
-    partners, names = matches.partners, matches.names
-    place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
-
-    def length(pairs: list[tuple[int, int]]) -> tuple[float, float]:
-        ends = np.array(pairs, dtype=np.int32).reshape(-1, 2).T
-        mine = target.points[ends[1]] - target.points[ends[0]]
-        theirs = source.points[partners[ends[1]]] - source.points[partners[ends[0]]]
-        return float(np.linalg.norm(mine, axis=1).sum()), float(
-            np.linalg.norm(theirs, axis=1).sum()
-        )
-
-    matched = np.flatnonzero(partners >= 0)
-    bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
-    choices = [
-        ("ratio-of-legs", _pairs(_LEGS, place)),
-        ("ratio-of-arms", _pairs(_ARMS, place)),
-        ("ratio-of-bones", bones),
-    ]
-    for what, pairs in choices:
-        mine, theirs = length(pairs)
-        if mine > 0.0 and theirs > 0.0:
-            ratio = mine / theirs
-            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), Phrase(what)
-    return 1.0, Phrase("ratio-of-nothing")
-
-
-def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tuple[int, int]]:
-    return [
-        (place[start], place[end])
-        for limb in limbs
-        for start, end in pairwise(limb)
-        if start in place and end in place
-    ]

@@ -27,6 +27,9 @@ from viewer.rig.units import METRES
 
 # Smaller values are 0; relative to the figure's size for lengths, otherwise absolute.
 _NOISE = 1e-9
+_METRE = 999.5  # millimetres that would be rounded to 1000 mm
+_LEAST = 0.001  # length in millimetres or percent that is shown instead of shorter ones
+_ZERO = 1e-6  # rounding errors below this are 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,13 +377,6 @@ def joint_of(figure: Figure, text: str) -> int:
 def joint_text(figure: Figure, joint: int) -> str:
     """Return the label of a joint, such as ``"#4"`` if it has no name."""
     return f"#{joint}" if figure.skeleton is None else joint_label(figure.skeleton, joint)
-
-
-_METRE = 999.5  # millimetres that would be rounded to 1000 mm
-_LEAST = (
-    0.001  # smallest length that matters, in millimetres or percent; shorter ones are shown as it
-)
-_ZERO = 1e-6  # rounding errors below this are 0
 
 
 def length_unit(figure: Figure) -> tuple[float, str]:

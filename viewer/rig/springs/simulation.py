@@ -1,5 +1,9 @@
 """Simulation of spring joints by Verlet integration, in steps of equal length.
 
+A ``SpringTrack`` simulates a motion once and in order: from rest at its start, in equal steps, so
+that the result at a given time does not depend on what was played previously. Between two steps,
+rotations are interpolated.
+
 With the position c of the point now and p one step before, the head h and rest direction a of
 the joint in its posed parent, and a step of t seconds, a step computes ::
 
@@ -32,10 +36,13 @@ STEPS_PER_SECOND = 60
 _STEP = 1.0 / STEPS_PER_SECOND
 _SHORT = 1e-12
 _FLAT = 1e-30  # determinant below which a matrix is treated as singular
+_BLOCK = 64  # number of steps that are computed and cached together
+_MOST_BLOCKS = 256  # maximum number of cached blocks; others are recomputed from their stored start
+_ON_STEP = 1e-6  # tolerance, as a fraction of a step, for times that are treated as that step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tails:
+class Tails:
     """The swinging points, each in the space of its centre: (N, 3) now and one step before."""
 
     now: Floats
@@ -83,7 +90,7 @@ class Simulation:
         """Rotations of the spring joints at rest: (N, 4)."""
         return self._rests
 
-    def start(self, world: Floats, local: Floats, scales: Floats, place: Floats) -> _Tails:
+    def start(self, world: Floats, local: Floats, scales: Floats, place: Floats) -> Tails:
         """Return points at rest, with spring joints in rest pose; arguments as for ``step``."""
         springs, world = self._springs, world.copy()
         points = np.zeros((springs.n_joints, 3))
@@ -94,11 +101,11 @@ class Simulation:
             points[rows] = _points(heads[level.places], tails)
             world[level.joints] = _scaled(heads, scales[level.joints])
         points = _points(_inverse(self._centers(world)), points)
-        return _Tails(points, points)
+        return Tails(points, points)
 
     def step(
-        self, tails: _Tails, world: Floats, local: Floats, scales: Floats, place: Floats
-    ) -> tuple[_Tails, Floats]:
+        self, tails: Tails, world: Floats, local: Floats, scales: Floats, place: Floats
+    ) -> tuple[Tails, Floats]:
         """Return the points after one step, and the rotations of the spring joints.
 
         Parameters
@@ -135,7 +142,7 @@ class Simulation:
                 centers = self._centers(world, rows)
                 now[rows] = _points(_inverse(centers), points)
             world[level.joints] = _scaled(heads, scales[level.joints])
-        return _Tails(now, tails.now), rotations
+        return Tails(now, tails.now), rotations
 
     def _heads(self, level: _Level, world: Floats, local: Floats, place: Floats) -> Floats:
         """Return world matrices without the joints' own scales, spring joints in rest rotation."""
@@ -152,7 +159,7 @@ class Simulation:
         return found
 
     def _moved(
-        self, level: _Level, tails: _Tails, world: Floats, heads: Floats, factors: Floats
+        self, level: _Level, tails: Tails, world: Floats, heads: Floats, factors: Floats
     ) -> Floats:
         """Return the points of one level in figure space after one step: (N', 3)."""
         springs, rows = self._springs, level.rows
@@ -270,17 +277,6 @@ def _at_length(points: Floats, origins: Floats, lengths: Floats, rest: Floats) -
     return found
 
 
-# Rotations of spring joints over the time of a motion, computed once and in order.
-#
-# The simulation starts at rest at the start of the motion and proceeds in equal steps, so the
-# result at a given time does not depend on what was played previously. Between two steps,
-# rotations are interpolated.
-
-_BLOCK = 64  # number of steps that are computed and cached together
-_MOST_BLOCKS = 256  # maximum number of cached blocks; others are recomputed from their stored start
-_ON_STEP = 1e-6  # tolerance, as a fraction of a step, for times that are treated as that step
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedJoints:
     """Joints of a motion without springs at F times.
@@ -319,7 +315,7 @@ class SpringTrack:
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:
         self._simulation, self._start = Simulation(skeleton), start
         self._last = int(np.ceil(max(end - start, 0.0) * STEPS_PER_SECOND - _ON_STEP))
-        self._starts: list[_Tails] = []
+        self._starts: list[Tails] = []
         self._blocks: dict[int, Floats] = {}
 
     def rotations(self, times: Floats, poses_at: _PosesAt) -> Floats:

@@ -43,18 +43,6 @@ _UNCHANGED = 1e-9  # tolerance within which lengths, factors and weights equal t
 _SAME_ROTATION = 1e-9
 
 
-def _with_transform_channel(
-    clip: TransformClip, index: int, channel: TransformChannel | None
-) -> TransformClip:
-    """Return a clip with one channel replaced, removed (None), or added (index -1)."""
-    channels = list(clip.channels)
-    if index < 0:
-        channels += [] if channel is None else [channel]
-    else:
-        channels[index : index + 1] = [] if channel is None else [channel]
-    return replace(clip, channels=tuple(channels))
-
-
 def move_transform_keys(
     clip: TransformClip,
     skeleton: Skeleton,
@@ -171,6 +159,108 @@ def set_clip_interpolation(
 def set_clip_range(clip: TransformClip, start: float, end: float) -> TransformClip:
     """Return a clip with a new playback range; the two times are sorted."""
     return replace(clip, start=min(start, end), end=max(start, end))
+
+
+def key_transform_pose(
+    clip: TransformClip, figure: Figure, pose: Pose, time: float, only_changed: bool = False
+) -> TransformClip:
+    """Return a clip with a key of the pose at one time.
+
+    Properties that differ from the file's pose and have no channel get one.
+
+    Parameters
+    ----------
+    clip : TransformClip
+        The motion; its range is extended to contain the time.
+    figure : Figure
+        Figure of the pose.
+    pose : Pose
+        Its values become the keys.
+    time : float
+        Seconds.
+    only_changed : bool
+        Key only properties that differ from the clip at this time.
+    """
+    skeleton = figure.require_skeleton()
+    now, rest = joint_values(skeleton, pose), figure_pose(figure)
+    channels = []
+    for channel in clip.channels:
+        if channel.shapes is not None:
+            value = pose.shape_weights[channel.shapes]
+        else:
+            value = now[channel.path][channel.joint]
+        if not only_changed or _differs(channel.path, value_at(channel, time), value):
+            channel = added_key(channel, time, value)[0]
+        channels.append(channel)
+    channels += _new_joints(clip, skeleton, now, joint_values(skeleton, rest), time)
+    channels += _new_weights(clip, pose.shape_weights, rest.shape_weights, time)
+    start, end = min(clip.start, time), max(clip.end, time)
+    return replace(clip, channels=tuple(channels), start=start, end=end)
+
+
+def joint_values(skeleton: Skeleton, pose: Pose) -> dict[TransformPath, Floats]:
+    """Return the local transforms of a pose as values of keys, by path: (J, 3) and (J, 4)."""
+    return {
+        "translation": local_matrices(skeleton, pose)[:, :3, 3],
+        "rotation": matrix_to_quaternion(joint_rotations(skeleton, pose)),
+        "scale": pose.scales.copy(),
+    }
+
+
+def _differs(path: TransformPath, one: Floats, other: Floats) -> bool:
+    if path != "rotation":
+        return bool(np.abs(one - other).max() > _UNCHANGED)
+    apart = min(np.abs(one - other).max(), np.abs(one + other).max())
+    return bool(apart > _SAME_ROTATION)
+
+
+def _new_joints(
+    clip: TransformClip,
+    skeleton: Skeleton,
+    now: dict[TransformPath, Floats],
+    rest: dict[TransformPath, Floats],
+    time: float,
+) -> list[TransformChannel]:
+    """Return channels for joints that differ from the file's pose and have none."""
+    known = {(channel.path, channel.joint) for channel in clip.channels}
+    return [
+        TransformChannel(joint, path, np.array([time]), values[joint][None])
+        for path, values in now.items()
+        for joint in range(skeleton.n_joints)
+        if (path, joint) not in known
+        and not (skeleton.auxiliary is not None and skeleton.auxiliary[joint])
+        and _differs(path, rest[path][joint], values[joint])
+    ]
+
+
+def _new_weights(
+    clip: TransformClip, now: Floats, rest: Floats, time: float
+) -> list[TransformChannel]:
+    """Return a channel for blend shapes that differ from the file's weights and have none."""
+    known = {
+        shape
+        for channel in clip.channels
+        if channel.shapes is not None
+        for shape in channel.shapes.tolist()
+    }
+    changed = np.flatnonzero(np.abs(now - rest) > _UNCHANGED).tolist()
+    shapes: Ints = np.array([shape for shape in changed if shape not in known], dtype=np.int32)
+    if not len(shapes):
+        return []
+    keys = now[shapes][None]
+    return [TransformChannel(-1, "weights", np.array([time]), keys, shapes=shapes)]
+
+
+def _with_transform_channel(
+    clip: TransformClip, index: int, channel: TransformChannel | None
+) -> TransformClip:
+    """Return a clip with one channel replaced, removed (None), or added (index -1)."""
+    channels = list(clip.channels)
+    if index < 0:
+        channels += [] if channel is None else [channel]
+    else:
+        channels[index : index + 1] = [] if channel is None else [channel]
+    return replace(clip, channels=tuple(channels))
 
 
 def _by_channel(
@@ -343,93 +433,3 @@ def with_interpolation(channel: TransformChannel, mode: Interpolation) -> Transf
     slopes = _smooth(channel.times, values)
     tangents = np.stack([slopes, slopes], axis=1)
     return replace(channel, values=values, interpolation=mode, tangents=tangents)
-
-
-def joint_values(skeleton: Skeleton, pose: Pose) -> dict[TransformPath, Floats]:
-    """Return the local transforms of a pose as values of keys, by path: (J, 3) and (J, 4)."""
-    return {
-        "translation": local_matrices(skeleton, pose)[:, :3, 3],
-        "rotation": matrix_to_quaternion(joint_rotations(skeleton, pose)),
-        "scale": pose.scales.copy(),
-    }
-
-
-def key_transform_pose(
-    clip: TransformClip, figure: Figure, pose: Pose, time: float, only_changed: bool = False
-) -> TransformClip:
-    """Return a clip with a key of the pose at one time.
-
-    Properties that differ from the file's pose and have no channel get one.
-
-    Parameters
-    ----------
-    clip : TransformClip
-        The motion; its range is extended to contain the time.
-    figure : Figure
-        Figure of the pose.
-    pose : Pose
-        Its values become the keys.
-    time : float
-        Seconds.
-    only_changed : bool
-        Key only properties that differ from the clip at this time.
-    """
-    skeleton = figure.require_skeleton()
-    now, rest = joint_values(skeleton, pose), figure_pose(figure)
-    channels = []
-    for channel in clip.channels:
-        if channel.shapes is not None:
-            value = pose.shape_weights[channel.shapes]
-        else:
-            value = now[channel.path][channel.joint]
-        if not only_changed or _differs(channel.path, value_at(channel, time), value):
-            channel = added_key(channel, time, value)[0]
-        channels.append(channel)
-    channels += _new_joints(clip, skeleton, now, joint_values(skeleton, rest), time)
-    channels += _new_weights(clip, pose.shape_weights, rest.shape_weights, time)
-    start, end = min(clip.start, time), max(clip.end, time)
-    return replace(clip, channels=tuple(channels), start=start, end=end)
-
-
-def _differs(path: TransformPath, one: Floats, other: Floats) -> bool:
-    if path != "rotation":
-        return bool(np.abs(one - other).max() > _UNCHANGED)
-    apart = min(np.abs(one - other).max(), np.abs(one + other).max())
-    return bool(apart > _SAME_ROTATION)
-
-
-def _new_joints(
-    clip: TransformClip,
-    skeleton: Skeleton,
-    now: dict[TransformPath, Floats],
-    rest: dict[TransformPath, Floats],
-    time: float,
-) -> list[TransformChannel]:
-    """Return channels for joints that differ from the file's pose and have none."""
-    known = {(channel.path, channel.joint) for channel in clip.channels}
-    return [
-        TransformChannel(joint, path, np.array([time]), values[joint][None])
-        for path, values in now.items()
-        for joint in range(skeleton.n_joints)
-        if (path, joint) not in known
-        and not (skeleton.auxiliary is not None and skeleton.auxiliary[joint])
-        and _differs(path, rest[path][joint], values[joint])
-    ]
-
-
-def _new_weights(
-    clip: TransformClip, now: Floats, rest: Floats, time: float
-) -> list[TransformChannel]:
-    """Return a channel for blend shapes that differ from the file's weights and have none."""
-    known = {
-        shape
-        for channel in clip.channels
-        if channel.shapes is not None
-        for shape in channel.shapes.tolist()
-    }
-    changed = np.flatnonzero(np.abs(now - rest) > _UNCHANGED).tolist()
-    shapes: Ints = np.array([shape for shape in changed if shape not in known], dtype=np.int32)
-    if not len(shapes):
-        return []
-    keys = now[shapes][None]
-    return [TransformChannel(-1, "weights", np.array([time]), keys, shapes=shapes)]

@@ -1,4 +1,8 @@
-"""Evaluation of transform clips: slerp, linear, step and cubic interpolation (glTF 2.0)."""
+"""Evaluation of transform clips: slerp, linear, step and cubic interpolation (glTF 2.0).
+
+The keys of all channels are laid out in a table once. One search then finds the spans of all
+distinct lists of key times, and each kind of interpolation is a few operations on whole arrays.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,8 @@ from viewer.rig.motion.transform_clip import (
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
+
+_SMALLEST = 1e-9  # angle in radians below which slerp equals linear interpolation
 
 _tables: Memo[TransformClip, _TransformTable] = Memo(kept=1)
 
@@ -184,7 +190,7 @@ def _arcs(arcs: _Arcs, spans: Ints, fractions: Floats) -> Floats:
     return first[..., None] * before + second[..., None] * following
 
 
-def _lines(curves: Curves, spans: Ints, fractions: Floats) -> Floats:
+def _lines(curves: _Curves, spans: Ints, fractions: Floats) -> Floats:
     """Return linear and step interpolation: (T, C)."""
     rows = curves.bases + spans.take(curves.timelines, axis=1) * curves.strides
     start = curves.values.take(rows)
@@ -192,7 +198,7 @@ def _lines(curves: Curves, spans: Ints, fractions: Floats) -> Floats:
     return start + fractions.take(curves.timelines, axis=1) * curves.slopes * rise
 
 
-def _cubics(curves: Curves, timelines: _Timelines, spans: Ints, fractions: Floats) -> Floats:
+def _cubics(curves: _Curves, timelines: _Timelines, spans: Ints, fractions: Floats) -> Floats:
     """Return cubic Hermite splines: (T, C)."""
     durations = timelines.durations[timelines.first + spans]
     durations = np.where(np.isfinite(durations), durations, 0.0)[:, curves.timelines]
@@ -211,9 +217,6 @@ def _normalised(quaternions: Floats) -> Floats:
     lengths = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     still = np.array([0.0, 0.0, 0.0, 1.0])
     return np.where(lengths > 0.0, quaternions / np.where(lengths > 0.0, lengths, 1.0), still)
-
-
-_SMALLEST = 1e-9  # angle in radians below which slerp equals linear interpolation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -273,7 +276,7 @@ class _Arcs:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curves:
+class _Curves:
     """C components of channels, each a scalar curve of lines, steps or cubic splines.
 
     Attributes
@@ -322,8 +325,8 @@ class _TransformTable:
 
     timelines: _Timelines
     arcs: _Arcs
-    lines: Curves
-    cubics: Curves
+    lines: _Curves
+    cubics: _Curves
     targets: dict[TransformPath, _Targets]
 
 
@@ -395,7 +398,7 @@ def _arc_table(channels: list[tuple[TransformChannel, int]]) -> _Arcs:
     )
 
 
-def _curves(channels: list[tuple[TransformChannel, int]]) -> Curves:
+def _curves(channels: list[tuple[TransformChannel, int]]) -> _Curves:
     of_component: list[tuple[int, int, int, float]] = []
     values, incoming, outgoing = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     start = 0
@@ -411,7 +414,7 @@ def _curves(channels: list[tuple[TransformChannel, int]]) -> Curves:
     table = np.array(of_component, dtype=np.float64).reshape(-1, 4)
     timelines, bases, strides = table[:, :3].astype(np.int64).T
     parts = (np.concatenate(part) for part in (values, incoming, outgoing))
-    return Curves(timelines, bases, strides, table[:, 3].copy(), *parts)
+    return _Curves(timelines, bases, strides, table[:, 3].copy(), *parts)
 
 
 def _targets(
