@@ -23,7 +23,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
+from viewer.formats._archive.checking import (
+    archive_of,
+    are_indices,
+    corners_of,
+    finite,
+    finite_array,
+)
 from viewer.formats._archive.values import Archive
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import Source
@@ -137,7 +143,7 @@ def _parameters(archive: Archive, n_shapes: int) -> ModelParameters:
     if int(version) != _VERSION:
         raise archive.fault("F002.mhr-version", item="schema_version", found=int(version))
     n_joints = archive.array("joint_offsets", (None, 3)).shape[0]
-    transform = _floats(archive, "parameter_transform", (PER_JOINT * n_joints, None))
+    transform = finite_array(archive, "parameter_transform", (PER_JOINT * n_joints, None))
     names = archive.array("parameter_names", (transform.shape[1],), "SU").values().tolist()
     count = transform.shape[1] - n_shapes
     if count < 0 or transform[:, count:].any():
@@ -150,7 +156,7 @@ def _parameters(archive: Archive, n_shapes: int) -> ModelParameters:
 
 def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
     """Return the skeleton, with a DOF for each joint parameter that model parameters drive."""
-    offsets = _floats(archive, "joint_offsets", (None, 3), "joints")
+    offsets = finite_array(archive, "joint_offsets", (None, 3))
     count = len(offsets)
     parents = archive.array("joint_parents", (count,)).values()
     places = np.arange(count)
@@ -178,16 +184,16 @@ def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
 
 
 def _quaternions(archive: Archive, key: str, count: int) -> Floats:
-    values = _floats(archive, key, (count, 4))
+    values = finite_array(archive, key, (count, 4))
     if not values.any(axis=1).all():
         raise archive.fault("F002.mhr-quaternion", item=key)
     return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
 def _mesh(lod: Archive) -> Mesh:
-    positions = finite(lod, "base_shape", lod.array("base_shape", (None, 3)).values())
+    positions = finite_array(lod, "base_shape", (None, 3))
     triangles = corners_of(lod, "faces", lod.array("faces", (None, 3)).values(), len(positions))
-    uvs = finite(lod, "texcoords", lod.array("texcoords", (None, 2)).values())
+    uvs = finite_array(lod, "texcoords", (None, 2))
     given = lod.array("texcoord_faces", (len(triangles), 3)).values()
     fits = len(uvs) > 0 and are_indices(given, len(uvs))
     return Mesh(
@@ -200,7 +206,7 @@ def _mesh(lod: Archive) -> Mesh:
 
 
 def _skin(lod: Archive, n_vertices: int, inverse_bind: Floats) -> Skin:
-    weights = finite(lod, "skin_weights", lod.array("skin_weights", (n_vertices, None)).values())
+    weights = finite_array(lod, "skin_weights", (n_vertices, None))
     joints = lod.array("skin_indices", weights.shape).values()
     if not are_indices(joints, len(inverse_bind)):
         raise lod.fault("F002.mhr-index", item="skin_indices", last=len(inverse_bind) - 1)
@@ -217,7 +223,7 @@ def _skin(lod: Archive, n_vertices: int, inverse_bind: Floats) -> Skin:
 def _bind_matrices(archive: Archive, n_joints: int) -> Floats:
     """Return the inverse bind matrices, stored as translation, quaternion and scale: (J, 4, 4)."""
     key = "inverse_bind_pose"
-    rows = _floats(archive, key, (n_joints, 8), "bindings")
+    rows = finite_array(archive, key, (n_joints, 8))
     if not rows[:, 3:7].any(axis=1).all():
         raise archive.fault("F002.mhr-quaternion", item=key)
     matrices = np.tile(np.eye(4), (n_joints, 1, 1))
@@ -271,13 +277,9 @@ def _correctives(
 def _feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFeature:
     """Return the feature of the correctives."""
     indices = archive.array("0.sparse_indices", (2, None)).values()
-    entries = _floats(archive, "0.sparse_weight", (indices.shape[1],))
+    entries = finite_array(archive, "0.sparse_weight", (indices.shape[1],))
     for row, end in enumerate((n_weights, 6 * (n_joints - 2))):
         if not are_indices(indices[row], end):
             raise archive.fault("F002.mhr-index", item="0.sparse_indices", last=end - 1)
     outputs, inputs = indices.astype(np.int32)
     return NetworkFeature(n_joints, n_weights, outputs, inputs, entries)
-
-
-def _floats(archive: Archive, key: str, shape: tuple[int | None, ...], part: str = "") -> Floats:
-    return finite(archive, key, archive.array(key, shape).values())

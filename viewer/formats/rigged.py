@@ -40,9 +40,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Part
 from viewer.errors import FormatError, RigError
-from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, corners_of, finite, finite_array
 from viewer.formats._archive.values import Archive
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
@@ -98,7 +97,7 @@ def read(source: Source) -> Figure:
         If an array is missing or has the wrong shape, or the parts do not match each other.
     """
     archive = archive_of(source)
-    version = int(_finite(archive, "viewer_rig", ()))
+    version = int(finite_array(archive, "viewer_rig", ()))
     if version != _VERSION:
         raise archive.fault("F002.rig-version", item="viewer_rig", expected=_VERSION, found=version)
     up = archive.text("up")
@@ -135,7 +134,7 @@ def _mesh(archive: Archive) -> Mesh:
     RigError
         If arrays do not match each other.
     """
-    positions = _finite(archive, "positions", (None, 3), "positions")
+    positions = finite_array(archive, "positions", (None, 3), "positions")
     listed = archive.array("triangles", (None, 3)).values()
     triangles = corners_of(archive, "triangles", listed, len(positions))
     positions = neutral_positions(positions, triangles)
@@ -144,10 +143,10 @@ def _mesh(archive: Archive) -> Mesh:
         positions=positions,
         normals=vertex_normals(positions, triangles),
         triangles=triangles,
-        uvs=_finite(archive, "uvs", (None, 2)) if archive.has("uvs") else None,
+        uvs=finite_array(archive, "uvs", (None, 2)) if archive.has("uvs") else None,
         uv_triangles=_optional(archive, "uv_triangles", (None, 3)),
-        other_uvs=tuple(_finite(archive, key, (None, 2)) for key in _present_uvs(archive)),
-        colors=_finite(archive, "colors", (None, 4)) if archive.has("colors") else None,
+        other_uvs=tuple(finite_array(archive, key, (None, 2)) for key in _present_uvs(archive)),
+        colors=finite_array(archive, "colors", (None, 4)) if archive.has("colors") else None,
         parts=_texts(archive, "part_names") if archive.has("part_names") else (),
         triangle_parts=_optional(archive, "triangle_parts", (None,)),
         materials=materials,
@@ -261,14 +260,14 @@ def _skeleton(archive: Archive) -> Skeleton:
     return Skeleton(
         names=names,
         parents=_parents(archive, count),
-        rest_translations=_finite(archive, "rest_translations", (count, 3), "joints"),
-        rest_rotations=_finite(archive, "rest_rotations", (count, 4), "joints"),
-        rest_scales=_finite(archive, "rest_scales", (count, 3), "joints"),
+        rest_translations=finite_array(archive, "rest_translations", (count, 3), "joints"),
+        rest_rotations=finite_array(archive, "rest_rotations", (count, 4), "joints"),
+        rest_scales=finite_array(archive, "rest_scales", (count, 3), "joints"),
         dof_joints=_numbers(archive, "dof_joints", (n_dofs,)),
         dof_kinds=_numbers(archive, "dof_kinds", (n_dofs,)),
-        rest_dofs=_finite(archive, "rest_dofs", (n_dofs,)),
+        rest_dofs=finite_array(archive, "rest_dofs", (n_dofs,)),
         dof_limits=_limits(archive, n_dofs),
-        boxes=_finite(archive, "boxes", (count, 2, 3)) if archive.has("boxes") else None,
+        boxes=finite_array(archive, "boxes", (count, 2, 3)) if archive.has("boxes") else None,
         auxiliary=_optional(archive, "auxiliary", (count,)),
     )
 
@@ -325,7 +324,7 @@ def _skin(archive: Archive, n_joints: int) -> Skin:
     # The skin checks whether the starts are in ascending order.
     owners = np.searchsorted(np.sort(starts), np.arange(len(listed)), side="right") - 1
     weights = finite(archive, "skin_weights", listed, "weights", np.maximum(owners, 0))
-    inverse_bind = _finite(archive, "inverse_bind", (None, 4, 4), "bindings")
+    inverse_bind = finite_array(archive, "inverse_bind", (None, 4, 4), "bindings")
     if len(inverse_bind) != n_joints:
         raise archive.fault(
             "B001.rig-matrices", item="inverse_bind", expected=n_joints, found=len(inverse_bind)
@@ -358,9 +357,9 @@ def _correctives(archive: Archive, n_joints: int) -> Correctives | None:
 def _layout(archive: Archive, n_joints: int) -> PoseLayout | None:
     if not archive.has("layout_starts"):
         return None
-    starts = _finite(archive, "layout_starts", (n_joints,))
+    starts = finite_array(archive, "layout_starts", (n_joints,))
     is_euler = _numbers(archive, "layout_is_euler", (n_joints,)).astype(np.bool_)
-    total, translation, scale = map(int, _finite(archive, "layout_counts", (3,)))
+    total, translation, scale = map(int, finite_array(archive, "layout_counts", (3,)))
     ends = (int(starts.max()) + 3, translation + 3 * (translation >= 0), scale + 1)
     if starts.min() < 0 or max(ends) > total:
         raise archive.fault(
@@ -381,8 +380,8 @@ def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
     return Hand(
         archive.text(f"hand_{index}_side"),
         joints,
-        _finite(archive, f"hand_{index}_components", (None, None)),
-        _finite(archive, f"hand_{index}_mean", (None,)),
+        finite_array(archive, f"hand_{index}_components", (None, None)),
+        finite_array(archive, f"hand_{index}_mean", (None,)),
     )
 
 
@@ -394,7 +393,7 @@ def _fields(archive: Archive) -> tuple[VertexField, ...]:
             VertexField(
                 name=archive.text(f"{key}_name"),
                 title=archive.text(f"{key}_title"),
-                values=_finite(archive, f"{key}_values", (None,)),
+                values=finite_array(archive, f"{key}_values", (None,)),
                 unit=archive.text(f"{key}_unit"),
                 names=_texts(archive, f"{key}_names") if archive.has(f"{key}_names") else (),
             )
@@ -404,10 +403,6 @@ def _fields(archive: Archive) -> tuple[VertexField, ...]:
 
 def _numbers(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
     return archive.array(key, shape).values()
-
-
-def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Part = "") -> Floats:
-    return finite(archive, key, _numbers(archive, key, shape), part)
 
 
 def _optional(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any] | None:

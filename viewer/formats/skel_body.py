@@ -16,11 +16,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.checking import (
+    archive_of,
+    corners_of,
+    finite,
+    finite_array,
+    last_axis_first,
+)
 from viewer.formats._archive.values import Archive
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
-from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
 from viewer.rig.bodies.pose_features import MappedFeature
@@ -63,8 +69,7 @@ def read(source: Source) -> Figure:
     missing = [key for key in _KEYS.split() if not archive.has(key)]
     if missing:
         raise source.fault("F002.smpl-keys", missing=missing, found=list(archive.keys))
-    template = archive.array("skin_template_v", (None, 3)).values()
-    positions = finite(archive, "skin_template_v", template, "positions")
+    positions = finite_array(archive, "skin_template_v", (None, 3), "positions")
     given = archive.array("skin_template_f", (None, 3)).values()
     triangles = corners_of(archive, "skin_template_f", given, len(positions))
     rows, columns, numbers = archive.sparse(
@@ -91,8 +96,8 @@ def read(source: Source) -> Figure:
 
 def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
     parents = _parents(archive)
-    frames = _floats(archive, "apose_rel_transfo", (len(JOINTS), 4, 4))
-    learned = _floats(archive, "per_joint_rot", (len(JOINTS), 3, 3))
+    frames = finite_array(archive, "apose_rel_transfo", (len(JOINTS), 4, 4))
+    learned = finite_array(archive, "per_joint_rot", (len(JOINTS), 3, 3))
     _check_rotations(archive, "apose_rel_transfo", frames[:, :3, :3])
     _check_rotations(archive, "per_joint_rot", learned)
     owners, kinds = dof_table()
@@ -146,7 +151,7 @@ def _shapes(archive: Archive, n_vertices: int) -> BlendShapes | None:
     if count == 0:
         return None
     names = tuple(f"shape {k}" for k in range(count))
-    return BlendShapes(names, _rows(archive, "shapedirs", array))
+    return BlendShapes(names, last_axis_first(archive, "shapedirs", array))
 
 
 def _correctives(source: Source, archive: Archive, n_vertices: int) -> Correctives | None:
@@ -155,18 +160,4 @@ def _correctives(source: Source, archive: Archive, n_vertices: int) -> Correctiv
         return None
     feature = MappedFeature(_SMPL, _N_SMPL)
     array = archive.array("posedirs", (n_vertices, 3, feature.n_weights))
-    return Correctives(_rows(archive, "posedirs", array), feature)
-
-
-def _rows(archive: Archive, key: str, array: Deferred) -> Deferred:
-    """Return an array (V, 3, N) as (N, V, 3), read on first use."""
-
-    def load() -> Floats:
-        rows = np.moveaxis(array.values(), 2, 0)
-        return finite(archive, key, np.ascontiguousarray(rows, np.float64))
-
-    return Deferred((array.shape[2], *array.shape[:2]), np.float64, load)
-
-
-def _floats(archive: Archive, key: str, shape: tuple[int, ...]) -> Floats:
-    return finite(archive, key, archive.array(key, shape).values())
+    return Correctives(last_axis_first(archive, "posedirs", array), feature)

@@ -20,7 +20,14 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
+from viewer.formats._archive.checking import (
+    archive_of,
+    are_indices,
+    corners_of,
+    finite,
+    finite_array,
+    last_axis_first,
+)
 from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._published_models import published_name
@@ -120,8 +127,7 @@ def read(source: Source) -> Figure:
 
 
 def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
-    template = archive.array("v_template", ("V", 3)).values()
-    positions = finite(archive, "v_template", template, "positions")
+    positions = finite_array(archive, "v_template", ("V", 3), "positions")
     if len(positions) == 0:
         raise archive.fault("F002.smpl-no-vertex", item="v_template")
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
@@ -143,7 +149,7 @@ def _uvs(
     """Return texture coordinates and their triangles, if the file has both."""
     if not (archive.has("vt") and archive.has("ft")):
         return None, None
-    uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
+    uvs = finite_array(archive, "vt", ("U", 2))
     corners = archive.array("ft", (n_triangles, 3)).values()
     if not are_indices(corners, len(uvs)):
         source.warn("F007.smpl-uvs")
@@ -264,17 +270,13 @@ def _shapes(
     if member is not None and member.has_expressions:
         n_shapes = _SHAPES if count >= _SHAPES + 100 else min(_FEW_SHAPES, count)
 
-    def load() -> Floats:
-        rows = np.moveaxis(array.values(), 2, 0)
-        return finite(archive, "shapedirs", np.ascontiguousarray(rows, np.float64))
-
     used.append("shapedirs")
     if count == 0:
         return None
     names = _shape_names(archive, n_shapes, used)
     names += tuple(f"expression {k}" for k in range(count - n_shapes))
     groups = ("shape",) * n_shapes + ("expression",) * (count - n_shapes)
-    return BlendShapes(names, Deferred((count, n_vertices, 3), np.float64, load), groups)
+    return BlendShapes(names, last_axis_first(archive, "shapedirs", array), groups)
 
 
 def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
@@ -332,12 +334,8 @@ def _quaternion_correctives(
     if array.shape != (n_vertices, 3, count) or count not in kinds or n_joints < 2:
         return None
 
-    def load() -> np.ndarray:
-        rows = np.ascontiguousarray(np.moveaxis(array.values(), 2, 0), np.float64)
-        return finite(archive, "posedirs", rows)
-
     feature, title = kinds[count]
-    return Correctives(Deferred((count, n_vertices, 3), np.float64, load), feature), title
+    return Correctives(last_axis_first(archive, "posedirs", array), feature), title
 
 
 def _shape_space(source: Source, archive: Archive, title: str, used: list[str]) -> ShapeSpace:
@@ -396,8 +394,8 @@ def _hands(archive: Archive, member: Member | None, used: list[str]) -> tuple[Ha
         components, mean = f"hands_components{side[:1]}", f"hands_mean{side[:1]}"
         if archive.has(components) and archive.has(mean):
             joints = np.arange(first, first + 15, dtype=np.int32)
-            rows = finite(archive, components, archive.array(components, (None, 45)).values())
-            middle = finite(archive, mean, archive.array(mean, (45,)).values())
+            rows = finite_array(archive, components, (None, 45))
+            middle = finite_array(archive, mean, (45,))
             hands.append(Hand(side, joints, rows, middle))
             used += [components, mean]
     return tuple(hands)

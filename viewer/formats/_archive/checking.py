@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._archive.opening import open_archive
-from viewer.formats._archive.values import Archive
+from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._placeholders import neutral_corners
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Bools, Deferred, Floats, Ints
 
 _ROWS = {
     "positions": "row-vertex",
@@ -85,6 +85,21 @@ def finite(
         lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
         return np.where(lost[:, None, None], np.eye(4), numbers)
     return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
+
+
+def finite_array(archive: Archive, key: str, shape: Axes | None, part: Part = "") -> Floats:
+    """Return an array of a shape as float64; see ``Archive.array`` and ``finite``."""
+    return finite(archive, key, archive.array(key, shape).values(), part)
+
+
+def last_axis_first(archive: Archive, key: str, array: Deferred) -> Deferred:
+    """Return directions (V, 3, N), as models store them, as (N, V, 3), read on first use."""
+
+    def load() -> Floats:
+        rows = np.moveaxis(array.values(), 2, 0)
+        return finite(archive, key, np.ascontiguousarray(rows, np.float64))
+
+    return Deferred((array.shape[2], *array.shape[:2]), np.float64, load)
 
 
 def finite_or_nan(archive: Archive, key: str, values: NDArray[Any]) -> Floats:

@@ -19,7 +19,7 @@ import re
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.formats._archive.checking import archive_of, finite, within_reach
+from viewer.formats._archive.checking import archive_of, finite, finite_array, within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, has, intrinsics_of, rotations_of, rows
@@ -98,7 +98,7 @@ def _bodies(archive: Archive, n_people: int, n_frames: int) -> list[Track]:
     vectors = np.concatenate([roots, joints], axis=2)
     shape = None
     if archive.has("betas"):
-        shape = finite(archive, "betas", archive.array("betas", (n_people, None)).values())
+        shape = finite_array(archive, "betas", (n_people, None))
     placed = [within_reach(archive, "trans", own) for own in rows(archive, "trans", (*both, 3))]
     frames, names = np.arange(n_frames), members_by_numbers()[66]
     return [
