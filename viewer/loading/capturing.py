@@ -13,6 +13,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
+from viewer.loading.scaling import scale_to_unit
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.cameras import CameraView
@@ -31,7 +32,6 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.units import METRES, UNIT_NAMES
 
 _COLORS = (
     (0.85, 0.42, 0.28),
@@ -414,26 +414,3 @@ def _joined_points(first: PointClip, second: PointClip) -> PointClip:
     """Return one clip with the concatenated rows of two clips on the same timeline."""
     timing = _joined_timing(first.timing, second.timing, len(first.points))
     return PointClip(first.name, timing, np.concatenate([first.points, second.points]))
-
-
-def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:
-    """Scale an actor to a unit; return a note if both units are known and differ."""
-    own = known_unit(actor)
-    if not unit or own in ("", unit):
-        return []
-    factor = METRES[own] / METRES[unit]
-    actor.placement = scaling(factor) @ actor.placement
-    values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
-    return [Diagnostic("F007.unit-matched", values={**values, "factor": factor})]
-
-
-def scaling(factor: float) -> Floats:
-    """Return the matrix of a uniform scale: (4, 4)."""
-    return np.diag([factor, factor, factor, 1.0])
-
-
-def known_unit(actor: Actor) -> str:
-    """Return the unit of an actor; empty if it is unknown."""
-    if actor.figure.points is not None:  # captured keypoints
-        return "m"
-    return actor.figure.unit if actor.figure.unit in METRES else ""

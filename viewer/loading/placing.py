@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.loading.capturing import known_unit, scale_to_unit, scaling
+from viewer.loading.scaling import known_unit, scale_to_unit, scaling
 from viewer.loading.scene_draft import SceneDraft
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box, scene_unit
