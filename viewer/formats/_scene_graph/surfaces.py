@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,7 @@ _MOST_TRIANGLES = 200_000  # largest primitive that is shaded flat
 
 # Grid cells per unit of normal components: faces within half a degree share a normal.
 _CELLS = 128
+_Origin: TypeAlias = Literal["file", "flat", "smooth"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,8 +37,7 @@ class Influences:
     """Number of influences of each vertex: (V,)."""
     joints: Ints
     weights: Floats
-    """Joint of the figure and weight of each, (N,); the weights of a vertex sum to
-    1."""
+    """Joint of the figure and weight of each, (N,); the weights of a vertex sum to 1."""
     deviation: float = 0.0
     """Largest deviation of a sum of weights from 1 before normalisation."""
     n_deviating: int = 0
@@ -67,7 +67,7 @@ class Piece:
     int32."""
     normals: Floats
     """Mesh space: (V, 3)."""
-    shading: str
+    shading: _Origin
     """Origin of the normals."""
 
     @property
@@ -189,7 +189,9 @@ def _piece(
 ) -> Piece:
     """Return one piece; triangles that a reflection reverses are flipped back."""
     sources, triangles, normals, is_flat = shading
-    kind = "file" if primitive.normals is not None else "flat" if is_flat else "smooth"
+    kind: _Origin = "flat" if is_flat else "smooth"
+    if primitive.normals is not None:
+        kind = "file"
     if is_flat:
         influences = _of_rows(influences, sources)
     if np.linalg.det(baked[:3, :3]) < 0.0:

@@ -45,6 +45,7 @@ _COLORS = {
 _LINEAR = "_EmissionColor"
 _AXES = {"_MainTex_ST": (0, 1), "_MainTex_ST_S": (0,), "_MainTex_ST_T": (1,)}
 
+# Core members of version 0.x.
 _TEXTURE_TRANSFORM = "KHR_texture_transform"
 _SURFACE = "pbrMetallicRoughness"
 _CORE_TEXTURES = {
@@ -53,8 +54,9 @@ _CORE_TEXTURES = {
     "_EmissionMap": ("emissiveTexture",),
 }
 _CULL_OFF = 0.0
-_BRIGHTEST = 1e6
+_BRIGHTEST = 1e6  # maximum of emitted light
 
+# Toon shading of version 0.x: members of version 1.0, defaults and factors.
 _TOON_TEXTURES = {
     "_ShadeTexture": "shadeMultiplyTexture",
     "_SphereAdd": "matcapTexture",

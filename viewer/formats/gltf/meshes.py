@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import field
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,8 @@ _TRIANGLES = (_LIST, _STRIP, _FAN)  # all other modes draw points or lines
 _MODES = range(7)
 
 _MOST_UVS = 8  # maximum number of texture coordinate sets
-_NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")
+_NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")  # name and set of an attribute
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 @dataclass(slots=True)
@@ -190,11 +191,7 @@ class _Attributes:
 
     def floats(self, name: str, *kinds: str) -> Floats | None:
         """Return an attribute, (V, C); None if it is missing; errors as of ``accessor``."""
-        index = self.accessor(name)
-        if index < 0:
-            return None
-        read, user = self.document.accessors.floats, self.element.at(name)
-        return read(index, kinds, user, self.rows, self.decoded.get(name))
+        return self._values(self.document.accessors.floats, name, kinds)
 
     def stored(self, name: str, *kinds: str) -> NDArray[Any] | None:
         """Return the finite numbers of all vertices as in the file, without copying them.
@@ -210,19 +207,19 @@ class _Attributes:
 
     def fractions(self, name: str, *kinds: str) -> Floats | None:
         """Return an attribute of normalised integers; shape and errors as for ``floats``."""
-        index = self.accessor(name)
-        if index < 0:
-            return None
-        read, user = self.document.accessors.fractions, self.element.at(name)
-        return read(index, kinds, user, self.rows, self.decoded.get(name))
+        return self._values(self.document.accessors.fractions, name, kinds)
 
     def integers(self, name: str, *kinds: str) -> NDArray[np.int64] | None:
         """Return an attribute of whole numbers; shape and errors as for ``floats``."""
+        return self._values(self.document.accessors.integers, name, kinds)
+
+    def _values(
+        self, read: Callable[..., NDArray[_Number]], name: str, kinds: tuple[str, ...]
+    ) -> NDArray[_Number] | None:
         index = self.accessor(name)
         if index < 0:
             return None
-        read, user = self.document.accessors.integers, self.element.at(name)
-        return read(index, kinds, user, self.rows, self.decoded.get(name))
+        return read(index, kinds, self.element.at(name), self.rows, self.decoded.get(name))
 
     def sets(self, name: str) -> list[int]:
         """Return the set numbers of attributes such as ``TEXCOORD_0``, in ascending order."""
