@@ -5,8 +5,6 @@ from __future__ import annotations
 from viewer.data_classes import dataclass
 from viewer.diagnostics.template import rendered
 
-__all__ = ["SEVERITIES", "Code"]
-
 SEVERITIES = ("note", "warning", "error")
 """Severities in ascending order."""
 

@@ -1,4 +1,9 @@
-"""A single error, warning or note: message key, location and values."""
+"""Errors, warnings and notes as data.
+
+A ``Diagnostic`` is the key of a message, a location and the values of the message; a value that is
+text with values of its own is a ``Phrase``. A ``Collector`` keeps what a reader finds, ``merged``
+counts what differs only in its location, and ``described`` returns everything as JSON data.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +33,10 @@ Part = Literal[
     "frames",
 ]
 """Part of a figure or motion that a diagnostic refers to."""
+# Maximum number of warnings per file: users do not read longer lists.
+_MOST = 100
+# Maximum number of indices and names per diagnostic; the total is always included.
+_LISTED = 100
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,10 +185,6 @@ def frame_range(first: int, last: int) -> Phrase:
     return Phrase("frame-range", first=first, last=last)
 
 
-# Maximum number of warnings per file: users do not read longer lists.
-_MOST = 100
-
-
 class Collector:
     """Collects the diagnostics of readers and operations.
 
@@ -256,10 +261,6 @@ def _joined(alike: list[Diagnostic]) -> Diagnostic:
     known = [one.places for one in alike if one.places is not None]
     places = np.unique(np.concatenate(known)) if known else None
     return replace(alike[0], places=places, count=sum(one.count for one in alike))
-
-
-# Maximum number of indices and names per diagnostic; the total is always included.
-_LISTED = 100
 
 
 def described(found: Diagnostic) -> dict[str, Any]:

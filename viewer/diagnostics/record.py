@@ -12,8 +12,6 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics.diagnostic import Diagnostic, described
 from viewer.phrases import printable
 
-__all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", "recorded"]
-
 
 @dataclass
 class Record:

@@ -8,8 +8,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.scene import Actor
 
-__all__ = ["Exporter", "require_mesh"]
-
 
 @dataclass(frozen=True, slots=True)
 class Exporter:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from array import array
 from dataclasses import replace
 
 import numpy as np
@@ -265,40 +263,3 @@ def _rotated(frames: Frames, animation: SampledAnimation, vector: Floats) -> Fra
     )  # a rotation by 90 degrees has integer entries
     places = (root + frames.figure_translations) @ rotation.T - root
     return replace(frames, rotations=rotations, figure_translations=places)
-
-
-class Records:
-    """The records of one person in EasyMocap's frames, parsed from their text.
-
-    ``member``: the body model.
-    """
-
-    def __init__(self, member: Member) -> None:
-        self._member = member
-        self._rows: list[dict[str, array[float]]] = []
-
-    def motion(self, rate: float) -> BodyMotion:
-        """Return the motion of all added frames."""
-        rotation = self._array("poses").reshape(len(self._rows), -1, 3)
-        rotation[:, 0] = self._array("Rh")
-        has_expression = "expression" in self._rows[0]
-        return BodyMotion(
-            "again",
-            Timing(rate, np.arange(len(self._rows), dtype=np.int32)),
-            self._member.names,
-            rotation,
-            self._array("Th"),
-            about_origin=True,
-            shape=self._array("shapes"),
-            expression=self._array("expression") if has_expression else None,
-        )
-
-    def add(self, text: str) -> None:
-        """Add the record of the next frame."""
-        # Arrays take a quarter of the memory of lists.
-        record = json.loads(text)
-        record.pop("id", None)
-        self._rows.append({key: array("d", row) for key, (row,) in record.items()})
-
-    def _array(self, key: str) -> Floats:
-        return np.array([record[key] for record in self._rows], dtype=np.float64)

@@ -27,8 +27,6 @@ from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["export_animation", "require"]
-
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
 _BLOCK = 4096  # frames measured per block
 _SAME = 1e-9  # tolerance, in frames or length units

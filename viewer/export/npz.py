@@ -46,8 +46,6 @@ from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
-__all__ = ["export", "export_animation", "export_points"]
-
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write float64 arrays in the figure's own space and unit; see ``viewer.export.export``."""

@@ -37,6 +37,15 @@ from viewer.rig.units import UNIT_NAMES
 _DIGITS = 9  # significant digits of a number, as most programs read and write
 _PRECISE = 1e-6  # largest rounding of positions, as a fraction of the figure's size
 _NO_PART = "other"  # object of triangles without a part
+_MAPS = {
+    "base_texture": ("map_Kd", ""),
+    "metallic_texture": ("map_Pm", "_metallic"),
+    "roughness_texture": ("map_Pr", "_roughness"),
+    "normal_texture": ("norm", "_normal"),
+    "emissive_texture": ("map_Ke", "_emissive"),
+}
+"""MTL statement of each texture, and suffix of its image's name."""
+_ONE_NUMBER = ("metallic_texture", "roughness_texture")
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
@@ -196,17 +205,6 @@ def _faces(mesh: Mesh, materials: Sequence[str], has_library: bool) -> Iterator[
             yield f"usemtl {name}\n".encode("utf-8", "surrogateescape")
         now = [part, material]
         yield from row_texts(table[first:last], integers, between, start=b"f ")
-
-
-_MAPS = {
-    "base_texture": ("map_Kd", ""),
-    "metallic_texture": ("map_Pm", "_metallic"),
-    "roughness_texture": ("map_Pr", "_roughness"),
-    "normal_texture": ("norm", "_normal"),
-    "emissive_texture": ("map_Ke", "_emissive"),
-}
-"""MTL statement of each texture, and suffix of its image's name."""
-_ONE_NUMBER = ("metallic_texture", "roughness_texture")
 
 
 def _part_name(name: str) -> str:

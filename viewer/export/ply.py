@@ -19,8 +19,6 @@ from viewer.rig.skinning import Skinning, deform
 from viewer.rig.srgb import encode_srgb
 from viewer.rig.units import UNIT_NAMES
 
-__all__ = ["export"]
-
 _PRECISE = 1e-6  # largest rounding of positions, as a fraction of the figure's size
 _TYPES = {"float": "<f4", "double": "<f8"}
 _COLORS = ("red", "green", "blue", "alpha")

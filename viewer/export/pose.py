@@ -19,8 +19,6 @@ from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
-__all__ = ["export"]
-
 _TURNED = 1e-6  # difference of rotation matrices, larger than the rounding of angles
 _SAME = 1e-9  # difference of a number up to which it counts as stored
 

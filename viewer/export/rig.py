@@ -35,6 +35,8 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices, skin_used
 
 _ROUNDED = 1e-5  # scales in files differ from 1 by less than this if they are rounded
 _FLAT = 1e-12  # determinant below which a joint counts as scaled to 0
+_SAME = 1e-12  # tolerance of rotation matrices and scales
+_CUBE = 0.01  # half the edge length of default boxes, relative to the skeleton's size
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
@@ -213,10 +215,6 @@ def _error(
     losses = PoseLosses(figure, skinning)
     losses.look(pose, vertices, joints, sources)
     return losses.notes(files[-1].path)
-
-
-_SAME = 1e-12  # tolerance of rotation matrices and scales
-_CUBE = 0.01  # half the edge length of default boxes, relative to the skeleton's size
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,8 +29,6 @@ from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
-__all__ = ["export_animation"]
-
 _MEMBER = FAMILY[55]
 _PARTS = {
     "root_orient": slice(0, 1),

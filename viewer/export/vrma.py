@@ -36,8 +36,6 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.scene import figure_pose
 from viewer.rig.units import METRES
 
-__all__ = ["export_animation"]
-
 _EXTENSION = "VRMC_vrm_animation"
 
 

@@ -30,6 +30,10 @@ from viewer.rig.skinning import Skinning, deform
 
 _NOTED = 1e-3  # minimum deviation of a sum from 1: files round to three digits
 _WRONG = 5e-3  # four influences with three digits, each with an error of half a digit, and a margin
+# Poses in which the effect of fewer influences is measured
+_COUNT = 4  # number of poses in addition to the rest pose and the current pose
+_SWING = 0.6  # radians: roughly the largest rotation of most joints in a walk
+_SEED = 5  # fixed, so that results are reproducible
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -245,11 +249,6 @@ def _distinct(values: np.ndarray) -> np.ndarray:
     """Return each value once, in the given order."""
     _, first = np.unique(values, return_index=True)
     return values[np.sort(first)]
-
-
-_COUNT = 4  # number of poses in addition to the rest pose and the current pose
-_SWING = 0.6  # radians: roughly the largest rotation of most joints in a walk
-_SEED = 5  # fixed, so that results are reproducible
 
 
 def _some_poses(actor: Actor) -> list[Pose]:

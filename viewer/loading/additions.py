@@ -14,8 +14,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor
 
-__all__ = ["add_to_actor", "apply_pose"]
-
 
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:
     """Apply poses and images to an actor that is already open.

@@ -14,8 +14,6 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.joint_map import JointMap
 
-__all__ = ["body_drive", "has_joints", "with_joints"]
-
 _ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
 
 

@@ -21,8 +21,6 @@ from viewer.models.bundled import bundled_body
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
 
-__all__ = ["BodyModels", "Choice", "is_body"]
-
 _ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
 _HIP = "left_hip"
 

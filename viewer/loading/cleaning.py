@@ -34,6 +34,7 @@ from viewer.rig.units import METRES
 
 Smoothing = OneEuro | SavitzkyGolay
 _ROUNDING = 1e-9  # tolerance, scene or figure units
+_SAME = 0.25  # maximum distance between two tracks of one person, relative to the body's size
 
 
 def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
@@ -258,9 +259,6 @@ def _note(
         "where": where,
     }
     return Diagnostic(key, values={"figure": actor.name, **values, **moved})
-
-
-_SAME = 0.25  # maximum distance between two tracks of one person, relative to the body's size
 
 
 def _merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:

@@ -30,6 +30,16 @@ if TYPE_CHECKING:
     from viewer.rig.posing.pose_record import PoseRecord
 
 _PEEK = 16  # number of bytes that identify an image
+_LISTS = {
+    "Clip": "clips",
+    "PoseRecord": "poses",
+    "BodyMotion": "body_motions",
+    "SkeletonMotion": "skeleton_motions",
+    "Capture": "captures",
+    "MorphTarget": "morphs",
+    "Figure": "figures",
+}
+"""Fields by class name: only readers that create a class import its module."""
 
 
 @dataclass(slots=True)
@@ -145,18 +155,6 @@ def read_source(source: Source, contents: Contents, settings: MotionSettings) ->
         contents.pictures.append((source.path, read_picture(source)))
         return ()
     return _sort(source, contents, settings)
-
-
-_LISTS = {
-    "Clip": "clips",
-    "PoseRecord": "poses",
-    "BodyMotion": "body_motions",
-    "SkeletonMotion": "skeleton_motions",
-    "Capture": "captures",
-    "MorphTarget": "morphs",
-    "Figure": "figures",
-}
-"""Fields by class name: only readers that create a class import its module."""
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:

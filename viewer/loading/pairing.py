@@ -9,8 +9,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.rig.figure import Figure
 
-__all__ = ["joined_figures"]
-
 
 def joined_figures(
     figures: Sequence[tuple[Path, Figure]],

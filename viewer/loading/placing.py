@@ -18,14 +18,6 @@ if TYPE_CHECKING:
     from viewer.rig.captures.cameras import CameraView
     from viewer.rig.figure import FigureGroup
 
-__all__ = [
-    "place_side_by_side",
-    "placed_like",
-    "placed_views",
-    "scale_to_one_unit",
-    "stand_up",
-]
-
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
 

@@ -1,4 +1,9 @@
-"""Largest distances between a figure and the file written from it."""
+"""Largest distances between a figure and the file written from it, over many poses.
+
+Skinning every vertex in every pose would take longer than the export itself. ``Bounds`` excludes
+poses that cannot matter, by a bound per joint; ``Estimator`` finds the farthest vertices of the
+others in single precision; only these candidates are skinned in double precision.
+"""
 
 from __future__ import annotations
 
@@ -34,6 +39,13 @@ _EPSILON = 2.0**-22  # two steps of single precision, relative to a coordinate
 _SIZED = 256  # frames used to measure the distance of a motion from the origin
 _FAR = 5.0  # maximum factor on the tolerance far from the origin
 _NO_REASONS: dict[str, object] = {"causes": [], "estimate": "", "rate": 0.0}
+# Upper bounds, without which most poses would be skinned in vain
+_NUMBERS = 9  # entries of a joint's rotation matrix, which drive the correctives
+# Cached bounds of the correctives used last: a batch writes many motions of the same body.
+_known: tuple[weakref.ref[Floats] | None, Floats] = (None, np.zeros(0))
+# Estimates in single precision
+Single = NDArray[np.float32]
+_STEPS = 2.0**-18  # error bound of single-precision sums, relative to the largest term
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,12 +297,6 @@ def with_values(notes: list[Diagnostic], **values: object) -> list[Diagnostic]:
 # The vertices of each joint are bounded by a sphere, so a bound takes only a few operations per
 # joint. Poses whose bound is below the tolerance, or below the largest distance so far, are
 # skipped.
-
-# Cached bounds of the correctives used last: a batch writes many motions of the same body.
-_known: tuple[weakref.ref[Floats] | None, Floats] = (None, np.zeros(0))
-_NUMBERS = 9  # entries of a joint's rotation matrix, which drive the correctives
-
-
 class Bounds:
     """Bounds for two bodies with the same vertices and joints.
 
@@ -448,11 +454,6 @@ def _largest_stretch(palette: Floats) -> Floats:
 #
 # Many frames are skinned together, a few hundred vertices at a time, so that their matrices stay
 # in the CPU cache. Candidates are then measured in double precision.
-
-Single = NDArray[np.float32]
-_STEPS = 2.0**-18  # error bound of single-precision sums, relative to the largest term
-
-
 class Estimator:
     """Estimator for two bodies with the same vertices.
 

@@ -1,4 +1,8 @@
-"""Errors of an exported motion at times between its frames."""
+"""Errors of an exported motion at times between its frames.
+
+A motion given as curves is compared with the file at the times where the two are likely to differ
+most; a capture, which has no curves, at the times of its own frames.
+"""
 
 from __future__ import annotations
 
@@ -35,6 +39,21 @@ from viewer.rig.skinning import Skinning
 from viewer.rig.transform_keys.rate import is_regular
 
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
+# Search for the times of the largest errors
+_MOST = 8192  # total number of samples before refinement
+_STEPS = 16  # maximum number of samples between two keys or frames
+_FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
+_LIKELY = 256  # number of likely spans, for joints and vertices each
+_INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
+_SHORT = 1e-6  # spans shorter than this, in frames, are ignored
+_BLOCK = 1024  # poses per block
+_NAMING = 1024  # approximate number of times at which all vertices are compared
+_GROUPS = 32  # time intervals, each of which contributes its farthest vertex
+_PEAKS = 64  # maximum number of refined peaks
+_HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
+_PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
+_ROUNDS = 4  # number of rounds of refinement
+_Sampler = Callable[[Floats], Frames]
 
 
 def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[Diagnostic]:
@@ -134,23 +153,6 @@ def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
 #
 # Curves are smooth between their keys, so the difference is sampled there, and the highest
 # samples are refined.
-
-_Sampler = Callable[[Floats], Frames]
-_MOST = 8192  # total number of samples before refinement
-_STEPS = 16  # maximum number of samples between two keys or frames
-_FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
-_LIKELY = 256  # number of likely spans, for joints and vertices each
-_INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
-_SHORT = 1e-6  # spans shorter than this, in frames, are ignored
-_BLOCK = 1024  # poses per block
-_NAMING = 1024  # approximate number of times at which all vertices are compared
-_GROUPS = 32  # time intervals, each of which contributes its farthest vertex
-_PEAKS = 64  # maximum number of refined peaks
-_HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
-_PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
-_ROUNDS = 4  # number of rounds of refinement
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _WorstTimes:
     """Candidate times of the largest distance.

@@ -35,6 +35,13 @@ from viewer.rig.units import METRES, UNIT_NAMES
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
 _MOST_DIGITS = 15
+# End sites
+_MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
+_FEW = 4  # minimum number of vertices for measuring a joint's extent
+_TOO_SHORT = 0.1  # fraction of the parent bone: shorter ends are implausible
+_HALF = 0.5  # fraction of the parent bone: length of an end without another estimate
+_NO_SIZE = 0.1  # metres: length of an end in a skeleton without bones
+_DEFAULT_END = 1.0  # length of such an end if the unit is unknown
 
 
 def export_animation(
@@ -316,14 +323,6 @@ def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnosti
 def _visible(name: str) -> str:
     """Return a name for messages, in quotes if it would not be seen."""
     return name if name.strip() else f'"{name}"'
-
-
-_MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
-_FEW = 4  # minimum number of vertices for measuring a joint's extent
-_TOO_SHORT = 0.1  # fraction of the parent bone: shorter ends are implausible
-_HALF = 0.5  # fraction of the parent bone: length of an end without another estimate
-_NO_SIZE = 0.1  # metres: length of an end in a skeleton without bones
-_DEFAULT_END = 1.0  # length of such an end if the unit is unknown
 
 
 def _end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:

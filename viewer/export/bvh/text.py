@@ -105,8 +105,36 @@ def head_text(
     ``n_frames``: number of frames.
     ``digits``: number of decimals.
     """
-    order = depth_first(parents)
-    lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)
+    lines = ["HIERARCHY"]
+    rotations = " ".join(f"{axis.upper()}rotation" for axis in rotation_order)
+    open_joints: list[int] = []
+
+    def put(depth: int, text: str) -> None:
+        lines.append("\t" * min(depth, _DEEPEST) + text)
+
+    def close(until: int) -> None:
+        while open_joints and open_joints[-1] != until:
+            open_joints.pop()
+            put(len(open_joints), "}")
+
+    for joint in depth_first(parents):
+        parent = int(parents[joint])
+        close(parent)
+        depth = len(open_joints)
+        put(depth, f"{'ROOT' if parent < 0 else 'JOINT'} {names[joint]}".rstrip(" "))
+        put(depth, "{")
+        put(depth + 1, f"OFFSET {_vector(offsets[joint] if parent >= 0 else np.zeros(3), digits)}")
+        has_positions = parent < 0 or moves[joint]
+        count = "6 Xposition Yposition Zposition" if has_positions else "3"
+        put(depth + 1, f"CHANNELS {count} {rotations}")
+        open_joints.append(int(joint))
+        if int(joint) in ends:
+            put(depth + 1, "End Site")
+            put(depth + 1, "{")
+            put(depth + 2, f"OFFSET {_vector(ends[int(joint)], digits)}")
+            put(depth + 1, "}")
+    close(-1)
+
     seconds = 1.0 / rate
     decimals = max(_SECONDS_DIGITS, _SECONDS_DIGITS - 1 - int(np.floor(np.log10(seconds))))
     lines += ["MOTION", f"Frames: {n_frames}", f"Frame Time: {seconds:.{decimals}f}"]
@@ -133,48 +161,6 @@ def frame_texts(
                 columns.append(positions[rows, joint])
             columns.append(degrees[:, joint])
         yield from row_texts(np.concatenate(columns, axis=1), lambda part: fixed(part, digits))
-
-
-def _hierarchy(
-    names: Sequence[str],
-    parents: Ints,
-    order: Ints,
-    offsets: Floats,
-    ends: dict[int, Floats],
-    moves: Bools,
-    rotation_order: str,
-    digits: int,
-) -> list[str]:
-    lines = ["HIERARCHY"]
-    rotations = " ".join(f"{axis.upper()}rotation" for axis in rotation_order)
-    open_joints: list[int] = []
-
-    def put(depth: int, text: str) -> None:
-        lines.append("\t" * min(depth, _DEEPEST) + text)
-
-    def close(until: int) -> None:
-        while open_joints and open_joints[-1] != until:
-            open_joints.pop()
-            put(len(open_joints), "}")
-
-    for joint in order:
-        parent = int(parents[joint])
-        close(parent)
-        depth = len(open_joints)
-        put(depth, f"{'ROOT' if parent < 0 else 'JOINT'} {names[joint]}".rstrip(" "))
-        put(depth, "{")
-        put(depth + 1, f"OFFSET {_vector(offsets[joint] if parent >= 0 else np.zeros(3), digits)}")
-        has_positions = parent < 0 or moves[joint]
-        count = "6 Xposition Yposition Zposition" if has_positions else "3"
-        put(depth + 1, f"CHANNELS {count} {rotations}")
-        open_joints.append(int(joint))
-        if int(joint) in ends:
-            put(depth + 1, "End Site")
-            put(depth + 1, "{")
-            put(depth + 2, f"OFFSET {_vector(ends[int(joint)], digits)}")
-            put(depth + 1, "}")
-    close(-1)
-    return lines
 
 
 def _vector(values: Floats, digits: int) -> str:

@@ -53,6 +53,14 @@ from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _Extend = Callable[[Document, Body, Built], list[Diagnostic]]
+# Cameras
+# OpenCV's cameras look along z with y down, those of glTF along -z with y up.
+_FLIP = np.diag([1.0, -1.0, -1.0])
+_NEAR = 0.01  # distance of the near plane, which glTF requires, in metres: closer than any figure
+# Largest distance of the principal point from the centre that is not reported, pixels: calibrations
+# of a centred lens state W / 2 or, in OpenCV's coordinates, (W - 1) / 2.
+_CENTRED = 0.5 + 1e-6
+_EXACT = 1e-9  # tolerance for a matrix that is a rotation
 
 
 def export(
@@ -379,16 +387,6 @@ def _remarks(body: Body, up: str) -> list[Diagnostic]:
         unbound = int(body.influences.n_fixed)
         notes.append(Diagnostic("X005.no-influence", values={"n": unbound}))
     return notes
-
-
-# OpenCV's cameras look along z with y down, those of glTF along -z with y up.
-_FLIP = np.diag([1.0, -1.0, -1.0])
-_NEAR = 0.01  # distance of the near plane, which glTF requires, in metres: closer than any figure
-
-# Largest distance of the principal point from the centre that is not reported, pixels: calibrations
-# of a centred lens state W / 2 or, in OpenCV's coordinates, (W - 1) / 2.
-_CENTRED = 0.5 + 1e-6
-_EXACT = 1e-9  # tolerance for a matrix that is a rotation
 
 
 def _add_cameras(

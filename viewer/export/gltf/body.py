@@ -22,6 +22,8 @@ from viewer.rig.file_record import FileRecord
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import Skinning, skin_used
 
+_SOURCES, _FIGURES, _EXTRAS = "sources", "figures", "extras"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
@@ -183,10 +185,6 @@ def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Place
 #
 #     "extras": {"sources": [{"figures": ["hero"], "extras": ...},
 #                            {"figures": ["wolf", "cub"], "extras": ...}]}
-
-_SOURCES, _FIGURES, _EXTRAS = "sources", "figures", "extras"
-
-
 def _add_record(document: Document, record: FileRecord, joints: list[int], name: str) -> None:
     """Add the application data and copyright of a figure's file and of its joints.
 

@@ -1,4 +1,8 @@
-"""Figures in one glTF file: each in its pose, or at rest with its animations."""
+"""Figures in one glTF file: each in its pose, or at rest with its animations.
+
+Written animations are evaluated from the file, and compared with the figure at their keys and
+between them.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +42,14 @@ from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
+
+# Comparison of the written animations
+# Maximum number of compared vertices over all times: takes about two seconds.
+_MOST_VERTICES = 4_000_000
+_FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
+_BLOCK = 64  # number of times per block
+_DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
+_PARALLEL = 1.0 - 1e-9  # rotations with a larger cosine are interpolated linearly
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,13 +191,6 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
 
 def _names(shapes: BlendShapes, rows: list[int]) -> list[str]:
     return [shapes.names[row] or f"#{row}" for row in rows]
-
-
-# Maximum number of compared vertices over all times: takes about two seconds.
-_MOST_VERTICES = 4_000_000
-_FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
-_BLOCK = 64  # number of times per block
-_DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
 
 
 def _shown_weights(figure: Figure, weights: Floats) -> Floats:
@@ -344,10 +349,6 @@ def _one(parts: list[Frames]) -> Frames:
 #
 # The evaluation follows glTF 2.0, section 3.11 and appendix C, in double precision, and shares no
 # code with other parts of the program.
-
-_PARALLEL = 1.0 - 1e-9  # rotations with a larger cosine are interpolated linearly
-
-
 def key_times(animation: dict[str, Any], file: GltfFile) -> Floats:
     """Return all key times of an animation, increasing: (T,)."""
     inputs = {sampler["input"] for sampler in animation["samplers"]}

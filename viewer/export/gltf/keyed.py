@@ -24,6 +24,7 @@ _Targets: TypeAlias = NDArray[np.integer]
 _MODES = {"linear": "LINEAR", "step": "STEP", "cubic": "CUBICSPLINE"}
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 _RATE = 60.0  # frames per second at which channels of different interpolation are merged
+_NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
 
 
 class Clips:
@@ -181,9 +182,6 @@ def _merged(channels: list[TransformChannel], rows: _Targets, weights: Floats) -
     mode: Interpolation = "step" if modes == {"step"} else "linear"
     shapes = rows.astype(np.int32)
     return TransformChannel(-1, "weights", times, values[:, rows], mode, shapes=shapes)
-
-
-_NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
 
 
 def moving(skeleton: Skeleton, frames: Frames) -> Bools:

@@ -23,6 +23,11 @@ from viewer.rig.skin import influence_counts
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # maximum number of vertices with 16-bit indices, the last of which is reserved
 _NOT_UNIT = 1e-3  # tolerance for unit length; squares of normals may underflow or overflow
+_WORST_CONDITION = 1e5  # maximum condition number of an inverse bind matrix that is applied
+# Quantised attributes: largest values of normalised integers
+EXTENSION = "KHR_mesh_quantization"
+_SHORT, _WORD, _BYTE = 32767, 65535, 255
+_Integers = NDArray[np.integer]
 
 
 def add_mesh(
@@ -172,9 +177,6 @@ def _primitives(
     return primitives
 
 
-_WORST_CONDITION = 1e5  # maximum condition number of an inverse bind matrix that is applied
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
     """Triangles of a mesh that become a glTF mesh with a node.
@@ -322,11 +324,6 @@ def _part_targets(
 
 def _moves(offsets: Floats, sources: Ints) -> bool:
     return bool(offsets[sources].any())
-
-
-EXTENSION = "KHR_mesh_quantization"
-_SHORT, _WORD, _BYTE = 32767, 65535, 255
-_Integers = NDArray[np.integer]
 
 
 @dataclass(slots=True, eq=False)

@@ -26,6 +26,8 @@ from viewer.rig.skin import (
 PER_SET = 4
 _SUM = 1e-6  # smaller deviations of weight sums from 1 are rounding errors of the original file
 _MOST_JOINTS = 65536  # maximum number of joints, as indices have 16 bits
+# Maximum number of targets: each takes 12 bytes per vertex, and programs support few.
+_MOST_TARGETS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,10 +127,6 @@ def inverse_bind_matrices(influences: Influences, inverse_bind: Floats, decoding
         matrices = matrices @ decoding
     matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # set exactly, as readers expect
     return matrices.transpose(0, 2, 1).reshape(-1, 16)
-
-
-# Maximum number of targets: each takes 12 bytes per vertex, and programs support few.
-_MOST_TARGETS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

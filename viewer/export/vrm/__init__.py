@@ -46,6 +46,7 @@ _CONSTRAINT = "VRMC_node_constraint"
 _TOON = "VRMC_materials_mtoon"
 _UNLIT = "KHR_materials_unlit"
 _TRANSFORM = "KHR_texture_transform"
+_AXES = "XYZ"
 
 
 def export(
@@ -317,9 +318,6 @@ def _lost(lost: Counter[str]) -> list[Diagnostic]:
     """Return a note about references that could not be kept, if there are any."""
     parts = [Phrase(f"lost-{kind}", n=count) for kind, count in sorted(lost.items()) if count]
     return [Diagnostic("X003.vrm-lost", values={"parts": parts})] if parts else []
-
-
-_AXES = "XYZ"
 
 
 def _constraint_items(

@@ -20,6 +20,17 @@ _BINDS = {
     "materialColorBinds": ("material", "material-binds"),
     "textureTransformBinds": ("material", "material-binds"),
 }
+# Material of version 0.x that is drawn as glTF describes it
+_PLAIN = {
+    "shader": "VRM_USE_GLTFSHADER",
+    "renderQueue": -1,
+    "floatProperties": {},
+    "vectorProperties": {},
+    "textureProperties": {},
+    "keywordMap": {},
+    "tagMap": {},
+}
+_KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # image formats that VRM allows
 
 
 def kept_modern(maps: Maps) -> dict[str, Any]:
@@ -149,18 +160,6 @@ def kept_toon(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
 #
 # Version 0.x binds expressions to meshes, which become one mesh per node here: such binds are
 # repeated. Its materials are parallel to those of the file.
-
-_PLAIN = {
-    "shader": "VRM_USE_GLTFSHADER",
-    "renderQueue": -1,
-    "floatProperties": {},
-    "vectorProperties": {},
-    "textureProperties": {},
-    "keywordMap": {},
-    "tagMap": {},
-}
-
-
 def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
     """Return the root extension ``VRM`` of a character.
 
@@ -262,9 +261,6 @@ def _materials(data: list[Any], maps: Maps, names: list[str]) -> list[Any]:
         }
         result[written] = each
     return result
-
-
-_KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # image formats that VRM allows
 
 
 class Maps:

@@ -35,6 +35,32 @@ _VIEWS["firstpersononly"] = "firstPersonOnly"
 _RANGES = ("HorizontalInner", "HorizontalOuter", "VerticalDown", "VerticalUp")
 _STRAIGHT = [0, 0, 0, 1, 1, 1, 1, 0]  # time, value and two slopes of the first and last key
 _SAME = 1e-6
+# Meta data
+_USERS = {
+    "OnlyAuthor": "onlyAuthor",
+    "ExplicitlyLicensedPerson": "onlySeparatelyLicensedPerson",
+    "Everyone": "everyone",
+}
+_ALLOWS = {
+    "violentUssageName": "allowExcessivelyViolentUsage",
+    "sexualUssageName": "allowExcessivelySexualUsage",
+}
+_COMMONS = "https://creativecommons.org"
+_LICENCES = {
+    "CC0": f"{_COMMONS}/publicdomain/zero/1.0/",
+    **{
+        f"CC_{name}": f"{_COMMONS}/licenses/{name.lower().replace('_', '-')}/4.0/"
+        for name in ("BY", "BY_NC", "BY_SA", "BY_NC_SA", "BY_ND", "BY_NC_ND")
+    },
+}
+# Expressions
+_PERCENT = 100.0
+# Springs
+_DOWN = {"x": 0.0, "y": -1.0, "z": 0.0}
+# Materials
+_TOON, _UNLIT = "VRMC_materials_mtoon", "KHR_materials_unlit"
+_BLENDS, _WRITES_DEPTH = (2, 3), 3  # _BlendMode
+_MOST_OFFSET = 9
 
 
 def upgraded(
@@ -133,25 +159,6 @@ def _range(told: dict[str, Any], name: str, lost: list[str]) -> dict[str, float]
     return found
 
 
-_USERS = {
-    "OnlyAuthor": "onlyAuthor",
-    "ExplicitlyLicensedPerson": "onlySeparatelyLicensedPerson",
-    "Everyone": "everyone",
-}
-_ALLOWS = {
-    "violentUssageName": "allowExcessivelyViolentUsage",
-    "sexualUssageName": "allowExcessivelySexualUsage",
-}
-_COMMONS = "https://creativecommons.org"
-_LICENCES = {
-    "CC0": f"{_COMMONS}/publicdomain/zero/1.0/",
-    **{
-        f"CC_{name}": f"{_COMMONS}/licenses/{name.lower().replace('_', '-')}/4.0/"
-        for name in ("BY", "BY_NC", "BY_SA", "BY_NC_SA", "BY_ND", "BY_NC_ND")
-    },
-}
-
-
 def _upgraded_meta(data: Any, record: VrmRecord, name: str, lost: list[str]) -> dict[str, Any]:
     """Return the meta data; permissions that version 0.x does not have keep their defaults.
 
@@ -216,10 +223,6 @@ def _thumbnail(texture: Any, record: VrmRecord) -> int | None:
 #
 #     blendShapeGroups  name, presetName, isBinary, binds (mesh, index, weight in percent),
 #                       materialValues, see ``viewer.formats._vrm.materials``
-
-_PERCENT = 100.0
-
-
 def _upgraded_expressions(told: Any, record: VrmRecord, lost: list[str]) -> dict[str, Any]:
     """Return the preset and custom expressions; a further one of a preset becomes a custom one.
 
@@ -286,10 +289,6 @@ def _material_binds(told: dict[str, Any], materials: list[Any], lost: list[str])
 # In version 0.x all joints below a bone swing, each towards its first child, and the last one
 # towards a point 7 cm further. In version 1.0 a chain is a list of joints; the last one only ends
 # it.
-
-_DOWN = {"x": 0.0, "y": -1.0, "z": 0.0}
-
-
 def _with_ends(
     figure: Figure, record: VrmRecord, springs: Springs | None
 ) -> tuple[Figure, VrmRecord]:
@@ -439,11 +438,6 @@ def _colliders(data: Any, lost: list[str]) -> tuple[list[Any], list[Any], dict[i
             places[index] = len(groups)
             groups.append({"colliders": own})
     return colliders, groups, places
-
-
-_TOON, _UNLIT = "VRMC_materials_mtoon", "KHR_materials_unlit"
-_BLENDS, _WRITES_DEPTH = (2, 3), 3  # _BlendMode
-_MOST_OFFSET = 9
 
 
 def _upgraded_toon(
