@@ -28,10 +28,9 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
 from viewer.export._losses.posed import PoseLosses
-from viewer.export._options import QUATERNIONS
+from viewer.export._options import QUATERNIONS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive

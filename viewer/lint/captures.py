@@ -6,17 +6,15 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
-from viewer.lint._subject import Indices, Subject
+from viewer.lint._subject import Subject
 from viewer.lint.clips import missing_frames
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Ints
 from viewer.rig.captures.points import PointClip
 
 LOW_FRACTION = 0.05
 """Fraction of a keypoint's visible frames: this much low confidence is normal."""
-
 LOW_FRAMES = 2
 """Minimum number of frames with low confidence."""
-
 _SINGLE = 6  # maximum number of low-confidence keypoints listed individually
 _SIZES = 15.0  # maximum speed of a point, in bounding box diagonals of the points per second
 
@@ -36,7 +34,11 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]:
-    rows = clip.timing.rows
+    """Report keypoints that are never visible, and those whose confidence is often low.
+
+    The worst of the latter are reported individually, worst first, and the others together.
+    """
+    rows, first_frame = clip.timing.rows, clip.timing.first_frame
     numbers = np.flatnonzero(rows >= 0)
     if len(numbers) == 0:
         return []
@@ -55,31 +57,12 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
                 joints=never,
             )
         )
-    return findings + _low(subject, clip, names, numbers, confidence)
-
-
-def _low(
-    subject: Subject, clip: PointClip, names: list[str], numbers: Indices, confidence: Floats
-) -> list[Finding]:
-    """Report low-confidence keypoints individually, worst first; the remaining ones together.
-
-    Parameters
-    ----------
-    subject, clip, names
-        The checked actor, its motion, and the names of the K keypoints.
-    numbers : (F,)
-        Frames in which the person is present, from 0.
-    confidence : (F, K)
-        Confidences in these frames.
-    """
-    seen = confidence > 0.0
-    is_low = seen & (confidence < subject.options.confidence)
+    limit = subject.options.confidence
+    is_low = seen & (confidence < limit)
     counts = is_low.sum(axis=0)
     fractions = counts / np.maximum(seen.sum(axis=0), 1)
     points = np.flatnonzero((fractions > LOW_FRACTION) & (counts >= LOW_FRAMES))
     points = points[np.argsort(-fractions[points], kind="stable")]
-    limit, first_frame = subject.options.confidence, clip.timing.first_frame
-    findings = []
     for point in points[:_SINGLE].tolist():
         frames = numbers[is_low[:, point]]
         findings.append(
@@ -96,38 +79,26 @@ def _low(
                 times=_times(subject, clip, frames),
             )
         )
-    return findings + _rarer(subject, clip, names, points[_SINGLE:], fractions, numbers, is_low)
-
-
-def _rarer(
-    subject: Subject,
-    clip: PointClip,
-    names: list[str],
-    points: Indices,
-    fractions: Floats,
-    numbers: Indices,
-    is_low: Bools,
-) -> list[Finding]:
-    """Report low-confidence keypoints together; ``fractions`` (K,) are fractions of the frames."""
-    if len(points) == 0:
-        return []
-    frames = numbers[is_low[:, points].any(axis=1)]
-    shown = [
-        Phrase("low-point", name=names[point], percent=100.0 * float(fractions[point]))
-        for point in points.tolist()
-    ]
-    return [
-        subject.found(
-            "C011.more-points",
-            n=len(points),
-            limit=subject.options.confidence,
-            points=shown,
-            part="clip",
-            joints=points,
-            frames=frames + clip.timing.first_frame,
-            times=_times(subject, clip, frames),
+    others = points[_SINGLE:]
+    if len(others):
+        frames = numbers[is_low[:, others].any(axis=1)]
+        shown = [
+            Phrase("low-point", name=names[point], percent=100.0 * float(fractions[point]))
+            for point in others.tolist()
+        ]
+        findings.append(
+            subject.found(
+                "C011.more-points",
+                n=len(others),
+                limit=limit,
+                points=shown,
+                part="clip",
+                joints=others,
+                frames=frames + first_frame,
+                times=_times(subject, clip, frames),
+            )
         )
-    ]
+    return findings
 
 
 def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]:
