@@ -11,24 +11,16 @@ SEVERITIES = ("note", "warning", "error")
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """One kind of finding.
-
-    Attributes
-    ----------
-    severity : str
-        One of ``SEVERITIES``; a diagnostic may override it.
-    title : str
-        Short description, for lists of codes.
-    remedy : str
-        Suggested remedy, a template without values.
-    other_remedy : str
-        Suggested remedy if no line is known; empty if it is the same.
-    """
+    """One kind of finding."""
 
     severity: str
+    """One of ``SEVERITIES``; a diagnostic may override it."""
     title: str
+    """Short description, for lists of codes."""
     remedy: str
+    """Suggested remedy, a template without values."""
     other_remedy: str = ""
+    """Suggested remedy if no line is known; empty if it is the same."""
 
     @property
     def hint(self) -> str:

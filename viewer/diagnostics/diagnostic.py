@@ -41,48 +41,33 @@ _LISTED = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnostic:
-    """An error, warning or note from a reader, check or operation.
-
-    Attributes
-    ----------
-    key : str
-        A key of ``MESSAGES``: code, dot, name of the message, as in ``"W004.vertices"``.
-    path : Path or None
-        The file that the message is about.
-    line : int or None
-        Line in that file, from 1.
-    part : str
-        Part of the figure or motion that ``places`` indexes. Readers replace the faulty elements
-        with neutral values.
-    places : (N,) int32 or None
-        Indices, ascending: vertices (positions, weights), triangles, joints (bindings, joints, and
-        items: boxes, limits and poses), channels of a clip, or rows of frames.
-    values : mapping of str to object
-        Values for the template.
-    count : int
-        Number of errors that it represents; 0 if it only adds indices to an error reported by
-        another diagnostic.
-    level : str
-        Severity, if different from that of the code.
-    is_refusal : bool
-        Whether ``load`` refuses the file because of it.
-    is_final : bool
-        Whether parsing of the file stopped there.
-    pointer : str
-        JSON pointer (RFC 6901) to the element of that file, as in ``"/skins/0/joints/3"``.
-    """
+    """An error, warning or note from a reader, check or operation."""
 
     key: str
+    """A key of ``MESSAGES``: code, dot, name of the message, as in ``"W004.vertices"``."""
     path: Path | None = None
+    """The file that the message is about."""
     line: int | None = None
+    """Line in that file, from 1."""
     part: Part = ""
+    """Part of the figure or motion that ``places`` indexes. Readers replace the faulty elements
+    with neutral values."""
     places: NDArray[np.int32] | None = None
+    """(N,): indices, ascending: vertices (positions, weights), triangles, joints (bindings, joints,
+    and items: boxes, limits and poses), channels of a clip, or rows of frames."""
     values: Mapping[str, Any] = field(default_factory=dict)
+    """Values for the template."""
     count: int = 1
+    """Number of errors that it represents; 0 if it only adds indices to an error reported by
+    another diagnostic."""
     level: str = ""
+    """Severity, if different from that of the code."""
     is_refusal: bool = False
+    """Whether ``load`` refuses the file because of it."""
     is_final: bool = False
+    """Whether parsing of the file stopped there."""
     pointer: str = ""
+    """JSON pointer (RFC 6901) to the element of that file, as in ``"/skins/0/joints/3"``."""
 
     @property
     def code(self) -> str:

@@ -15,22 +15,15 @@ from viewer.phrases import printable
 
 @dataclass
 class Record:
-    """Data of a run that is not in its printed text.
-
-    Attributes
-    ----------
-    diagnostics : list of dict
-        Warnings and notes as returned by ``described``; entries that are only text have just
-        ``severity`` and ``message``.
-    values : dict
-        Results as JSON data.
-    outputs : dict of str
-        Written files, in order, as keys.
-    """
+    """Data of a run that is not in its printed text."""
 
     diagnostics: list[dict[str, Any]] = field(default_factory=list)
+    """Warnings and notes as returned by ``described``; entries that are only text have just
+    ``severity`` and ``message``."""
     values: dict[str, Any] = field(default_factory=dict)
+    """Results as JSON data."""
     outputs: dict[str, None] = field(default_factory=dict)
+    """Written files, in order, as keys."""
 
 
 # Not a context variable: videos are encoded and written by separate threads.

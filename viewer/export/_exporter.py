@@ -11,45 +11,31 @@ from viewer.rig.scene import Actor
 
 @dataclass(frozen=True, slots=True)
 class Exporter:
-    """Properties of an exporter that menus need before its module is imported.
-
-    Attributes
-    ----------
-    title : str
-        Label in menus.
-    suffixes : tuple of str
-        With leading dots; ``"/"`` represents a folder.
-    keeps, omits : str
-        Data that its files contain, and data that they cannot store.
-    writes_pose : bool
-        Whether its module has ``export(actor, path, skinning)``.
-    writes_motion : bool
-        Whether its module has ``export_animation(animation, path, options)``.
-    keeps_world : bool
-        Whether it keeps the up axis of the motion's own world, even if that world is upside down.
-    writes_keys : bool
-        Whether its module has ``export_clips(actor, path, skinning, clips)``, which writes all
-        animations of a figure with their own keys.
-    writes_several : bool
-        Whether its module has ``export_figures``, which writes several figures to one file.
-    is_particular : bool
-        Whether its module has ``require(figure)``, which raises RigError for figures whose joints
-        the format cannot hold.
-    needs : "mesh", "skeleton" or ""
-        The part without which nothing of a figure can be written.
-    """
+    """Properties of an exporter that menus need before its module is imported."""
 
     title: str
+    """Label in menus."""
     suffixes: tuple[str, ...]
+    """With leading dots; ``"/"`` represents a folder."""
     keeps: str
     omits: str
+    """Data that its files contain, and data that they cannot store."""
     writes_pose: bool = True
+    """Whether its module has ``export(actor, path, skinning)``."""
     writes_motion: bool = False
+    """Whether its module has ``export_animation(animation, path, options)``."""
     keeps_world: bool = False
+    """Whether it keeps the up axis of the motion's own world, even if that world is upside down."""
     writes_keys: bool = False
+    """Whether its module has ``export_clips(actor, path, skinning, clips)``, which writes all
+    animations of a figure with their own keys."""
     writes_several: bool = False
+    """Whether its module has ``export_figures``, which writes several figures to one file."""
     is_particular: bool = False
+    """Whether its module has ``require(figure)``, which raises RigError for figures whose joints
+    the format cannot hold."""
     needs: Literal["mesh", "skeleton", ""] = ""
+    """The part without which nothing of a figure can be written."""
 
     def holds(self, actor: Actor) -> bool:
         """Return whether the actor's figure has the part that the format needs."""

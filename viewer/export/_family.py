@@ -30,34 +30,23 @@ _NEGLIGIBLE = 1e-6  # in metres; also the relative deviation of a scale from 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FamilyFrames:
-    """Poses of one body, V = R (X - J0) + J0 + t.
-
-    Attributes
-    ----------
-    member : Member
-        Model of the family.
-    vectors : (F, J, 3)
-        Rotation vectors in the member's own joint order, with angles up to pi.
-    translations : (F, 3)
-        t, metres.
-    roots : (F, 3) or (1, 3)
-        J0, the rest position of the root, metres.
-    shape, expression : (F, S) or (1, S)
-        Coefficients; one row if they are constant.
-    present : (F,) bool
-        Whether the person is present; the other arrays are filled elsewhere.
-    gender : str
-        Gender of the body.
-    """
+    """Poses of one body, V = R (X - J0) + J0 + t."""
 
     member: Member
+    """Model of the family."""
     vectors: Floats
+    """(F, J, 3): rotation vectors in the member's own joint order, with angles up to pi."""
     translations: Floats
+    """(F, 3): t, metres."""
     roots: Floats
+    """(F, 3) or (1, 3): J0, the rest position of the root, metres."""
     shape: Floats
     expression: Floats
+    """(F, S) or (1, S): coefficients; one row if they are constant."""
     present: Bools
+    """(F,): whether the person is present; the other arrays are filled elsewhere."""
     gender: str
+    """Gender of the body."""
 
     @property
     def has_expression(self) -> bool:

@@ -31,69 +31,46 @@ _CLOSED = "hold"  # default of formats that do not support missing frames
 
 @dataclass(frozen=True, slots=True)
 class VrmMeta:
-    """Meta data of a VRM character; empty values keep those of its file.
-
-    Attributes
-    ----------
-    name : str
-        Name of the character; that of the figure if it has no VRM file.
-    authors : tuple of str
-        At least one for figures from other files.
-    licence : str
-        Address of the licence.
-    upgrades : bool
-        Write characters from VRM 0.x files as VRM 1.0.
-    """
+    """Meta data of a VRM character; empty values keep those of its file."""
 
     name: str = ""
+    """Name of the character; that of the figure if it has no VRM file."""
     authors: tuple[str, ...] = ()
+    """At least one for figures from other files."""
     licence: str = ""
+    """Address of the licence."""
     upgrades: bool = False
+    """Write characters from VRM 0.x files as VRM 1.0."""
 
 
 @dataclass(slots=True)
 class MotionOptions:
-    """Options for writing a motion.
-
-    Attributes
-    ----------
-    unit : str
-        A key of ``viewer.rig.units.METRES``; empty for the format's default.
-    up : "y", "z" or ""
-        Up axis of the file; empty for the format's default.
-    rotation_order : str
-        One of ``ROTATION_ORDERS``.
-    quaternions : str
-        One of ``QUATERNIONS``.
-    gaps : str
-        A key of ``GAPS``; empty for the format's default: missing frames are omitted if the
-        format allows it, and held otherwise.
-    rest_frame : bool
-        Put the rest pose before the first frame.
-    digits : int
-        Decimals of text formats.
-    safe_names : bool
-        Write the names of joints with letters, digits and underscores only, each name once.
-    world_up : "y", "z", "-y" or "-z"
-        The up axis of the animation's world; negative axes are only for exporters that keep that
-        world.
-    skinning : Skinning
-        Skinning method and options, if vertices are written.
-    optimizes : bool
-        Quantise the vertices of glTF files.
-    """
+    """Options for writing a motion."""
 
     unit: str = ""
+    """A key of ``viewer.rig.units.METRES``; empty for the format's default."""
     up: str = ""
+    """One of "y", "z" or "": up axis of the file; empty for the format's default."""
     rotation_order: str = "zyx"
+    """One of ``ROTATION_ORDERS``."""
     quaternions: str = "xyzw"
+    """One of ``QUATERNIONS``."""
     gaps: str = ""
+    """A key of ``GAPS``; empty for the format's default: missing frames are omitted if the format
+    allows it, and held otherwise."""
     rest_frame: bool = False
+    """Put the rest pose before the first frame."""
     digits: int = 6
+    """Decimals of text formats."""
     safe_names: bool = False
+    """Write the names of joints with letters, digits and underscores only, each name once."""
     world_up: str = "y"
+    """One of "y", "z", "-y" or "-z": the up axis of the animation's world; negative axes are only
+    for exporters that keep that world."""
     skinning: Skinning = field(default_factory=Skinning)
+    """Skinning method and options, if vertices are written."""
     optimizes: bool = False
+    """Quantise the vertices of glTF files."""
 
     @property
     def closing(self) -> str:

@@ -219,31 +219,21 @@ def _error(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CourseSkeleton:
-    """A skeleton in the form of ``.skel`` files, whose joints only rotate about x, then y, then z.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-        Joints in depth-first order, with the pose as rest pose.
-    order : (J,) int32
-        The old index of each new joint.
-    turned : sequence of int
-        Old indices of joints whose three angles include a rest rotation, another order of rotations
-        or a constraint: they have no limits.
-    unlimited : sequence of int
-        Those of them that had limits.
-    is_scaled : bool
-        Whether the pose scales joints, which a ``.skel`` cannot: the bindings have to.
-    renamed : sequence of str
-        Names that the format cannot store.
-    """
+    """A skeleton in the form of ``.skel`` files: joints only rotate about x, then y, then z."""
 
     skeleton: Skeleton
+    """Joints in depth-first order, with the pose as rest pose."""
     order: Ints
+    """(J,): the old index of each new joint."""
     turned: Sequence[int]
+    """Old indices of joints whose three angles include a rest rotation, another order of rotations
+    or a constraint: they have no limits."""
     unlimited: Sequence[int]
+    """Those of them that had limits."""
     is_scaled: bool
+    """Whether the pose scales joints, which a ``.skel`` cannot: the bindings have to."""
     renamed: Sequence[str]
+    """Names that the format cannot store."""
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> _CourseSkeleton:

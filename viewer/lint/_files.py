@@ -96,24 +96,16 @@ def lint_files(
 
 @dataclass(slots=True)
 class Opened:
-    """Result of opening files.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene; figures without a match are separate actors.
-    contents : Contents
-        Contents of all files that were read.
-    findings : list of Finding
-        Findings about files that cannot be read or assembled, and messages of readers.
-    sources : dict of Path to Source
-        All files that were read, with their errors and the positions of their data.
-    """
+    """Result of opening files."""
 
     scene: Scene = field(default_factory=lambda: Scene([]))
+    """The scene; figures without a match are separate actors."""
     contents: Contents = field(default_factory=Contents)
+    """Contents of all files that were read."""
     findings: list[Finding] = field(default_factory=list)
+    """Findings about files that cannot be read or assembled, and messages of readers."""
     sources: dict[Path, Source] = field(default_factory=dict)
+    """All files that were read, with their errors and the positions of their data."""
 
 
 def open_files(

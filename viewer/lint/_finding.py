@@ -22,79 +22,56 @@ NO_TIMES: Floats = np.zeros(0)
 
 @dataclass(frozen=True, slots=True)
 class LintOptions:
-    """Check thresholds that depend on the user's purpose.
-
-    Attributes
-    ----------
-    max_speed : float or None
-        Maximum speed of a joint or keypoint, figure units per second; None for 15 times the
-        figure's size.
-    max_rotation : float
-        Maximum rotation rate of a joint relative to its parent, radians per second; by default
-        ``MAX_ROTATION``.
-    confidence : float
-        Captured keypoints below this have low confidence.
-    rate : float
-        Minimum sampling rate of keyed clips, per second.
-    frame_rate : float or None
-        Frames per second for numbering the frames of keyed clips; None for the rate of their keys.
-    ground : float, "auto" or "none"
-        Height of the ground along the scene's up axis; detected from the feet if
-        ``"auto"``; with ``"none"``, feet are not checked.
-    """
+    """Check thresholds that depend on the user's purpose."""
 
     max_speed: float | None = None
+    """Maximum speed of a joint or keypoint, figure units per second; None for 15 times the figure's
+    size."""
     max_rotation: float = float(np.radians(MAX_ROTATION))
+    """Maximum rotation rate of a joint relative to its parent, radians per second; by default
+    ``MAX_ROTATION``."""
     confidence: float = 0.3
+    """Captured keypoints below this have low confidence."""
     rate: float = 60.0
+    """Minimum sampling rate of keyed clips, per second."""
     frame_rate: float | None = None
+    """Frames per second for numbering the frames of keyed clips; None for the rate of their
+    keys."""
     ground: float | Literal["auto", "none"] = "auto"
+    """Height of the ground along the scene's up axis; detected from the feet if ``"auto"``; with
+    ``"none"``, feet are not checked."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """A diagnostic with its location in a scene.
-
-    Attributes
-    ----------
-    diagnostic : Diagnostic
-        The diagnostic, with file and line if known.
-    actor : int or None
-        Index in the scene.
-    name : str
-        Name of the actor.
-    part : "", "mesh", "skeleton" or "clip"
-        The part of the actor that the finding refers to.
-    vertices, triangles, joints : (N,) int32
-        Indices in the actor's figure, worst first; keypoints of captures are listed as joints.
-    frames : (N,) int32
-        Frame numbers as in the file, worst first.
-    times : (N,)
-        Times of these frames on the scene's clock, in seconds.
-    seek : float or None
-        Best time for viewing the finding, in seconds; None for the first of ``times``.
-    motion : str
-        Label of the animation that the finding is about, if the figure has several.
-    animation : int
-        Index of that animation, which need not be playing; -1 for none.
-    at : (str, int) or None
-        The first item of the message, whose position in the file the reader recorded:
-        ``("weights", 5)`` is the line of vertex 5's weights.
-    """
+    """A diagnostic with its location in a scene."""
 
     diagnostic: Diagnostic
+    """The diagnostic, with file and line if known."""
     actor: int | None = None
+    """Index in the scene."""
     name: str = ""
+    """Name of the actor."""
     part: Literal["", "mesh", "skeleton", "clip"] = ""
+    """The part of the actor that the finding refers to."""
     vertices: Ints = field(default_factory=lambda: NO_INDICES)
     triangles: Ints = field(default_factory=lambda: NO_INDICES)
     joints: Ints = field(default_factory=lambda: NO_INDICES)
+    """(N,): indices in the actor's figure, worst first; keypoints of captures are listed as
+    joints."""
     frames: Ints = field(default_factory=lambda: NO_INDICES)
+    """(N,): frame numbers as in the file, worst first."""
     times: Floats = field(default_factory=lambda: NO_TIMES)
+    """(N,): times of these frames on the scene's clock, in seconds."""
     seek: float | None = None
+    """Best time for viewing the finding, in seconds; None for the first of ``times``."""
     motion: str = ""
+    """Label of the animation that the finding is about, if the figure has several."""
     animation: int = -1
+    """Index of that animation, which need not be playing; -1 for none."""
     at: tuple[str, int] | None = None
+    """The first item of the message, whose position in the file the reader recorded: ``("weights",
+    5)`` is the line of vertex 5's weights."""
 
     @property
     def code(self) -> str:

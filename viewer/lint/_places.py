@@ -17,25 +17,18 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
-    """Positions that a finding refers to in the posed scene, in scene space.
-
-    Attributes
-    ----------
-    vertices : (N, 3)
-        Positions, worst first.
-    triangles : (T, 3, 3)
-        Corners of triangles; the worst triangle first.
-    joints : (J, 3)
-        Joints or visible captured points; for findings about a whole motion, the actor's position.
-    facing : (3,)
-        Mean normal of the marked surface: length 1 if it all faces one direction, 0 if it faces
-        all directions or there is no surface.
-    """
+    """Positions that a finding refers to in the posed scene, in scene space."""
 
     vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(N, 3): positions, worst first."""
     triangles: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    """(T, 3, 3): corners of triangles; the worst triangle first."""
     joints: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(J, 3): joints or visible captured points; for findings about a whole motion, the actor's
+    position."""
     facing: Floats = field(default_factory=lambda: np.zeros(3))
+    """(3,): mean normal of the marked surface: length 1 if it all faces one direction, 0 if it
+    faces all directions or there is no surface."""
 
 
 def places_of(

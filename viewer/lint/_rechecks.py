@@ -33,21 +33,14 @@ _LISTED = 3  # maximum number of files that a note lists
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recheck:
-    """Findings about an open scene and its files.
-
-    Attributes
-    ----------
-    findings : list of Finding
-        Findings as from ``lint_files``, for the current state of the scene.
-    n_files : int
-        Number of files that the scene was opened from.
-    notes : tuple of str
-        One line for each file that is missing or was changed.
-    """
+    """Findings about an open scene and its files."""
 
     findings: list[Finding]
+    """Findings as from ``lint_files``, for the current state of the scene."""
     n_files: int
+    """Number of files that the scene was opened from."""
     notes: tuple[str, ...]
+    """One line for each file that is missing or was changed."""
 
 
 def recheck(

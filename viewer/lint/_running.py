@@ -23,21 +23,14 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Properties of a check that are needed before its module is imported.
-
-    Attributes
-    ----------
-    title : str
-        Name of the checked part, for progress.
-    of_motion : bool
-        Whether it depends on an actor's motion; otherwise actors of one figure are checked once.
-    of_animations : bool
-        Whether it is repeated for each animation of a figure.
-    """
+    """Properties of a check that are needed before its module is imported."""
 
     title: str
+    """Name of the checked part, for progress."""
     of_motion: bool = False
+    """Whether it depends on an actor's motion; otherwise actors of one figure are checked once."""
     of_animations: bool = False
+    """Whether it is repeated for each animation of a figure."""
 
 
 CHECKS = {

@@ -59,39 +59,27 @@ _ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, within which a time cou
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subject:
-    """One actor to check.
-
-    Attributes
-    ----------
-    actor : Actor
-        The actor, which is not modified.
-    index : int
-        Index of the actor in its scene.
-    up : "y" or "z"
-        The scene's up axis.
-    options : LintOptions
-        Thresholds of the checks.
-    counting : Counting or None
-        Frame numbering of keyed clips; None to number each clip separately.
-    invalid : mapping of str to (N,)
-        Data that a reader replaced because the data in the file is invalid: vertices by
-        ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
-        ``"joints"``, rows by ``"frames"``.
-    people : tuple of Actor
-        All captured people of the scene, in its order.
-    tracks : list of Track
-        Cached track of the actor's clip; may be empty.
-    """
+    """One actor to check."""
 
     actor: Actor
+    """The actor, which is not modified."""
     index: int = 0
+    """Index of the actor in its scene."""
     up: Literal["y", "z"] = "y"
+    """The scene's up axis."""
     options: LintOptions = field(default_factory=LintOptions)
+    """Thresholds of the checks."""
     counting: Counting | None = None
+    """Frame numbering of keyed clips; None to number each clip separately."""
     invalid: Mapping[str, Ints] = field(default_factory=dict)
+    """Data that a reader replaced because the data in the file is invalid: vertices by
+    ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and ``"joints"``,
+    rows by ``"frames"``."""
     people: tuple[Actor, ...] = ()
+    """All captured people of the scene, in its order."""
     # Results that several checks need are computed once: ``track_of`` caches them here.
     tracks: list[Track] = field(default_factory=list)
+    """Cached track of the actor's clip; may be empty."""
 
     def valid(self, part: str, count: int) -> Bools:
         """Return which items are valid data of the file.
@@ -198,44 +186,31 @@ class Subject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """A motion evaluated frame by frame.
-
-    Attributes
-    ----------
-    times : (F,)
-        Times on the scene's clock, in seconds.
-    numbers : (F,) int32
-        Number of each frame in the file; for keyed clips, the frame of the timeline. Several rows
-        may have the same frame.
-    present : (F,) bool
-        Whether the row is defined: the actor is present, and the data of the file is valid.
-    positions : (F, J, 3)
-        Joints in scene space.
-    rotations : (F, J, 4)
-        Local rotations: unit quaternions.
-    stepped : (F, J) bool
-        Whether a key without interpolation, of the joint or of an ancestor, is between the previous
-        row and this one: such jumps are intended.
-    size : float
-        Size of the skeleton at rest, in scene units.
-    scale : float
-        Scene units per figure unit.
-    feet : (N,) int32
-        The joint of each foot nearest to the ground; empty unless joint names identify two feet.
-    soles : (F, N)
-        Height of each foot's lowest point in the scene.
-    """
+    """A motion evaluated frame by frame."""
 
     times: Floats
+    """(F,): times on the scene's clock, in seconds."""
     numbers: Ints
+    """(F,): number of each frame in the file; for keyed clips, the frame of the timeline. Several
+    rows may have the same frame."""
     present: Bools
+    """(F,): whether the row is defined: the actor is present, and the data of the file is valid."""
     positions: Floats
+    """(F, J, 3): joints in scene space."""
     rotations: Floats
+    """(F, J, 4): local rotations: unit quaternions."""
     stepped: Bools
+    """(F, J): whether a key without interpolation, of the joint or of an ancestor, is between the
+    previous row and this one: such jumps are intended."""
     size: float
+    """Size of the skeleton at rest, in scene units."""
     scale: float
+    """Scene units per figure unit."""
     feet: Ints
+    """(N,): the joint of each foot nearest to the ground; empty unless joint names identify two
+    feet."""
     soles: Floats
+    """(F, N): height of each foot's lowest point in the scene."""
 
     @property
     def n_frames(self) -> int:
@@ -353,21 +328,14 @@ def _known(subject: Subject, clip: JointMotion, count: int) -> Bools:
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """Frame numbering of a timeline.
-
-    Attributes
-    ----------
-    rate : float
-        Frames per second.
-    origin : float
-        Time of the first frame on the scene's clock, in seconds.
-    first : int
-        Number of the first frame.
-    """
+    """Frame numbering of a timeline."""
 
     rate: float
+    """Frames per second."""
     origin: float
+    """Time of the first frame on the scene's clock, in seconds."""
     first: int = 0
+    """Number of the first frame."""
 
     def numbers(self, times: Floats) -> Ints:
         """Return the frame shown at each time of the scene's clock: (N,) int32."""

@@ -200,24 +200,16 @@ def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TooFast:
-    """Joints that are faster than a limit between two frames.
-
-    Attributes
-    ----------
-    rate : float
-        The highest rate, per second.
-    worst : int
-        Row of the track at the end of the fastest movement.
-    rows : (N,)
-        One row for each frame with a joint above the limit, worst first.
-    joints : (J,)
-        Indices of the joints, fastest first.
-    """
+    """Joints that are faster than a limit between two frames."""
 
     rate: float
+    """The highest rate, per second."""
     worst: int
+    """Row of the track at the end of the fastest movement."""
     rows: Indices
+    """(N,): one row for each frame with a joint above the limit, worst first."""
     joints: Indices
+    """(J,): indices of the joints, fastest first."""
 
 
 def _too_fast(track: Track, rates: Floats, limit: float) -> _TooFast | None:

@@ -26,24 +26,16 @@ _LATER = 1.0  # maximum time between them, seconds
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Path:
-    """Path of one person through the scene.
-
-    Attributes
-    ----------
-    timing : Timing
-        Frames.
-    present : (F,) bool
-        Frames with a position.
-    places : (F, 3)
-        Positions of the root, or the mean of the visible points, scene space.
-    size : float
-        Size of the body, scene units.
-    """
+    """Path of one person through the scene."""
 
     timing: Timing
+    """Frames."""
     present: Bools
+    """(F,): frames with a position."""
     places: Floats
+    """(F, 3): positions of the root, or the mean of the visible points, scene space."""
     size: float
+    """Size of the body, scene units."""
 
 
 def check(subject: Subject) -> list[Finding]:

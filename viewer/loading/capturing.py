@@ -48,74 +48,50 @@ _COLORS = (
 
 @dataclass(slots=True, eq=False)
 class Builder:
-    """Converts the parts of one capture to actors whose clips grow.
-
-    Attributes
-    ----------
-    capture : Capture
-        The capture to read.
-    path : Path or None
-        Its file or folder, for messages.
-    model : Figure
-        The figure that shows its bodies.
-    model_of : callable or None
-        Returns the model for bodies of a shape space and messages, if the model depends on it.
-    gender : str
-        Gender of all people, as stated by the user; empty for that of the files.
-    called : str
-        Base name of all people; the capture's name if empty.
-    keeps_shape : bool
-        Whether the capture's shape coefficients are valid for the model.
-    placement : (4, 4)
-        Placement of every actor.
-    unit : str
-        Unit of the scene, to which later people are scaled; empty if it is unknown.
-    views : tuple of CameraView
-        Its cameras, in metres, before placement.
-    up : "y" or "z"
-        The axis along which people stand before placement.
-    n_read : int
-        Number of frames already added.
-    is_cut : bool
-        Whether reading was stopped before the end.
-    has_shape, has_expression : bool
-        Whether the files have nonzero shapes, and expressions.
-    target : Figure or None
-        Figure with different joints that the bodies move instead of the model.
-    swings : bool
-        Whether the spring joints of later people are simulated.
-    joint_map : JointMap or None
-        Joints of the target and the joints of the model that drive them; None to match them by
-        name.
-    plants_feet : bool
-        Whether the feet of the target still have to be planted.
-    hangs : bool
-        Whether the axis along which people stand points down before placement.
-    defers : bool
-        Whether the caller computes the final motions and passes them to ``finish``.
-    """
+    """Converts the parts of one capture to actors whose clips grow."""
 
     capture: Capture
+    """The capture to read."""
     model: Figure
+    """The figure that shows its bodies."""
     called: str = ""
+    """Base name of all people; the capture's name if empty."""
     model_of: Callable[[ShapeSpace], tuple[Figure, Sequence[Diagnostic]]] | None = None
+    """Returns the model for bodies of a shape space and messages, if the model depends on it."""
     gender: str = ""
+    """Gender of all people, as stated by the user; empty for that of the files."""
     keeps_shape: bool = True
+    """Whether the capture's shape coefficients are valid for the model."""
     placement: Floats = field(default_factory=lambda: np.eye(4))
+    """(4, 4): placement of every actor."""
     unit: str = ""
+    """Unit of the scene, to which later people are scaled; empty if it is unknown."""
     views: tuple[CameraView, ...] = ()
+    """Its cameras, in metres, before placement."""
     up: Literal["y", "z"] = "y"
+    """The axis along which people stand before placement."""
     n_read: int = 0
+    """Number of frames already added."""
     is_cut: bool = False
+    """Whether reading was stopped before the end."""
     has_shape: bool = False
     has_expression: bool = False
+    """Whether the files have nonzero shapes, and expressions."""
     path: Path | None = None
+    """Its file or folder, for messages."""
     target: Figure | None = None
+    """Figure with different joints that the bodies move instead of the model."""
     swings: bool = False
+    """Whether the spring joints of later people are simulated."""
     joint_map: JointMap | None = None
+    """Joints of the target and the joints of the model that drive them; None to match them by
+    name."""
     plants_feet: bool = True
+    """Whether the feet of the target still have to be planted."""
     hangs: bool = False
+    """Whether the axis along which people stand points down before placement."""
     defers: bool = False
+    """Whether the caller computes the final motions and passes them to ``finish``."""
     _names_shapes: bool = False  # whether any person has shape coefficients, even if all are 0
     _has_parameters: bool = False
     _grows: bool = True  # whether the motions of driven figures are computed part by part

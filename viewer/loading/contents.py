@@ -44,26 +44,13 @@ _LISTS = {
 
 @dataclass(slots=True)
 class Contents:
-    """Contents of several files by type, with the path of each.
-
-    Attributes
-    ----------
-    figures : list of (Path, Figure)
-        All figures, including the figures of groups.
-    groups : list of FigureGroup
-        Figures of one file, which keep their positions relative to each other and to their cameras.
-    called : dict
-        Figure names by resolved file, if another file specifies one.
-    diagnostics : tuple of Diagnostic
-        Messages from the readers.
-    files : tuple of Path
-        All files that were read.
-    used_options : set of str or None
-        Options that had an effect on the contents; None if unused options are not to be reported.
-    """
+    """Contents of several files by type, with the path of each."""
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
+    """All figures, including the figures of groups."""
     groups: list[FigureGroup] = field(default_factory=list)
+    """Figures of one file, which keep their positions relative to each other and to their
+    cameras."""
     clips: list[tuple[Path, Clip]] = field(default_factory=list)
     poses: list[tuple[Path, PoseRecord]] = field(default_factory=list)
     pictures: list[tuple[Path, Bytes]] = field(default_factory=list)
@@ -72,9 +59,13 @@ class Contents:
     captures: list[tuple[Path, Capture]] = field(default_factory=list)
     morphs: list[tuple[Path, MorphTarget]] = field(default_factory=list)
     called: dict[Path, str] = field(default_factory=dict)
+    """Figure names by resolved file, if another file specifies one."""
     diagnostics: tuple[Diagnostic, ...] = ()
+    """Messages from the readers."""
     files: tuple[Path, ...] = ()
+    """All files that were read."""
     used_options: set[str] | None = None
+    """Options that had an effect on the contents; None if unused options are not to be reported."""
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -18,43 +18,29 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class SceneDraft:
-    """The actors of a scene under construction.
-
-    Attributes
-    ----------
-    actors : list of Actor
-        Actors of opened figures come first.
-    ups : list of "y" or "z"
-        The up axis of each actor.
-    placed : list of bool
-        Whether each actor's motion determines its position.
-    groups : list of FigureGroup or None
-        Group of each actor's figure; its actors keep their positions relative to each other.
-    builders : list of Builder
-        Captures that are still being read.
-    views : list of CameraView
-        Calibrated cameras, in scene space.
-    images : CameraImages or None
-        Images of the cameras: those of the first capture that has any.
-    diagnostics : list of Diagnostic
-        Messages from assembling the scene.
-    used_options : set of str
-        Options that had an effect; ``begin`` reports the others.
-    files : list of Path
-        Files of body models, which are not among the opened files; the scene's list, once there
-        is a scene.
-    """
+    """The actors of a scene under construction."""
 
     actors: list[Actor]
+    """Actors of opened figures come first."""
     ups: list[str] = field(default_factory=list)
+    """List of "y" or "z": the up axis of each actor."""
     placed: list[bool] = field(default_factory=list)
+    """Whether each actor's motion determines its position."""
     groups: list[FigureGroup | None] = field(default_factory=list)
+    """Group of each actor's figure; its actors keep their positions relative to each other."""
     builders: list[Builder] = field(default_factory=list)
+    """Captures that are still being read."""
     views: list[CameraView] = field(default_factory=list)
+    """Calibrated cameras, in scene space."""
     images: CameraImages | None = None
+    """Images of the cameras: those of the first capture that has any."""
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    """Messages from assembling the scene."""
     used_options: set[str] = field(default_factory=set)
+    """Options that had an effect; ``begin`` reports the others."""
     files: list[Path] = field(default_factory=list)
+    """Files of body models, which are not among the opened files; the scene's list, once there is a
+    scene."""
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
         """Record a message, with the values of its template, about a file if ``path`` is given."""

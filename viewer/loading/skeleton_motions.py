@@ -39,21 +39,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lone:
-    """A motion that does not drive a figure.
-
-    Attributes
-    ----------
-    path : Path
-        Its file.
-    motion : SkeletonMotion
-        The motion, with the requested settings applied.
-    actor : Actor
-        The motion's skeleton in the scene.
-    """
+    """A motion that does not drive a figure."""
 
     path: Path
+    """Its file."""
     motion: SkeletonMotion
+    """The motion, with the requested settings applied."""
     actor: Actor
+    """The motion's skeleton in the scene."""
 
 
 def give_skeleton_motion(

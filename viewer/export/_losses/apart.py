@@ -59,22 +59,15 @@ class Farthest:
 
 @dataclass(frozen=True, slots=True)
 class Apart:
-    """Distances above the rounding error.
-
-    Attributes
-    ----------
-    joints, vertices : Farthest or None
-        The largest distances; None if negligible or if there are no joints or vertices.
-    looked : int
-        Number of frames whose vertices were compared; limited to keep the time short.
-    frames : int
-        Number of all frames.
-    """
+    """Distances above the rounding error."""
 
     joints: Farthest | None
     vertices: Farthest | None
+    """The largest distances; None if negligible or if there are no joints or vertices."""
     looked: int
+    """Number of frames whose vertices were compared; limited to keep the time short."""
     frames: int
+    """Number of all frames."""
 
 
 def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:

@@ -155,21 +155,14 @@ def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
 # samples are refined.
 @dataclass(frozen=True, slots=True, eq=False)
 class _WorstTimes:
-    """Candidate times of the largest distance.
-
-    Attributes
-    ----------
-    times : (T,)
-        Candidate times, seconds.
-    looked : int
-        Number of sampled times.
-    is_estimate : bool
-        Whether there were too few samples to be certain.
-    """
+    """Candidate times of the largest distance."""
 
     times: Floats
+    """(T,): candidate times, seconds."""
     looked: int
+    """Number of sampled times."""
     is_estimate: bool
+    """Whether there were too few samples to be certain."""
 
 
 def key_times(clip: Clip | TransformClip, start: float, stop: float) -> Floats:

@@ -36,69 +36,45 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """The pose-independent data of a body.
-
-    Attributes
-    ----------
-    positions : (V, 3)
-        Rest mesh in the reference shape.
-    skin : Skin
-        Skin in which every vertex has an influence; the last joint is the whole figure.
-    shapes : (S, V, 3) or None
-        Blend shapes whose weights change over time.
-    correctives : (P, V, 3) or None
-        Pose correctives.
-    """
+    """The pose-independent data of a body."""
 
     positions: Floats
+    """(V, 3): rest mesh in the reference shape."""
     skin: Skin
+    """Skin in which every vertex has an influence; the last joint is the whole figure."""
     shapes: Floats | None = None
+    """(S, V, 3): blend shapes whose weights change over time."""
     correctives: Floats | None = None
+    """(P, V, 3): pose correctives."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:
-    """The pose-dependent data of a body in F poses.
-
-    Attributes
-    ----------
-    places : (F, J, 3)
-        Joint positions.
-    palette : (F, J + 1, 4, 4)
-        Skinning matrices; the last one is that of the whole figure. Without a body, it is the
-        only one.
-    shifts : (F, 3)
-        Translations added to the vertices after skinning, independent of weights.
-    weights : (F, S) or (1, S)
-        Weights of the blend shapes, relative to the reference shape.
-    corrective_weights : (F, P)
-        Weights of the correctives; no columns if there are none.
-    """
+    """The pose-dependent data of a body in F poses."""
 
     places: Floats
+    """(F, J, 3): joint positions."""
     palette: Floats
+    """Skinning matrices; the last one is that of the whole figure. Without a body, it is the only
+    one."""
     shifts: Floats
+    """(F, 3): translations added to the vertices after skinning, independent of weights."""
     weights: Floats
+    """(F, S) or (1, S): weights of the blend shapes, relative to the reference shape."""
     corrective_weights: Floats
+    """(F, P): weights of the correctives; no columns if there are none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """One of two compared bodies.
-
-    Attributes
-    ----------
-    body : Body or None
-        The body; None without a mesh.
-    poses : callable
-        Function from frame indices to poses.
-    exact : callable or None
-        Function from one frame index to its vertices (V, 3), if skinning is not linear.
-    """
+    """One of two compared bodies."""
 
     body: Body | None
+    """The body; None without a mesh."""
     poses: Callable[[Rows], Poses]
+    """Function from frame indices to poses."""
     exact: Callable[[int], Floats] | None = None
+    """Function from one frame index to its vertices (V, 3), if skinning is not linear."""
 
 
 def figure_side(

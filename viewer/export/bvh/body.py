@@ -33,43 +33,28 @@ _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Space:
-    """Transform from a figure's space to the file's.
-
-    Attributes
-    ----------
-    rest : (3, 3)
-        Matrix from figure axes to file axes, e.
-    world : (3, 3)
-        Matrix from world axes to file axes, x.
-    factor : float
-        Scale factor from the figure's unit to the file's.
-    """
+    """Transform from a figure's space to the file's."""
 
     rest: Floats
+    """(3, 3): matrix from figure axes to file axes, e."""
     world: Floats
+    """(3, 3): matrix from world axes to file axes, x."""
     factor: float
+    """Scale factor from the figure's unit to the file's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """Contents of a file: J joints in the figure's order, F frames.
-
-    Attributes
-    ----------
-    offsets : (J, 3)
-        Offset at rest from the parent; for roots, from the figure's origin.
-    angles : (F, J, 3)
-        Radians, in the order of the rotation channels.
-    positions : (F, J, 3)
-        Relative to the parent, including the offset; for roots, in the file's space.
-    moves : (J,) bool
-        Joints whose positions differ from the offset.
-    """
+    """Contents of a file: J joints in the figure's order, F frames."""
 
     offsets: Floats
+    """(J, 3): offset at rest from the parent; for roots, from the figure's origin."""
     angles: Floats
+    """(F, J, 3): radians, in the order of the rotation channels."""
     positions: Floats
+    """(F, J, 3): relative to the parent, including the offset; for roots, in the file's space."""
     moves: Bools
+    """(J,): joints whose positions differ from the offset."""
 
 
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:

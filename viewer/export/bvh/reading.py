@@ -45,27 +45,18 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BvhFile:
-    """A written file.
-
-    Attributes
-    ----------
-    motion : SkeletonMotion
-        Contents, or some of the frames.
-    order : (J,)
-        Place of each of the figure's joints among the joints of the file.
-    space : Space
-        Transform from the figure's space to the file's.
-    reference : int
-        Frame that defines the shape and scale of the file's bones.
-    ahead : int
-        Index of the animation's first frame in this motion; negative if the motion begins later.
-    """
+    """A written file."""
 
     motion: SkeletonMotion
+    """Contents, or some of the frames."""
     order: Ints
+    """(J,): place of each of the figure's joints among the joints of the file."""
     space: Space
+    """Transform from the figure's space to the file's."""
     reference: int
+    """Frame that defines the shape and scale of the file's bones."""
     ahead: int
+    """Index of the animation's first frame in this motion; negative if the motion begins later."""
 
 
 def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> Side:

@@ -41,23 +41,16 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """An animation of a figure without a mesh, as consecutive parts.
-
-    Attributes
-    ----------
-    parts : callable
-        Yields the parts, in which the figure is always present; may be called repeatedly. Scales
-        and shape are the same in all frames.
-    n_frames : int
-        Number of all frames, N.
-    may_move_inner_joints : bool
-        Whether a joint with a parent may be translated in the file; several roots get a common
-        parent.
-    """
+    """An animation of a figure without a mesh, as consecutive parts."""
 
     parts: Callable[[], Iterator[SampledAnimation]]
+    """Yields the parts, in which the figure is always present; may be called repeatedly. Scales and
+    shape are the same in all frames."""
     n_frames: int
+    """Number of all frames, N."""
     may_move_inner_joints: bool
+    """Whether a joint with a parent may be translated in the file; several roots get a common
+    parent."""
 
 
 def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[Diagnostic]:

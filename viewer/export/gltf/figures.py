@@ -54,26 +54,18 @@ _PARALLEL = 1.0 - 1e-9  # rotations with a larger cosine are interpolated linear
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Added:
-    """A figure in a file.
-
-    Attributes
-    ----------
-    figure, pose : Figure, Pose or None
-        The original, in the pose that was written.
-    body, built : Body, Built
-        The written form, and its indices in the file.
-    clips : sequence of TransformClip or None
-        The animations to write; None if only the pose was written.
-    kept : dict of TransformClip
-        Animations with an effect, by index in the file.
-    """
+    """A figure in a file."""
 
     figure: Figure
     pose: Pose | None
+    """The original, in the pose that was written."""
     body: Body
     built: Built
+    """The written form, and its indices in the file."""
     clips: Sequence[TransformClip] | None
+    """The animations to write; None if only the pose was written."""
     kept: Mapping[int, TransformClip]
+    """Animations with an effect, by index in the file."""
 
 
 def add_figure(

@@ -27,33 +27,22 @@ from viewer.rig.skinning import METHODS, Skinning
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """A written file, and indices of its contents.
-
-    Attributes
-    ----------
-    path : Path
-        Path of the file.
-    file : GltfFile
-        Its parsed contents.
-    tree : Tree
-        Indices of the nodes.
-    meshes : list of Placed
-        Its meshes.
-    start : int
-        Frame of the figure that comes first in the file.
-    keys : dict, optional
-        Animated values of each frame; by default, the file's keys, one per frame.
-    animations : sequence of int
-        Indices of the figure's animations.
-    """
+    """A written file, and indices of its contents."""
 
     path: Path
+    """Path of the file."""
     file: GltfFile
+    """Its parsed contents."""
     tree: Tree
+    """Indices of the nodes."""
     meshes: list[Placed]
+    """Its meshes."""
     start: int = 0
+    """Frame of the figure that comes first in the file."""
     keys: Keys | None = None
+    """Animated values of each frame; by default, the file's keys, one per frame."""
     animations: Sequence[int] = ()
+    """Indices of the figure's animations."""
 
     @property
     def sources(self) -> Ints:

@@ -179,39 +179,27 @@ def _primitives(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """Triangles of a mesh that become a glTF mesh with a node.
-
-    Attributes
-    ----------
-    index : int
-        Index into the mesh's parts; -1 for triangles without a part, or for a whole mesh.
-    name, mesh_name : str
-        Names of the node and of the mesh.
-    joint : int
-        Joint whose node contains the mesh, because all vertices follow it rigidly; -1 if a skin
-        moves them.
-    sources, uv_indices : (R,) int32
-        Vertex and texture coordinate of the figure that each written vertex copies.
-    triangles : (T, 3) int32
-        Indices into the written vertices.
-    materials : (T,) int32
-        Material of each triangle, -1 for none.
-    targets : (M,) int
-        The part's morph targets, as indices into ``Shape.targets``.
-    target_names : tuple of M str
-        Their names.
-    """
+    """Triangles of a mesh that become a glTF mesh with a node."""
 
     index: int
+    """Index into the mesh's parts; -1 for triangles without a part, or for a whole mesh."""
     name: str
     mesh_name: str
+    """Names of the node and of the mesh."""
     joint: int
+    """Joint whose node contains the mesh, because all vertices follow it rigidly; -1 if a skin
+    moves them."""
     sources: Ints
     uv_indices: Ints
+    """(R,): vertex and texture coordinate of the figure that each written vertex copies."""
     triangles: Ints
+    """(T, 3): indices into the written vertices."""
     materials: Ints
+    """(T,): material of each triangle, -1 for none."""
     targets: NDArray[np.intp]
+    """(M,): the part's morph targets, as indices into ``Shape.targets``."""
     target_names: tuple[str, ...]
+    """Their names."""
 
 
 def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Part]:
@@ -328,26 +316,18 @@ def _moves(offsets: Floats, sources: Ints) -> bool:
 
 @dataclass(slots=True, eq=False)
 class Encoding:
-    """Writer of vertex attributes.
-
-    Attributes
-    ----------
-    document : Document
-        Modified in place.
-    center, reach : (3,), float
-        Quantised positions are (p - center) / reach, in -1 to 1.
-    is_quantized : bool
-        Whether attributes are integers.
-    errors : dict of float
-        Largest rounding error of each kind of attribute: ``positions`` in figure units, ``normals``
-        in radians, ``uvs``, ``weights``.
-    """
+    """Writer of vertex attributes."""
 
     document: Document
+    """Modified in place."""
     center: Floats = field(default_factory=lambda: np.zeros(3))
     reach: float = 1.0
+    """(3,): quantised positions are (p - center) / reach, in -1 to 1."""
     is_quantized: bool = False
+    """Whether attributes are integers."""
     errors: dict[str, float] = field(default_factory=dict)
+    """Largest rounding error of each kind of attribute: ``positions`` in figure units, ``normals``
+    in radians, ``uvs``, ``weights``."""
 
     @property
     def decoding(self) -> Floats:

@@ -37,39 +37,26 @@ _Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Locals:
-    """Joint transforms relative to their parents.
-
-    Attributes
-    ----------
-    translations, rotations, scales : (J, 3), (J, 4), (J, 3)
-        Figure units, unit quaternions (x, y, z, w), factors.
-    """
+    """Joint transforms relative to their parents."""
 
     translations: Floats
     rotations: Floats
     scales: Floats
+    """(J, 3): figure units, unit quaternions (x, y, z, w), factors."""
 
 
 @dataclass(slots=True)
 class Tree:
-    """Indices of nodes.
-
-    Attributes
-    ----------
-    root : int
-        The topmost node.
-    place : int
-        The node that moves the whole figure; -1 if there is none.
-    joints : list of J int
-        Nodes of the joints, in the figure's order.
-    fixed : list of int
-        The node of vertices without influence, if there are any.
-    """
+    """Indices of nodes."""
 
     root: int
+    """The topmost node."""
     place: int
+    """The node that moves the whole figure; -1 if there is none."""
     joints: list[int]
+    """Nodes of the joints, in the figure's order."""
     fixed: list[int]
+    """The node of vertices without influence, if there are any."""
 
 
 def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:

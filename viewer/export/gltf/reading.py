@@ -74,21 +74,14 @@ def parsed(files: list[bytes]) -> GltfFile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A mesh in a file, and the figure's vertices in it.
-
-    Attributes
-    ----------
-    node : int
-        Its node.
-    part : Part
-        The part from which it was written.
-    decoding : (4, 4)
-        From positions in the file, which may be quantised, to the figure's.
-    """
+    """A mesh in a file, and the figure's vertices in it."""
 
     node: int
+    """Its node."""
     part: Part
+    """The part from which it was written."""
     decoding: Floats = field(default_factory=lambda: np.eye(4))
+    """(4, 4): from positions in the file, which may be quantised, to the figure's."""
 
 
 def read_back(

@@ -30,21 +30,14 @@ from viewer.rig.skeleton import joint_label
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedMotion:
-    """A sampled motion of an actor in a scene.
-
-    Attributes
-    ----------
-    actor : Actor
-        The actor, as returned by ``placed_actor``.
-    animation : SampledAnimation
-        Its frames.
-    up : "y" or "z"
-        The up axis of the frames.
-    """
+    """A sampled motion of an actor in a scene."""
 
     actor: Actor
+    """The actor, as returned by ``placed_actor``."""
     animation: SampledAnimation
+    """Its frames."""
     up: str
+    """One of "y" or "z": the up axis of the frames."""
 
     @property
     def start(self) -> float:
@@ -59,27 +52,18 @@ class PlacedMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampled:
-    """A motion in the form that glTF can store.
-
-    Attributes
-    ----------
-    animation : SampledAnimation
-        The original.
-    frames : Frames
-        Its frames, with gaps filled.
-    body : Body
-        The written form of its figure.
-    up : str
-        Up axis of the frames.
-    color : (r, g, b) or None
-        Linear colour of surfaces without a colour; None for the default.
-    """
+    """A motion in the form that glTF can store."""
 
     animation: SampledAnimation
+    """The original."""
     frames: Frames
+    """Its frames, with gaps filled."""
     body: Body
+    """The written form of its figure."""
     up: str
+    """Up axis of the frames."""
     color: Color | None = None
+    """Linear colour of surfaces without a colour; None for the default."""
 
 
 def placed_actor(scene: Scene, actor: Actor) -> Actor:

@@ -32,27 +32,18 @@ _MOST_TARGETS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Influences:
-    """A skin in the form that a file can store.
-
-    Attributes
-    ----------
-    skin : Skin
-        Skin with unique joints per vertex, strongest first, and positive weights that sum to 1.
-    n_scaled : int
-        Number of vertices whose weights did not sum to 1.
-    n_negative : int
-        Number of vertices with negative weights, which glTF forbids.
-    n_fixed : int
-        Number of vertices without influence.
-    most : int
-        Largest number of influences of a vertex.
-    """
+    """A skin in the form that a file can store."""
 
     skin: Skin
+    """Skin with unique joints per vertex, strongest first, and positive weights that sum to 1."""
     n_scaled: int
+    """Number of vertices whose weights did not sum to 1."""
     n_negative: int
+    """Number of vertices with negative weights, which glTF forbids."""
     n_fixed: int
+    """Number of vertices without influence."""
     most: int
+    """Largest number of influences of a vertex."""
 
     @property
     def n_joints(self) -> int:
@@ -131,24 +122,16 @@ def inverse_bind_matrices(influences: Influences, inverse_bind: Floats, decoding
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """The written form of a figure's shape.
-
-    Attributes
-    ----------
-    figure : Figure
-        Figure whose mesh, skeleton and skin are written.
-    targets : (M,) int
-        Blend shapes that become morph targets.
-    weights : (F, M) or (1, M)
-        Weights of the targets over time.
-    baked : (S,) or None
-        The shape baked into the mesh instead; None if there is none.
-    """
+    """The written form of a figure's shape."""
 
     figure: Figure
+    """Figure whose mesh, skeleton and skin are written."""
     targets: NDArray[np.intp]
+    """(M,): blend shapes that become morph targets."""
     weights: Floats
+    """(F, M) or (1, M): weights of the targets over time."""
     baked: Floats | None = None
+    """(S,): the shape baked into the mesh instead; None if there is none."""
 
 
 def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
