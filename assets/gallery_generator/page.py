@@ -15,9 +15,9 @@ _HEAD = """<!-- Written by assets/make_gallery.py: make gallery -->
 
 Pictures of bundled data only, and the commands that drew them, with the options
 `{common}`. `make gallery` draws them again, and
-fails if 0.1 % of the pixels are overexposed or black. `walk` and `capture` are synthetic recordings
-in EasyMocap's layout, `scan.obj` a person without a rig, `body.npz` the bundled body;
-`assets/gallery_generator/` makes them.
+fails if more than 0.1 % of the pixels of a picture are overexposed or black. `walk` and `capture`
+are synthetic recordings in EasyMocap's layout, `scan.obj` is a person without a rig, and `body.npz`
+is the bundled body. `assets/gallery_generator/` makes them.
 """
 _WIDTH = 96
 
