@@ -10,8 +10,8 @@ from viewer.loading import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.motion.body_motion import ParameterMotion
 from viewer.rig.motion.evaluation import pose_actor
-from viewer.rig.motion.parameter_clip import ParameterMotion
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import deform
 

@@ -22,9 +22,8 @@ from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.body_motion import BodyMotion, body_clip, parameter_clip
 from viewer.rig.motion.evaluation import frame_rate, pose_actor
-from viewer.rig.motion.parameter_clip import parameter_clip
 from viewer.rig.motion.sampled_clip import SampledClip, joined, with_rate
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rig.geometry.shell import _has_long_borders, shell_of
-from viewer.rig.geometry.topology import welded
+from viewer.rig.geometry.topology import _has_long_borders, shell_of, welded
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import skin_from_lists
 

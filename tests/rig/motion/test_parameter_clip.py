@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import RigError
 from viewer.formats import Source, read
+from viewer.rig.motion.body_motion import ParameterMotion, parameter_clip
 from viewer.rig.motion.evaluation import pose_actor
-from viewer.rig.motion.parameter_clip import ParameterMotion, parameter_clip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform

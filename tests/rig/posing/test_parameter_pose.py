@@ -9,7 +9,7 @@ from rig.hand_made import skeleton
 from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.rig.figure import Figure
-from viewer.rig.motion.parameter_clip import parameter_pose
+from viewer.rig.motion.body_motion import parameter_pose
 from viewer.rig.skinning import deform
 
 

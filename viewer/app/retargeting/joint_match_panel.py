@@ -36,7 +36,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import full_map, matches_of
 from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.retargeting.joint_positions import front_axes, rest_positions
+from viewer.rig.retargeting.rest_positions import front_axes, rest_positions
 from viewer.rig.skeleton import joint_label, joint_labels, shown_joints
 
 _ORIGINS = {

@@ -21,8 +21,7 @@ from viewer.rig.captures.capture import Capture, CapturePart, RestRoots, capture
 from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.parameter_clip import ParameterMotion
+from viewer.rig.motion.body_motion import BodyMotion, ParameterMotion
 from viewer.rig.motion.timing import Timing
 
 _LARGEST = 1 << 20  # maximum width and height of a video, pixels

@@ -16,7 +16,7 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.joint_spheres import box_spheres, skin_spheres
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.shell import Shell
+from viewer.rig.geometry.topology import Shell
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.pose import Pose

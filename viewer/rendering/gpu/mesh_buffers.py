@@ -27,7 +27,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import active_rows
 from viewer.rig.bodies.offsets import SparseOffsets
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.shell import Shell, shell_of
+from viewer.rig.geometry.topology import Shell, shell_of
 from viewer.rig.mesh import bounding_box, visible_vertices
 from viewer.rig.skin import Skin, has_influence, strongest_first, weight_sums
 from viewer.rig.skinning import Skinning, skin_used

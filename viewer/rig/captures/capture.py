@@ -10,8 +10,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraImages, CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.parameter_clip import ParameterMotion
+from viewer.rig.motion.body_motion import BodyMotion, ParameterMotion
 from viewer.rig.motion.timing import DEFAULT_RATE
 
 RestRoots = Callable[[Floats | None], Floats]
