@@ -1,4 +1,9 @@
-"""Topology of triangle meshes: welded vertices, shared edges, components, orientation."""
+"""Topology of triangle meshes: welded vertices, shared edges, components, orientation, shells.
+
+A shell is a closed surface, up to small openings, whose inside is hidden. A ray from outside hits
+the front of such a surface before its back, unless it enters through an opening. It hits the back
+first only if skinning turns the surface inside out.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +16,14 @@ from viewer.rig.mesh import Mesh, area_vectors
 from viewer.rig.skin import Skin, skin_rows
 
 Indices = NDArray[np.int64]
+
+# Maximum number of triangles, above which the check takes longer than it saves.
+_MOST_TRIANGLES = 500_000
+_MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
+
+# Maximum squared number of edges of openings per triangle for which the volume's sign is reliable.
+_CLOSED = 0.25
+_HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
@@ -146,20 +159,6 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     mostly = against * 2 > members
     flipped = (is_against != mostly[component]) & ~one_sided
     return component, flipped, one_sided
-
-
-# Closed surfaces, up to small openings: their inside is hidden.
-#
-# A ray from outside hits the front of such a surface before its back, unless it enters through an
-# opening. It hits the back first only if skinning turns the surface inside out.
-
-# Maximum number of triangles, above which the check takes longer than it saves.
-_MOST_TRIANGLES = 500_000
-_MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
-
-# Maximum squared number of edges of openings per triangle for which the volume's sign is reliable.
-_CLOSED = 0.25
-_HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
 
 
 @dataclass(frozen=True, slots=True, eq=False)
