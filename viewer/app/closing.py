@@ -1,11 +1,10 @@
-"""Decision whether the window may close, or files may replace the scene, or the user is asked."""
+"""Unsaved changes: whether the window may close, or files may replace the scene, or a question."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import imgui
@@ -34,11 +33,20 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, pose_of
 from viewer.rig.scene import Actor, figure_pose
 
-if TYPE_CHECKING:
-    pass
-
-
 _MOST_LISTED = 6
+_LONGEST = 40  # maximum length of a name in characters
+# Rounding of a clip that is evaluated for one actor or for many, in lengths and radians.
+_SAME = 1e-9
+_VALUES = (
+    "dofs",
+    "translations",
+    "rotations",
+    "scales",
+    "shape_weights",
+    "figure_scale",
+    "figure_translation",
+)
+_WIDTH = 28.0  # in font sizes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +66,48 @@ class _Question:
     title: str
     lines: tuple[str, ...]
     answers: tuple[tuple[str, str, Callable[[AppState], None]], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unsaved:
+    """Edits that would be lost.
+
+    Attributes
+    ----------
+    text : str
+        Description of the edits.
+    ask : callable
+        Opens the dialog that saves them, given the state.
+    """
+
+    text: str
+    ask: Callable[[AppState], None]
+
+
+@dataclass(slots=True)
+class Closing:
+    """Progress of a request to quit; also used before files replace the scene.
+
+    Attributes
+    ----------
+    is_requested : bool
+        Whether the user asked to quit.
+    waits : bool
+        Whether the running job is finished first.
+    discards : bool
+        Whether the user agreed to lose the unsaved edits.
+    is_over : bool
+        Whether the window closes.
+    """
+
+    is_requested: bool = False
+    waits: bool = False
+    discards: bool = False
+    is_over: bool = False
+
+    def withdraw(self) -> None:
+        """Keep the window open until the user asks to quit again."""
+        self.is_requested = self.waits = self.discards = False
 
 
 def request_quit(state: AppState) -> None:
@@ -117,8 +167,6 @@ def _job(state: AppState) -> Job | None:
 
 def _edits(state: AppState) -> list[_Unsaved]:
     """Return the unsaved edits that the user has not agreed to lose."""
-    # Imports panels, which are otherwise loaded on first use.
-
     # The edits of this frame count too.
     state.history.observe(state.scene, state.options, busy=False)
     return [] if state.of(Closing).discards else unsaved_edits(state)
@@ -166,37 +214,6 @@ def _about_edits(edits: list[_Unsaved], purpose: str) -> _Question:
             ("Cancel##closing", "continue as before", keep_open),
         ),
     )
-
-
-_LONGEST = 40  # maximum length of a name in characters
-
-# Rounding of a clip that is evaluated for one actor or for many, in lengths and radians.
-_SAME = 1e-9
-_VALUES = (
-    "dofs",
-    "translations",
-    "rotations",
-    "scales",
-    "shape_weights",
-    "figure_scale",
-    "figure_translation",
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Unsaved:
-    """Edits that would be lost.
-
-    Attributes
-    ----------
-    text : str
-        Description of the edits.
-    ask : callable
-        Opens the dialog that saves them, given the state.
-    """
-
-    text: str
-    ask: Callable[[AppState], None]
 
 
 def unsaved_edits(state: AppState) -> list[_Unsaved]:
@@ -312,9 +329,6 @@ def _rigs(state: AppState) -> list[_Unsaved]:
     return [_Unsaved(text, lambda state: ask_where_to_save_rig(state, result))]
 
 
-_WIDTH = 28.0  # in font sizes
-
-
 def draw_question(state: AppState) -> None:
     """Draw the question above everything else if there is one, and apply the answer."""
     question = question_of(state)
@@ -343,29 +357,3 @@ def draw_question(state: AppState) -> None:
     imgui.end_popup()
     if answer is not None:
         answer(state)
-
-
-@dataclass(slots=True)
-class Closing:
-    """Progress of a request to quit; also used before files replace the scene.
-
-    Attributes
-    ----------
-    is_requested : bool
-        Whether the user asked to quit.
-    waits : bool
-        Whether the running job is finished first.
-    discards : bool
-        Whether the user agreed to lose the unsaved edits.
-    is_over : bool
-        Whether the window closes.
-    """
-
-    is_requested: bool = False
-    waits: bool = False
-    discards: bool = False
-    is_over: bool = False
-
-    def withdraw(self) -> None:
-        """Keep the window open until the user asks to quit again."""
-        self.is_requested = self.waits = self.discards = False

@@ -1,4 +1,15 @@
-"""Detection of a display on which a window can be opened, with the reason if there is none."""
+"""The display: whether a window can be opened on it, and what happens when it is lost.
+
+Xlib exits the process after an error, and after the loss of the connection, with its own message
+and exit code 1. It has one handler for each, which a program can replace.
+
+A request about a window that no longer exists is an error. GLFW answers programs that drag files
+onto the window, and that paste from it; if such a program ends before it is answered, the answer is
+lost, and nothing else is wrong. So those errors are ignored, and all others are left to Xlib.
+
+The handler of a lost connection must not return: OpenGL drivers would use replies that the X server
+never sent, and crash. So it does all of the clean-up.
+"""
 
 from __future__ import annotations
 
@@ -81,19 +92,6 @@ def find_display() -> None:
         display = os.environ.get("DISPLAY", "")
         raise NoDisplay(f"no display found (DISPLAY={display}: {message})")
 
-
-# Errors of the X server: other programs' vanished windows, and the loss of the connection.
-#
-# Xlib exits the process in both cases, with its own message and exit code 1. It has one handler
-# for each, which a program can replace.
-#
-# A request about a window that no longer exists is an error. GLFW answers programs that drag
-# files onto the window, and that paste from it; if such a program ends before it is answered, the
-# answer is lost, and nothing else is wrong. So those errors are ignored, and all others are left
-# to Xlib.
-#
-# The handler of a lost connection must not return: OpenGL drivers would use replies that the X
-# server never sent, and crash. So it does all of the clean-up.
 
 _LIBRARY = "libX11.so.6"  # the library that GLFW loads, which shares the handlers
 

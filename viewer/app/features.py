@@ -15,18 +15,6 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 
-__all__ = [
-    "ACTIONS",
-    "KEYS",
-    "MOUSE",
-    "PANELS",
-    "Action",
-    "Panel",
-    "Shortcut",
-    "key_of",
-    "panel_module",
-]
-
 _CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
 _K = imgui.Key
 _OPTION = "view.display_actions.toggle_option"

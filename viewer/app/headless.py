@@ -18,8 +18,6 @@ from viewer.rendering.gpu.context import Graphics
 from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes
 
-__all__ = ["HeadlessApp"]
-
 _SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to settle
 
 

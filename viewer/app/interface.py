@@ -27,6 +27,11 @@ from viewer.app.overlays import draw_overlays
 from viewer.app.preferences.preferences_window import draw_preferences
 from viewer.phrases import printable
 
+_ERROR_TITLE = "Error"
+_TITLE = "Messages"
+_SIZE = (42.0, 22.0)  # initial size of the window, in font sizes
+_LONGEST = 1000  # maximum length of a message in characters
+
 
 def draw_interface(state: AppState) -> list[Path]:
     """Draw everything except the scene; return files to open from a menu."""
@@ -89,12 +94,6 @@ def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     if not stays:
         set_open(state, name, False)
     return appears
-
-
-_ERROR_TITLE = "Error"
-_TITLE = "Messages"
-_SIZE = (42.0, 22.0)  # initial size of the window, in font sizes
-_LONGEST = 1000  # maximum length of a message in characters
 
 
 def _draw_message_window(state: AppState) -> None:

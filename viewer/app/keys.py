@@ -1,4 +1,4 @@
-"""Keyboard input: pressed keys run the actions in the table of keys."""
+"""Keyboard input: pressed keys run the actions in the table of keys; Esc and the window's keys."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Open and closed panels: most are open by default, some are opened on demand."""
+"""Arrangement of the panels: which are open, and the dock's proportions in a window of any size."""
 
 from __future__ import annotations
 
@@ -10,6 +10,17 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
 from viewer.data_classes import dataclass
+
+_DOCK = "viewer dock"
+# Minimum and maximum width of each side, in font sizes.
+_LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
+# Widths of the sides relative to the window's width.
+_LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
+_MOST = 0.5
+"""Maximum fraction of the window's width that panels may occupy."""
+_THREE_ROWS = 60.0  # font sizes: lower windows have two rows of panels on the right
+_TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
+"""Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
 
 
 @dataclass(slots=True)
@@ -32,50 +43,6 @@ class ShownPanels:
     opened: set[str] = field(default_factory=set)
     wants_reset: bool = False
     fronts: list[str] = field(default_factory=list)
-
-
-def is_open(state: AppState, name: str) -> bool:
-    """Return whether a panel is open; it is drawn only if it has something to show."""
-    shown = state.of(ShownPanels)
-    if PANELS[name].on_demand:
-        return name in shown.opened
-    return name not in shown.closed
-
-
-def set_open(state: AppState, name: str, opened: bool) -> None:
-    """Open or close a panel."""
-    shown = state.of(ShownPanels)
-    on_demand = PANELS[name].on_demand
-    names = shown.opened if on_demand else shown.closed
-    if opened == on_demand:
-        names.add(name)
-    else:
-        names.discard(name)
-
-
-def show_panel(state: AppState, name: str) -> None:
-    """Open a panel, and bring it to the front of its tabs once it is drawn."""
-    set_open(state, name, True)
-    state.of(ShownPanels).fronts.append(PANELS[name].title)
-
-
-def reset_layout(state: AppState) -> None:
-    """Restore the initial arrangement of the panels."""
-    state.of(ShownPanels).wants_reset = True
-
-
-_DOCK = "viewer dock"
-
-# Minimum and maximum width of each side, in font sizes.
-_LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
-
-# Widths of the sides relative to the window's width.
-_LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
-_MOST = 0.5
-"""Maximum fraction of the window's width that panels may occupy."""
-_THREE_ROWS = 60.0  # font sizes: lower windows have two rows of panels on the right
-_TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
-"""Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
 
 
 class _Sizes(NamedTuple):
@@ -120,6 +87,36 @@ class Layout:
     nodes: dict[str, int] = field(default_factory=dict)
     fronts: list[str] = field(default_factory=list)
     found: tuple[object, ...] = ()
+
+
+def is_open(state: AppState, name: str) -> bool:
+    """Return whether a panel is open; it is drawn only if it has something to show."""
+    shown = state.of(ShownPanels)
+    if PANELS[name].on_demand:
+        return name in shown.opened
+    return name not in shown.closed
+
+
+def set_open(state: AppState, name: str, opened: bool) -> None:
+    """Open or close a panel."""
+    shown = state.of(ShownPanels)
+    on_demand = PANELS[name].on_demand
+    names = shown.opened if on_demand else shown.closed
+    if opened == on_demand:
+        names.add(name)
+    else:
+        names.discard(name)
+
+
+def show_panel(state: AppState, name: str) -> None:
+    """Open a panel, and bring it to the front of its tabs once it is drawn."""
+    set_open(state, name, True)
+    state.of(ShownPanels).fronts.append(PANELS[name].title)
+
+
+def reset_layout(state: AppState) -> None:
+    """Restore the initial arrangement of the panels."""
+    state.of(ShownPanels).wants_reset = True
 
 
 def _default_sizes(window: tuple[float, float], letter: float, lines: float, plots: bool) -> _Sizes:

@@ -22,6 +22,10 @@ _TITLE_COLOR = (1.0, 0.78, 0.45, 1.0)
 _CODE_COLOR = (0.72, 0.85, 0.95, 1.0)
 _ALIGNED = re.compile(" {2,}#")
 _NARROWEST, _WIDEST = 6, 60  # smallest and largest width of a column, characters
+_FENCE = "```"
+_ITEM = re.compile(r"(\s*)- (.*)")
+_CELLS = re.compile(r"(?<!\\)\|")
+_MARKS = re.compile(r"`|\*\*")
 
 
 @dataclass(slots=True)
@@ -38,6 +42,25 @@ class Manual:
 
     topic: str = ""
     pages: dict[str, list[Block]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One part of a page.
+
+    Attributes
+    ----------
+    kind : str
+        ``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``.
+    text : str
+        One line of text to wrap, or all lines of a code block; empty for tables.
+    rows : tuple of tuples of str
+        Cells of a table; the header comes first.
+    """
+
+    kind: str
+    text: str = ""
+    rows: tuple[tuple[str, ...], ...] = ()
 
 
 def draw_manual_menu(state: AppState) -> None:
@@ -151,31 +174,6 @@ def _draw_table(block: Block, number: int) -> None:
             imgui.table_next_column()
             imgui.text_wrapped(text)
     imgui.end_table()
-
-
-_FENCE = "```"
-_ITEM = re.compile(r"(\s*)- (.*)")
-_CELLS = re.compile(r"(?<!\\)\|")
-_MARKS = re.compile(r"`|\*\*")
-
-
-@dataclass(frozen=True, slots=True)
-class Block:
-    """One part of a page.
-
-    Attributes
-    ----------
-    kind : str
-        ``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``.
-    text : str
-        One line of text to wrap, or all lines of a code block; empty for tables.
-    rows : tuple of tuples of str
-        Cells of a table; the header comes first.
-    """
-
-    kind: str
-    text: str = ""
-    rows: tuple[tuple[str, ...], ...] = ()
 
 
 def blocks_of(text: str) -> list[Block]:

@@ -45,8 +45,6 @@ from viewer.export import files_written
 from viewer.formats import file_stem, opened_text
 from viewer.phrases import printable
 
-__all__ = ["ask_for_export", "draw_menus"]
-
 
 def draw_menus(state: AppState) -> list[Path]:
     """Draw the menu bar; return files to open."""

@@ -1,4 +1,4 @@
-"""Mouse input in the view: orbit, pan and zoom, clicks and double clicks."""
+"""Mouse input in the view: orbit, pan and zoom, clicks and double clicks; what the mouse holds."""
 
 from __future__ import annotations
 

@@ -14,8 +14,6 @@ from viewer.progress import Cancelled, receiving
 if TYPE_CHECKING:
     from viewer.app.shell import Shell
 
-__all__ = ["Opening", "watch"]
-
 _PATIENCE = 0.6  # seconds before the window opens; most files take less time to read
 _EVERY = 0.05  # seconds between frames
 _BAR_WIDTH = 26.0  # width of the progress bar, in font sizes

@@ -33,6 +33,30 @@ _MOST_HEIGHT = 1.0 / 3.0  # maximum fraction of the view's height for several me
 _BESIDE = 0.6  # minimum fraction of the view's width for messages next to the hints
 _MOST_NOTES = 8
 _LONGEST_NOTE = 400  # maximum length of a message in characters
+_COLOR = (1.0, 0.78, 0.45, 1.0)  # colour of the keys
+_OPACITY = 0.97  # text behind the list must not show through
+_KEYS_GAP, _COLUMNS_GAP = (
+    1.5,
+    3.0,
+)  # distances from a key to its text and between columns, in font sizes
+
+
+class _Progress(NamedTuple):
+    """Progress of a job; a negative fraction means an indeterminate bar."""
+
+    title: str
+    fraction: float
+    text: str
+    label: str
+    is_aside: bool = False
+
+
+class _Columns(NamedTuple):
+    """Number of columns, number of rows, and whether the whole list fits."""
+
+    number: int
+    rows: int
+    fits: bool
 
 
 def draw_overlays(state: AppState) -> None:
@@ -74,16 +98,6 @@ def _hint(state: AppState) -> tuple[str, tuple[float, float]]:
     size = imgui.calc_text_size(text)
     one = imgui.get_style().font_scale_dpi
     return text, (x + width - size.x - _GAP * one, y + height - size.y - 0.8 * _GAP * one)
-
-
-class _Progress(NamedTuple):
-    """Progress of a job; a negative fraction means an indeterminate bar."""
-
-    title: str
-    fraction: float
-    text: str
-    label: str
-    is_aside: bool = False
 
 
 def _progress(state: AppState) -> _Progress | None:
@@ -208,22 +222,6 @@ def n_newest(heights: Sequence[float], line: float, room: float) -> int:
             break
         count += 1
     return count
-
-
-_COLOR = (1.0, 0.78, 0.45, 1.0)  # colour of the keys
-_OPACITY = 0.97  # text behind the list must not show through
-_KEYS_GAP, _COLUMNS_GAP = (
-    1.5,
-    3.0,
-)  # distances from a key to its text and between columns, in font sizes
-
-
-class _Columns(NamedTuple):
-    """Number of columns, number of rows, and whether the whole list fits."""
-
-    number: int
-    rows: int
-    fits: bool
 
 
 def _draw_keys(state: AppState) -> None:

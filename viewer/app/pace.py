@@ -1,4 +1,4 @@
-"""Drawing steps of each frame: more passes of still scenes, lower quality of moving ones."""
+"""When the view is drawn: the key of its image, passes of still scenes, quality of moving ones."""
 
 from __future__ import annotations
 

@@ -29,6 +29,10 @@ _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scroll
 _TOP = 0.14  # upper edge, as a fraction of the window's height
 _KEY_COLOR = (1.0, 0.78, 0.45, 1.0)
 _K = imgui.Key
+_LEFT_OUT = ("Ctrl+P", "Esc")  # shortcuts that open and close the palette
+_LONGEST = 60  # maximum length of a name in characters
+_START, _INSIDE, _SCATTERED = 100.0, 60.0, 20.0
+_BOUNDARIES = " _-.:/#("
 
 
 @dataclass(slots=True)
@@ -60,6 +64,31 @@ class Palette:
     known: list[_Entry] = field(default_factory=list)
     shown: list[int] = field(default_factory=list)
     matched: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """An entry that can be found and run.
+
+    Attributes
+    ----------
+    text : str
+        Name of the entry.
+    kind : str
+        Category in one word.
+    run : callable
+        Called with the state.
+    key : str
+        Keyboard shortcut; empty for none.
+    why : str
+        Reason why the entry cannot be run now; empty if it can.
+    """
+
+    text: str
+    kind: str
+    run: Callable[[AppState], None]
+    key: str = ""
+    why: str = ""
 
 
 def toggle_palette(state: AppState) -> None:
@@ -195,35 +224,6 @@ def _draw_row(state: AppState, entry: _Entry, row: int, is_chosen: bool) -> bool
     return bool(clicked)
 
 
-_LEFT_OUT = ("Ctrl+P", "Esc")  # shortcuts that open and close the palette
-_LONGEST = 60  # maximum length of a name in characters
-
-
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """An entry that can be found and run.
-
-    Attributes
-    ----------
-    text : str
-        Name of the entry.
-    kind : str
-        Category in one word.
-    run : callable
-        Called with the state.
-    key : str
-        Keyboard shortcut; empty for none.
-    why : str
-        Reason why the entry cannot be run now; empty if it can.
-    """
-
-    text: str
-    kind: str
-    run: Callable[[AppState], None]
-    key: str = ""
-    why: str = ""
-
-
 def entries(state: AppState) -> list[_Entry]:
     """Return all entries for the current scene."""
     kinds = (_actions, _panels, _choices, _animations, _joints, _figures)
@@ -309,10 +309,6 @@ def _figures(state: AppState) -> Iterator[_Entry]:
 def _choose(state: AppState, index: int) -> None:
     state.select_actor(index)
     state.say_status(printable(state.actor.name, _LONGEST))
-
-
-_START, _INSIDE, _SCATTERED = 100.0, 60.0, 20.0
-_BOUNDARIES = " _-.:/#("
 
 
 def score(query: str, name: str) -> float:

@@ -1,4 +1,15 @@
-"""The native window: GLFW, its OpenGL context, ImGui, and the events that the loop handles."""
+"""The native window: GLFW, its OpenGL context, ImGui, and the events that reach it.
+
+ImGui spreads the press and release of a key over two frames, so that no press is lost, and delays
+all later input. On a slow machine, typed text would appear at one or two characters per frame.
+Characters arrive as separate events, so a text field needs no key events for letters and digits:
+``TypedKeys`` leaves them out. Keys with an effect, such as Enter, Backspace and Ctrl+A, and the
+mouse stay in the queue, so that a press and release within one frame still works.
+
+ImGui sees modifiers at the end of a frame's events. If the modifier of a shortcut is released in
+the frame in which its key was pressed, as happens on a slow machine, the shortcut would be lost:
+``end_frame_before`` puts the earlier events into a frame of their own.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +38,13 @@ from viewer.rendering.gpu.context import explain_failure
 
 glfw = import_glfw()
 _SIZE = (1280, 800)
+_PRINTABLE = range(32, 163)  # GLFW's keys from Space to World 2
+_KEYPAD = (*range(320, 335), 336)  # digits and operators, without Enter
+_RELEASE, _PRESS = 0, 1
+_CTRL, _ALT, _SUPER = 0x2, 0x4, 0x8
+_MODIFIERS = range(340, 348)  # GLFW's keys from left Shift to right Super
+# No keyboard has this key. ImGui ends a frame's events at the second event of the same key.
+_SEPARATOR = imgui.Key.gamepad_back
 
 
 class Shell:
@@ -169,6 +187,35 @@ class Shell:
         stop_watching()
 
 
+class TypedKeys:
+    """Decides which key events are passed to ImGui; called for every event."""
+
+    def __init__(self) -> None:
+        self._left_out: set[int] = set()
+
+    def passes(self, key: int, action: int, modifiers: int, is_typing: bool) -> bool:
+        """Return whether a key event is passed to ImGui.
+
+        Parameters
+        ----------
+        key, action, modifiers : int
+            Arguments of GLFW's key callback.
+        is_typing : bool
+            Whether a text field is active.
+        """
+        if action == _RELEASE:
+            # A key that was pressed before the field became active must be released.
+            is_known = key not in self._left_out
+            self._left_out.discard(key)
+            return is_known
+        has_effect = bool(modifiers & (_CTRL | _ALT | _SUPER))
+        if not is_typing or has_effect or not (key in _PRINTABLE or key in _KEYPAD):
+            return True
+        if action == _PRESS:
+            self._left_out.add(key)
+        return False
+
+
 def create_window(title: str, is_visible: bool = True, scale: float = 0.0) -> Any:
     """Create a window, larger for a larger scale of the interface; 0 for the monitor's scale."""
     glfw.default_window_hints()
@@ -205,57 +252,6 @@ def create_context() -> moderngl.Context:
         return moderngl.create_context(require=330)
     except Exception as problem:  # glcontext raises bare Exception
         raise RenderError(explain_failure(str(problem))) from None
-
-
-# Input between two frames: keys that only type a character, shortcuts, and clicks.
-#
-# ImGui spreads the press and release of a key over two frames, so that no press is lost, and
-# delays all later input. On a slow machine, typed text would appear at one or two characters per
-# frame. Characters arrive as separate events, so a text field needs no key events for letters and
-# digits. Keys with an effect, such as Enter, Backspace and Ctrl+A, and the mouse stay in the
-# queue, so that a press and release within one frame still works.
-#
-# ImGui sees modifiers at the end of a frame's events. If the modifier of a shortcut is released
-# in the frame in which its key was pressed, as happens on a slow machine, the shortcut would be
-# lost.
-
-_PRINTABLE = range(32, 163)  # GLFW's keys from Space to World 2
-_KEYPAD = (*range(320, 335), 336)  # digits and operators, without Enter
-_RELEASE, _PRESS = 0, 1
-_CTRL, _ALT, _SUPER = 0x2, 0x4, 0x8
-_MODIFIERS = range(340, 348)  # GLFW's keys from left Shift to right Super
-
-# No keyboard has this key. ImGui ends a frame's events at the second event of the same key.
-_SEPARATOR = imgui.Key.gamepad_back
-
-
-class TypedKeys:
-    """Decides which key events are passed to ImGui; called for every event."""
-
-    def __init__(self) -> None:
-        self._left_out: set[int] = set()
-
-    def passes(self, key: int, action: int, modifiers: int, is_typing: bool) -> bool:
-        """Return whether a key event is passed to ImGui.
-
-        Parameters
-        ----------
-        key, action, modifiers : int
-            Arguments of GLFW's key callback.
-        is_typing : bool
-            Whether a text field is active.
-        """
-        if action == _RELEASE:
-            # A key that was pressed before the field became active must be released.
-            is_known = key not in self._left_out
-            self._left_out.discard(key)
-            return is_known
-        has_effect = bool(modifiers & (_CTRL | _ALT | _SUPER))
-        if not is_typing or has_effect or not (key in _PRINTABLE or key in _KEYPAD):
-            return True
-        if action == _PRESS:
-            self._left_out.add(key)
-        return False
 
 
 def end_frame_before(queue: Any, key: int, action: int) -> None:

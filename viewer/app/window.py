@@ -52,8 +52,6 @@ from viewer.rig.inspection.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
 from viewer.rig.scene import Scene, scene_points  # noqa: E402
 
-__all__ = ["Rest", "awaits_tooltip", "probe", "show"]
-
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two frames
 _FIRST_FRAMES = 3  # frames after which fonts for additional scripts are loaded
 _IDLE_SECONDS = 0.5  # interval between checks for messages that time out, seconds

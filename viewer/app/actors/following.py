@@ -9,8 +9,6 @@ from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.follow import followed_point
 
-__all__ = ["Following", "follow_actor", "start_following", "stop_following"]
-
 
 @dataclass(slots=True)
 class Following:

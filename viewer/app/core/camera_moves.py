@@ -1,4 +1,4 @@
-"""Fitting of the camera to the free view until the user moves it."""
+"""Moves of the camera: fit the view to the scene, or look through a calibrated camera."""
 
 from __future__ import annotations
 

@@ -15,8 +15,6 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["FASTEST", "MODES", "Clock"]
-
 MODES = {
     "loop": "Loop",
     "once": "Once",

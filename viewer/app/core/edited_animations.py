@@ -10,8 +10,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.transform_clip import Animation, TransformClip
 from viewer.rig.scene import Actor
 
-__all__ = ["Animations", "edited_aside", "keep_edited", "with_edited_keys"]
-
 
 @dataclass(slots=True)
 class Animations:

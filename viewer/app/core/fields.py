@@ -16,15 +16,6 @@ from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import is_typed_in_place, number_field, unit_of
 from viewer.rig.number_text import number_text
 
-__all__ = [
-    "begin_field",
-    "drag_float",
-    "drag_int",
-    "in_row",
-    "slider_float",
-    "slider_int",
-]
-
 Number = TypeVar("Number", int, float)
 
 _COLUMN, _WIDEST = 0.4, 8.5

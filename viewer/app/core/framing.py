@@ -21,6 +21,12 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene, scene_points
 
+_POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
+_MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
+_MOST_FRAMES = 32
+_MOST_PRODUCTS = 100_000_000  # maximum number of dot products with directions
+_N_DIRECTIONS = (100, 1000)
+
 
 @dataclass(slots=True)
 class _MotionExtent:
@@ -223,13 +229,6 @@ def _place(camera: Camera) -> tuple[object, ...]:
     """Return a key that identifies a camera's position."""
     lens = camera.fov, id(camera.fixed)
     return camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination, *lens
-
-
-_POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
-_MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
-_MOST_FRAMES = 32
-_MOST_PRODUCTS = 100_000_000  # maximum number of dot products with directions
-_N_DIRECTIONS = (100, 1000)
 
 
 def _growing(first: int, last: int) -> list[int]:

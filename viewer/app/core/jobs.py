@@ -9,8 +9,6 @@ from typing import Protocol
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 
-__all__ = ["CountedJob", "FrameJob", "Job", "Report", "unexpected"]
-
 Report = Callable[[int, int, str], None]
 """Called with the completed steps, their total and the next step's name; raises to cancel."""
 

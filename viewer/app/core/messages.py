@@ -8,8 +8,6 @@ from dataclasses import field
 
 from viewer.data_classes import dataclass
 
-__all__ = ["KINDS", "Message", "MessageLog", "Messages", "Note", "message_line"]
-
 KINDS = ("note", "status", "error")
 """Kinds of messages: unsolicited notes, status after a key or button, and errors."""
 

@@ -7,23 +7,6 @@ from viewer.app.core.state import AppState
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
 
-__all__ = [
-    "no_drive",
-    "no_job_room",
-    "no_mesh",
-    "no_motion",
-    "no_new_clip",
-    "no_panel",
-    "no_parts",
-    "no_pose",
-    "no_redo",
-    "no_skeleton",
-    "no_skin",
-    "no_texture",
-    "no_undo",
-    "nothing_to_export",
-]
-
 
 def no_motion(state: AppState) -> str:
     """Return the reason why the time cannot be changed."""

@@ -11,8 +11,6 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import PoseKey
 from viewer.rig.scene import Actor
 
-__all__ = ["SavedPose", "SavedWork"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedPose:

@@ -21,6 +21,28 @@ from viewer.app.core.theme import WARNING, ink
 from viewer.phrases import printable
 
 _FLAGS = imgui.InputTextFlags_
+_EXPECTED = "expected a number, such as 1.5 or 90/2"
+_DEGREE = "\N{DEGREE SIGN}"
+_FACTORS = {
+    _DEGREE: {_DEGREE: 1.0, "deg": 1.0, "rad": math.degrees(1.0)},
+    "rad": {"rad": 1.0, _DEGREE: math.radians(1.0), "deg": math.radians(1.0)},
+    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "cm": {"cm": 1.0, "m": 100.0, "mm": 0.1},
+    "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0},
+}
+"""Units that may be typed: maps a field's unit to the factors of other units."""
+_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+_SIGNS: dict[type[ast.unaryop], float] = {ast.UAdd: 1.0, ast.USub: -1.0}
+_FORMAT = re.compile(r"%[0-9.+-]*[defgi]")
+_UNIT = re.compile(rf"([^\W\d_]+|{_DEGREE}|%)\s*$")
+_LARGEST = 3.4e38  # largest float32 value
+_LONGEST = 100  # maximum number of characters of a number typed by hand
 
 
 def text_field(hidden: str, text: str, hint: str = "", flags: int = 0) -> tuple[bool, str]:
@@ -157,30 +179,6 @@ def _show_below(text: str) -> None:
     imgui.begin_tooltip()
     imgui.text_unformatted(text)
     imgui.end_tooltip()
-
-
-_EXPECTED = "expected a number, such as 1.5 or 90/2"
-_DEGREE = "\N{DEGREE SIGN}"
-_FACTORS = {
-    _DEGREE: {_DEGREE: 1.0, "deg": 1.0, "rad": math.degrees(1.0)},
-    "rad": {"rad": 1.0, _DEGREE: math.radians(1.0), "deg": math.radians(1.0)},
-    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "cm": {"cm": 1.0, "m": 100.0, "mm": 0.1},
-    "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0},
-}
-"""Units that may be typed: maps a field's unit to the factors of other units."""
-_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
-_SIGNS: dict[type[ast.unaryop], float] = {ast.UAdd: 1.0, ast.USub: -1.0}
-_FORMAT = re.compile(r"%[0-9.+-]*[defgi]")
-_UNIT = re.compile(rf"([^\W\d_]+|{_DEGREE}|%)\s*$")
-_LARGEST = 3.4e38  # largest float32 value
-_LONGEST = 100  # maximum number of characters of a number typed by hand
 
 
 def unit_of(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Font, colours and sizes of the interface."""
+"""Colours and fonts of the interface: dark and light theme, and text legible on both."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from viewer.rendering.overlay.typeface import interface_font, system_fonts
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
-
 # Colours by use: dark theme, light theme.
 _COLORS = {
     "panel": ((0.125, 0.135, 0.15, 1.0), (0.945, 0.95, 0.955, 1.0)),
@@ -59,6 +58,10 @@ _USES = {
     "chosen text": ("text_selected_bg", "plot_histogram"),
     "mark": ("check_mark", "tab_selected_overline"),
 }
+Color = tuple[float, float, float, float]
+WARNING: Color = (1.0, 0.77, 0.30, 1.0)
+ERROR: Color = (1.0, 0.50, 0.42, 1.0)
+_DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a light panel
 
 
 def apply_theme(scale: float, theme: str = "dark") -> None:
@@ -123,12 +126,6 @@ def set_theme(theme: str) -> None:
     for use, names in _USES.items():
         for name in names:
             style.set_color_(getattr(imgui.Col_, name), _COLORS[use][row])
-
-
-Color = tuple[float, float, float, float]
-WARNING: Color = (1.0, 0.77, 0.30, 1.0)
-ERROR: Color = (1.0, 0.50, 0.42, 1.0)
-_DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a light panel
 
 
 def ink(color: Color) -> Color:

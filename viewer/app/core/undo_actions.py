@@ -8,8 +8,6 @@ from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
 from viewer.rig.scene import Actor
 
-__all__ = ["redo", "undo"]
-
 
 def undo(state: AppState) -> None:
     """Cancel the change that is being computed, or undo the last change of pose or display."""

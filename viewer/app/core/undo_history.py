@@ -274,23 +274,6 @@ class History:
         return kept is not None and (self._seen is None or kept is not self._seen.kept)
 
 
-def _extended(look: _Look, actor: Actor | None) -> _Look:
-    """Return the state of an earlier step with the clip and drive that have grown since then."""
-    if actor is None:
-        return look
-    # Joints cannot be matched by hand while the motion grows.
-    return replace(look, clip=_grown(look.clip, actor.clip), drive=actor.drive)
-
-
-def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
-    """Return an earlier step's clip, extended by the frames read since then."""
-    if isinstance(old, SampledClip) and isinstance(new, SampledClip):
-        return with_rate(new, old.timing.frame_rate)
-    if isinstance(old, PointClip) and isinstance(new, PointClip):
-        return with_rate(new, old.timing.frame_rate)
-    return old
-
-
 @dataclass(frozen=True, slots=True)
 class _Look:
     """Motion and display settings of an actor, without its pose."""
@@ -335,6 +318,23 @@ class _Snapshot:
     options: DisplayOptions
     time: float
     kept: object | None = None
+
+
+def _extended(look: _Look, actor: Actor | None) -> _Look:
+    """Return the state of an earlier step with the clip and drive that have grown since then."""
+    if actor is None:
+        return look
+    # Joints cannot be matched by hand while the motion grows.
+    return replace(look, clip=_grown(look.clip, actor.clip), drive=actor.drive)
+
+
+def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
+    """Return an earlier step's clip, extended by the frames read since then."""
+    if isinstance(old, SampledClip) and isinstance(new, SampledClip):
+        return with_rate(new, old.timing.frame_rate)
+    if isinstance(old, PointClip) and isinstance(new, PointClip):
+        return with_rate(new, old.timing.frame_rate)
+    return old
 
 
 def key_of(actor: Actor) -> PoseKey | None:

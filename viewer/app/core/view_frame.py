@@ -10,8 +10,6 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
 
-__all__ = ["ViewFrame", "view_frame"]
-
 Place = tuple[float, float]
 """A position in the window, in window coordinates."""
 

@@ -1,4 +1,4 @@
-"""Widgets shared by several panels; each records where it was drawn."""
+"""Widgets shared by several panels, which record where they were drawn; names of keys in texts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,31 @@ from viewer.data_classes import dataclass
 from viewer.rig.number_text import number_text
 
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
-
 # Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
 _DISABLED = int(imgui.ItemFlags_.disabled)
 _HOVERED = int(imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled)
 Rect = tuple[float, float, float, float]
 """Left, upper, right and lower edge, in window coordinates."""
+
+
+@dataclass(slots=True)
+class KeyNames:
+    """Keys changed by the user.
+
+    Attributes
+    ----------
+    changed : dict
+        Maps the label of a key in the table of keys to the name of the key that replaces it.
+    """
+
+    changed: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Disabled:
+    """Reasons of the enclosing blocks that are disabled."""
+
+    reasons: list[str] = field(default_factory=list)
 
 
 def note_item(state: AppState, label: str) -> None:
@@ -34,13 +53,6 @@ def note_item(state: AppState, label: str) -> None:
     reasons = state.of(_Disabled).reasons
     if reasons:
         explain("", reasons[-1])
-
-
-@dataclass(slots=True)
-class _Disabled:
-    """Reasons of the enclosing blocks that are disabled."""
-
-    reasons: list[str] = field(default_factory=list)
 
 
 @contextlib.contextmanager
@@ -253,19 +265,6 @@ def plain_zero(value: float, text: str) -> float:
     spec = _NUMBER.search(text)
     shown = spec.group() % value if spec else ""
     return value if not shown.startswith("-") or number_text(float(shown)) != "0" else 0.0
-
-
-@dataclass(slots=True)
-class KeyNames:
-    """Keys changed by the user.
-
-    Attributes
-    ----------
-    changed : dict
-        Maps the label of a key in the table of keys to the name of the key that replaces it.
-    """
-
-    changed: dict[str, str] = field(default_factory=dict)
 
 
 def key_name(state: AppState, usual: str) -> str:

@@ -44,8 +44,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
 from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
 
-__all__ = ["draw"]
-
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
 _TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}

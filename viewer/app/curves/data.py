@@ -20,8 +20,6 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton, joint_labels, shown_joints
 from viewer.rig.transform_keys.rows import rows_of
 
-__all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
-
 _AXES = "xyz"
 _PREFIXES = {"translation": "t", "rotation": "", "scale": "s"}
 _SHAPES, _SHAPE_NUMBER = "shapes", -2  # heading of the curves of blend shapes

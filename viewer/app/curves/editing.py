@@ -1,4 +1,8 @@
-"""Edits of the chosen actor's clip in the Curves panel; each replaces the clip by a new one."""
+"""Edits of the chosen actor's clip: new clips, keys, tangents and range.
+
+Each edit replaces the clip by a new one, so that undo restores the old one. ``KeyedMotion`` is what
+the Curves panel edits: keys of DOFs, or of transforms.
+"""
 
 from __future__ import annotations
 
@@ -48,110 +52,83 @@ from viewer.rig.transform_keys.edit import (
 from viewer.rig.transform_keys.rows import TransformRow, key_values, row_values, rows_of
 
 _GAP = 1e-3  # minimum distance between dragged keys, seconds
+KeyPlace = tuple[int, int]
+"""Row of a curve and index of one of its keys."""
+_SECONDS = 2.0  # duration of a new clip
 
 
-def drop_missing(view: Curves, keyed: KeyedMotion, n_rows: int) -> None:
-    """Deselect keys that no longer exist because they were undone or deleted."""
-    found = set()
-    for row, key in view.keys:
-        keys = keyed.keys(row) if row < n_rows else None
-        if keys is not None and key < len(keys[0]):
-            found.add((row, key))
-    if len(found) < len(view.keys):
-        view.keys = frozenset(found)
+@dataclass(slots=True)
+class Curves:
+    """State of the Curves panel; the edited clip belongs to the actor.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        Selected curves as rows of ``curves_of``, in the order of selection.
+    keys : frozenset of (row, key)
+        Selected keys.
+    filter : str
+        Text that the names of listed curves must contain.
+    wants_fit : bool
+        Whether the axes are fitted in the next frame.
+    wants_scroll : bool
+        Whether the list scrolls to the first selected curve in the next frame.
+    owner : (int, str, int)
+        Key of the actor, motion and number of curves for which ``rows`` are valid.
+    joint : int
+        Joint whose curves were last selected.
+    """
+
+    rows: tuple[int, ...] = ()
+    keys: frozenset[KeyPlace] = frozenset()
+    filter: str = ""
+    wants_fit: bool = True
+    wants_scroll: bool = False
+    owner: tuple[int, str, int] = (-1, "", 0)
+    joint: int = -1
+
+    def choose(self, rows: tuple[int, ...]) -> None:
+        """Select curves, and fit the axes to them."""
+        self.rows, self.keys, self.wants_fit = rows, frozenset(), True
 
 
-def focused_rows(view: Curves) -> tuple[int, ...]:
-    """Return the curves with selected keys, otherwise all shown curves."""
-    return tuple(sorted({row for row, _ in view.keys})) or view.rows
+class KeyedMotion(Protocol):
+    """A keyed motion; every edit returns a new motion. Rows are as in ``curves_of``."""
 
+    def keys(self, row: int) -> tuple[Floats, Floats] | None:
+        """Return the times and values of a curve's keys, (N,) each; None without keys."""
 
-def move_chosen(state: AppState, dt: float, dv: float) -> None:
-    """Move the selected keys of all curves; they stop at unselected keys."""
-    keyed = keyed_of(state.actor)
-    if keyed is not None:
-        state.actor.clip = keyed.moved(state.of(Curves).keys, dt, dv, _GAP)
+    def slopes(self, row: int) -> Floats | None:
+        """Return the slopes at the keys that can be dragged, (N, 2); None if there are none."""
 
+    def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
+        """Return the values of some curves at many times: (T, C); those without keys are 0."""
 
-def place_key(
-    state: AppState, place: KeyPlace, time: float | None = None, value: float | None = None
-) -> None:
-    """Set the time or value of one key."""
-    keyed = keyed_of(state.actor)
-    if keyed is not None:
-        state.actor.clip = keyed.placed(place, time, value, _GAP)
+    def wraps(self, row: int) -> bool:
+        """Return whether a curve shows angles that jump by full rotations."""
 
+    def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Motion:
+        """Move keys together; they stop at unselected keys."""
 
-def add_key_at(state: AppState, rows: Iterable[int], time: float) -> None:
-    """Add keys on curves and select them."""
-    keyed, rows = keyed_of(state.actor), tuple(rows)
-    if keyed is None:
-        return
-    state.actor.clip = keyed.added(rows, time, state.actor)
-    changed = keyed_of(state.actor)
-    places = set()
-    for row in rows:
-        keys = None if changed is None else changed.keys(row)
-        if keys is not None:
-            places.add((row, int(np.abs(keys[0] - time).argmin())))
-    state.of(Curves).keys = frozenset(places)
+    def placed(
+        self, place: KeyPlace, time: float | None, value: float | None, gap: float
+    ) -> Motion:
+        """Set the time or value of one key."""
 
+    def added(self, rows: Iterable[int], time: float, actor: Actor) -> Motion:
+        """Add keys on curves; those without keys get the value of the actor's pose."""
 
-def nearest_row(
-    keyed: KeyedMotion, view: Curves, time: float, value: float, factors: list[float]
-) -> int:
-    """Return the shown curve nearest to a value at a time, -1 if none is shown."""
-    if not view.rows:
-        return -1
-    values = keyed.values(view.rows, np.array([time]))[0] * factors
-    return view.rows[int(np.abs(values - value).argmin())]
+    def deleted(self, places: Iterable[KeyPlace]) -> Motion:
+        """Delete keys."""
 
+    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Motion:
+        """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
 
-def delete_chosen(state: AppState) -> None:
-    """Delete the selected keys."""
-    curves, keyed = state.of(Curves), keyed_of(state.actor)
-    # Without selected keys, an equal clip would be an undo step that changes nothing.
-    if keyed is not None and curves.keys:
-        state.actor.clip = keyed.deleted(curves.keys)
-    curves.keys = frozenset()
+    def ranged(self, start: float, end: float) -> Motion:
+        """Set the playback range, seconds."""
 
-
-def change_slope(state: AppState, places: Iterable[KeyPlace], side: int, to: float) -> None:
-    """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
-    keyed = keyed_of(state.actor)
-    if keyed is not None:
-        state.actor.clip = keyed.sloped(places, side, to)
-
-
-def change_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
-    """Set the tangent rule or slope on one side of the keys of DOFs."""
-    keyed = keyed_of(state.actor)
-    if isinstance(keyed, DofKeys):
-        state.actor.clip = keyed.with_tangent(places, side, to)
-
-
-def extrapolate(state: AppState, side: int, mode: Extrapolation) -> None:
-    """Set the extrapolation of the curves in focus before (0) or after (1) their keys."""
-    keyed = keyed_of(state.actor)
-    if isinstance(keyed, DofKeys):
-        clip = keyed.clip
-        for row in focused_rows(state.of(Curves)):
-            clip = with_channel(clip, row, partial(set_extrapolation, side=side, mode=mode))
-        state.actor.clip = clip
-
-
-def interpolate(state: AppState, mode: Interpolation) -> None:
-    """Set the interpolation of the channels of the curves in focus."""
-    keyed = keyed_of(state.actor)
-    if isinstance(keyed, TransformKeys):
-        state.actor.clip = keyed.interpolated(focused_rows(state.of(Curves)), mode)
-
-
-def set_playback_range(state: AppState, start: float, end: float) -> None:
-    """Set the clip's own time range, seconds."""
-    keyed = keyed_of(state.actor)
-    if keyed is not None:
-        state.actor.clip = keyed.ranged(start, end)
+    def posed(self, actor: Actor, time: float, only_changed: bool) -> Motion:
+        """Key an actor's pose at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -315,43 +292,108 @@ class TransformKeys:
         return key_transform_pose(self.clip, actor.figure, pose, time, only_changed)
 
 
-class KeyedMotion(Protocol):
-    """A keyed motion; every edit returns a new motion. Rows are as in ``curves_of``."""
+def drop_missing(view: Curves, keyed: KeyedMotion, n_rows: int) -> None:
+    """Deselect keys that no longer exist because they were undone or deleted."""
+    found = set()
+    for row, key in view.keys:
+        keys = keyed.keys(row) if row < n_rows else None
+        if keys is not None and key < len(keys[0]):
+            found.add((row, key))
+    if len(found) < len(view.keys):
+        view.keys = frozenset(found)
 
-    def keys(self, row: int) -> tuple[Floats, Floats] | None:
-        """Return the times and values of a curve's keys, (N,) each; None without keys."""
 
-    def slopes(self, row: int) -> Floats | None:
-        """Return the slopes at the keys that can be dragged, (N, 2); None if there are none."""
+def focused_rows(view: Curves) -> tuple[int, ...]:
+    """Return the curves with selected keys, otherwise all shown curves."""
+    return tuple(sorted({row for row, _ in view.keys})) or view.rows
 
-    def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return the values of some curves at many times: (T, C); those without keys are 0."""
 
-    def wraps(self, row: int) -> bool:
-        """Return whether a curve shows angles that jump by full rotations."""
+def move_chosen(state: AppState, dt: float, dv: float) -> None:
+    """Move the selected keys of all curves; they stop at unselected keys."""
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        state.actor.clip = keyed.moved(state.of(Curves).keys, dt, dv, _GAP)
 
-    def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Motion:
-        """Move keys together; they stop at unselected keys."""
 
-    def placed(
-        self, place: KeyPlace, time: float | None, value: float | None, gap: float
-    ) -> Motion:
-        """Set the time or value of one key."""
+def place_key(
+    state: AppState, place: KeyPlace, time: float | None = None, value: float | None = None
+) -> None:
+    """Set the time or value of one key."""
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        state.actor.clip = keyed.placed(place, time, value, _GAP)
 
-    def added(self, rows: Iterable[int], time: float, actor: Actor) -> Motion:
-        """Add keys on curves; those without keys get the value of the actor's pose."""
 
-    def deleted(self, places: Iterable[KeyPlace]) -> Motion:
-        """Delete keys."""
+def add_key_at(state: AppState, rows: Iterable[int], time: float) -> None:
+    """Add keys on curves and select them."""
+    keyed, rows = keyed_of(state.actor), tuple(rows)
+    if keyed is None:
+        return
+    state.actor.clip = keyed.added(rows, time, state.actor)
+    changed = keyed_of(state.actor)
+    places = set()
+    for row in rows:
+        keys = None if changed is None else changed.keys(row)
+        if keys is not None:
+            places.add((row, int(np.abs(keys[0] - time).argmin())))
+    state.of(Curves).keys = frozenset(places)
 
-    def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> Motion:
-        """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
 
-    def ranged(self, start: float, end: float) -> Motion:
-        """Set the playback range, seconds."""
+def nearest_row(
+    keyed: KeyedMotion, view: Curves, time: float, value: float, factors: list[float]
+) -> int:
+    """Return the shown curve nearest to a value at a time, -1 if none is shown."""
+    if not view.rows:
+        return -1
+    values = keyed.values(view.rows, np.array([time]))[0] * factors
+    return view.rows[int(np.abs(values - value).argmin())]
 
-    def posed(self, actor: Actor, time: float, only_changed: bool) -> Motion:
-        """Key an actor's pose at a time."""
+
+def delete_chosen(state: AppState) -> None:
+    """Delete the selected keys."""
+    curves, keyed = state.of(Curves), keyed_of(state.actor)
+    # Without selected keys, an equal clip would be an undo step that changes nothing.
+    if keyed is not None and curves.keys:
+        state.actor.clip = keyed.deleted(curves.keys)
+    curves.keys = frozenset()
+
+
+def change_slope(state: AppState, places: Iterable[KeyPlace], side: int, to: float) -> None:
+    """Set the slope on one side of keys: 0 incoming, 1 outgoing."""
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        state.actor.clip = keyed.sloped(places, side, to)
+
+
+def change_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
+    """Set the tangent rule or slope on one side of the keys of DOFs."""
+    keyed = keyed_of(state.actor)
+    if isinstance(keyed, DofKeys):
+        state.actor.clip = keyed.with_tangent(places, side, to)
+
+
+def extrapolate(state: AppState, side: int, mode: Extrapolation) -> None:
+    """Set the extrapolation of the curves in focus before (0) or after (1) their keys."""
+    keyed = keyed_of(state.actor)
+    if isinstance(keyed, DofKeys):
+        clip = keyed.clip
+        for row in focused_rows(state.of(Curves)):
+            clip = with_channel(clip, row, partial(set_extrapolation, side=side, mode=mode))
+        state.actor.clip = clip
+
+
+def interpolate(state: AppState, mode: Interpolation) -> None:
+    """Set the interpolation of the channels of the curves in focus."""
+    keyed = keyed_of(state.actor)
+    if isinstance(keyed, TransformKeys):
+        state.actor.clip = keyed.interpolated(focused_rows(state.of(Curves)), mode)
+
+
+def set_playback_range(state: AppState, start: float, end: float) -> None:
+    """Set the clip's own time range, seconds."""
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        state.actor.clip = keyed.ranged(start, end)
 
 
 def keyed_of(actor: Actor) -> KeyedMotion | None:
@@ -362,48 +404,6 @@ def keyed_of(actor: Actor) -> KeyedMotion | None:
     if isinstance(clip, Clip):
         return DofKeys(clip, skeleton)
     return TransformKeys(clip, skeleton) if isinstance(clip, TransformClip) else None
-
-
-KeyPlace = tuple[int, int]
-"""Row of a curve and index of one of its keys."""
-
-
-@dataclass(slots=True)
-class Curves:
-    """State of the Curves panel; the edited clip belongs to the actor.
-
-    Attributes
-    ----------
-    rows : tuple of int
-        Selected curves as rows of ``curves_of``, in the order of selection.
-    keys : frozenset of (row, key)
-        Selected keys.
-    filter : str
-        Text that the names of listed curves must contain.
-    wants_fit : bool
-        Whether the axes are fitted in the next frame.
-    wants_scroll : bool
-        Whether the list scrolls to the first selected curve in the next frame.
-    owner : (int, str, int)
-        Key of the actor, motion and number of curves for which ``rows`` are valid.
-    joint : int
-        Joint whose curves were last selected.
-    """
-
-    rows: tuple[int, ...] = ()
-    keys: frozenset[KeyPlace] = frozenset()
-    filter: str = ""
-    wants_fit: bool = True
-    wants_scroll: bool = False
-    owner: tuple[int, str, int] = (-1, "", 0)
-    joint: int = -1
-
-    def choose(self, rows: tuple[int, ...]) -> None:
-        """Select curves, and fit the axes to them."""
-        self.rows, self.keys, self.wants_fit = rows, frozenset(), True
-
-
-_SECONDS = 2.0  # duration of a new clip
 
 
 def can_have_keys(state: AppState) -> bool:

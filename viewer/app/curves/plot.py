@@ -47,6 +47,67 @@ _Points: TypeAlias = tuple[Floats, Floats]
 """Times and values, (P,) each: seconds; lengths, radians or factors."""
 _Lines: TypeAlias = tuple[_Points | None, _Points | None, _Points | None]
 _lines: Memo[Motion, _Lines] = Memo(kept=256)  # sampled again only after an edit, pan or zoom
+_HANDLE = 1.0, 0.85, 0.4, 1.0
+_FAINT = (0.75, 0.75, 0.8, 0.8)
+_MOST_KEYS = 300  # if more keys are visible, none can be dragged
+_SAME_KEY = 2.0  # points: keys closer than this cannot be distinguished
+_HANDLE_LENGTH = 4.0  # length of a tangent's handle, in font sizes
+_HANDLE_ID = 16
+_FIRST_KEY_ID = 32
+_KEYS_PER_ROW = 1 << 20
+_FIXED = implot.DragToolFlags_.no_fit
+_Color = tuple[float, float, float, float]
+# Smallest value range that fitted axes magnify to the height of the plot. Rotations and
+# positions in single precision, as files store them, are rounded to far smaller steps.
+_LEAST_ANGLE = math.radians(0.1)
+_LEAST_LENGTH = 5e-4  # lengths, relative to the size of the scene
+_LEAST = 1e-3  # scale factors and weights
+_LEAST_RELATIVE = 1e-5  # any value, relative to its magnitude
+_CONSTANT = 0.02  # fraction of that range below which a change is drawn as a constant
+_AXES_MARGIN = 0.16  # margin above and below the curves, relative to their height
+_COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
+_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness factors that distinguish the joints
+
+
+@dataclass(frozen=True, slots=True)
+class _Plot:
+    """State of the plot in this frame.
+
+    Attributes
+    ----------
+    state : AppState
+        State that is shown and changed.
+    curves : tuple of Curve
+        All curves of the motion.
+    limits : (low, high, bottom, top)
+        Ranges of clip time, in seconds, and of values, in the displayed unit.
+    scale : (float, float)
+        Pixels per second and per displayed unit.
+    """
+
+    state: AppState
+    curves: tuple[Curve, ...]
+    limits: tuple[float, float, float, float]
+    scale: tuple[float, float]
+
+    @property
+    def view(self) -> Curves:
+        """State of the Curves panel."""
+        return self.state.of(Curves)
+
+    def factor(self, row: int) -> float:
+        """Return the factor from a curve's values to the displayed unit."""
+        return factor_of(self.state, self.curves[row])
+
+    def color(self, row: int) -> _Color:
+        """Return a curve's colour."""
+        return curve_color(self.view, self.curves, row)
+
+    def note(self, label: str, time: float, value: float, reach: float = 4.0) -> None:
+        """Record the position of a point of the plot under a label, for tests."""
+        place = implot.plot_to_pixels(time, value)
+        rect = (place.x - reach, place.y - reach, place.x + reach, place.y + reach)
+        self.state.item_rects[label] = rect
 
 
 def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
@@ -248,17 +309,6 @@ def _draw_time(plot: _Plot) -> None:
     plot.note("time line", time, 0.5 * (plot.limits[2] + plot.limits[3]))
 
 
-_HANDLE = 1.0, 0.85, 0.4, 1.0
-_FAINT = (0.75, 0.75, 0.8, 0.8)
-_MOST_KEYS = 300  # if more keys are visible, none can be dragged
-_SAME_KEY = 2.0  # points: keys closer than this cannot be distinguished
-_HANDLE_LENGTH = 4.0  # length of a tangent's handle, in font sizes
-_HANDLE_ID = 16
-_FIRST_KEY_ID = 32
-_KEYS_PER_ROW = 1 << 20
-_FIXED = implot.DragToolFlags_.no_fit
-
-
 def _draw_keys(plot: _Plot) -> bool:
     """Draw keys and tangents; return whether the mouse is over one of them.
 
@@ -447,61 +497,6 @@ def _is_pressed(key: imgui.Key) -> bool:
     is_dragging = imgui.is_mouse_down(imgui.MouseButton_.left)
     is_free = not (is_dragging or imgui.get_io().want_text_input)
     return is_free and imgui.is_key_pressed(key, False)
-
-
-_Color = tuple[float, float, float, float]
-
-# Smallest value range that fitted axes magnify to the height of the plot. Rotations and
-# positions in single precision, as files store them, are rounded to far smaller steps.
-_LEAST_ANGLE = math.radians(0.1)
-_LEAST_LENGTH = 5e-4  # lengths, relative to the size of the scene
-_LEAST = 1e-3  # scale factors and weights
-_LEAST_RELATIVE = 1e-5  # any value, relative to its magnitude
-_CONSTANT = 0.02  # fraction of that range below which a change is drawn as a constant
-_AXES_MARGIN = 0.16  # margin above and below the curves, relative to their height
-_COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
-_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness factors that distinguish the joints
-
-
-@dataclass(frozen=True, slots=True)
-class _Plot:
-    """State of the plot in this frame.
-
-    Attributes
-    ----------
-    state : AppState
-        State that is shown and changed.
-    curves : tuple of Curve
-        All curves of the motion.
-    limits : (low, high, bottom, top)
-        Ranges of clip time, in seconds, and of values, in the displayed unit.
-    scale : (float, float)
-        Pixels per second and per displayed unit.
-    """
-
-    state: AppState
-    curves: tuple[Curve, ...]
-    limits: tuple[float, float, float, float]
-    scale: tuple[float, float]
-
-    @property
-    def view(self) -> Curves:
-        """State of the Curves panel."""
-        return self.state.of(Curves)
-
-    def factor(self, row: int) -> float:
-        """Return the factor from a curve's values to the displayed unit."""
-        return factor_of(self.state, self.curves[row])
-
-    def color(self, row: int) -> _Color:
-        """Return a curve's colour."""
-        return curve_color(self.view, self.curves, row)
-
-    def note(self, label: str, time: float, value: float, reach: float = 4.0) -> None:
-        """Record the position of a point of the plot under a label, for tests."""
-        place = implot.plot_to_pixels(time, value)
-        rect = (place.x - reach, place.y - reach, place.x + reach, place.y + reach)
-        self.state.item_rects[label] = rect
 
 
 def measured(state: AppState, curves: tuple[Curve, ...]) -> _Plot:

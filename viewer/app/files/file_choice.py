@@ -10,8 +10,6 @@ from viewer.app.core.state import AppState
 from viewer.formats import FORMATS
 from viewer.phrases import printable
 
-__all__ = ["PICTURES", "FileDialog", "folder_of"]
-
 PICTURES = (".png", ".jpg", ".jpeg")
 """File suffixes of texture images."""
 

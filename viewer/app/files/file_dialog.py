@@ -20,6 +20,7 @@ from viewer.phrases import printable
 
 _SIZE = (46.0, 33.0)  # size of the dialog, in font sizes
 _RIG = {".skel", ".skin"}
+_PAGE = 12  # number of rows skipped by Page Up and Page Down
 
 
 def draw_file_dialog(state: AppState) -> None:
@@ -159,9 +160,6 @@ def _foot_height(dialog: FileDialog) -> float:
         + dialog.more_rows * imgui.get_text_line_height_with_spacing()
         + imgui.get_style().item_spacing.y
     )
-
-
-_PAGE = 12  # number of rows skipped by Page Up and Page Down
 
 
 def _draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Path]:

@@ -1,4 +1,4 @@
-"""State of opening files: dialog, loader, stream, and recent files."""
+"""Opening of files: the open dialog, the thread that reads files, and captures read while shown."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor, Scene
+
+_Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
+_WAITING = 4  # maximum number of parts in the queue: limits memory
 
 
 @dataclass(slots=True)
@@ -189,10 +192,6 @@ class Loader:
     def wait(self) -> None:
         """Wait until loading ends."""
         self._thread.join()
-
-
-_Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
-_WAITING = 4  # maximum number of parts in the queue: limits memory
 
 
 class Stream:

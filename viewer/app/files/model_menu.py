@@ -1,4 +1,4 @@
-"""The menu File > Models: body models that were found, missing ones, and the folder to search."""
+"""Menu of the body models that are installed or can be added, and their folder."""
 
 from __future__ import annotations
 

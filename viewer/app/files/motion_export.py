@@ -1,4 +1,4 @@
-"""Dialog to export motions: choice of actors, format and file."""
+"""Export for other programs: the list of formats, the actors and files, and writing of motions."""
 
 from __future__ import annotations
 
@@ -50,6 +50,15 @@ from viewer.rig.motion.upright import upright_actor
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
 
+_MANY = (".obj",)  # one file per frame: exported by the command line only
+_ALL_ANIMATIONS = (".gltf", ".glb")  # these contain all animations of a figure, not only one
+_FRAMES = "smpl"  # folder of the frames within a capture's folder
+FOLDER = "/"
+"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
+N_ROWS = 6.5
+"""Height of the list in lines: half a line shows that the list continues."""
+_COLUMNS = (("Format", 0.3), ("Keeps", 0.4), ("Omits", 0.3))
+
 
 @dataclass(slots=True)
 class _Selection:
@@ -57,6 +66,21 @@ class _Selection:
 
     everyone: bool
     safe_names: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """One actor to export: its state at the start of the export, target file and frames.
+
+    ``saved``: the edited clips and the pose that the file will contain.
+    """
+
+    actor: Actor
+    path: Path
+    frames: tuple[int, int] | None
+    rate: float | None
+    number: int
+    saved: tuple[object, ...]
 
 
 def ask_for_motion(state: AppState, suffix: str = "") -> None:
@@ -113,11 +137,6 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
     why = "" if suffix == ".bvh" else "for .bvh only"
     selection.safe_names = checkbox(state, "Safe names", selection.safe_names, why)
     explain(SAFE_NAMES, why)
-
-
-_MANY = (".obj",)  # one file per frame: exported by the command line only
-_ALL_ANIMATIONS = (".gltf", ".glb")  # these contain all animations of a figure, not only one
-_FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 
 def _moving_actors(state: AppState) -> list[Actor]:
@@ -187,21 +206,6 @@ def _is_one_file(path: Path) -> bool:
 def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
     """Return the distinct files of actors."""
     return [path] if _is_one_file(path) else motion_paths(path, actors)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Part:
-    """One actor to export: its state at the start of the export, target file and frames.
-
-    ``saved``: the edited clips and the pose that the file will contain.
-    """
-
-    actor: Actor
-    path: Path
-    frames: tuple[int, int] | None
-    rate: float | None
-    number: int
-    saved: tuple[object, ...]
 
 
 def save_motion(
@@ -390,13 +394,6 @@ def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
     first = -frame_at(clip.start + actor.offset - clock.start, rate)
     stop = frame_at(clock.end - actor.offset - clip.start, rate) + 1
     return max(first, 0), min(stop, count)
-
-
-FOLDER = "/"
-"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
-N_ROWS = 6.5
-"""Height of the list in lines: half a line shows that the list continues."""
-_COLUMNS = (("Format", 0.3), ("Keeps", 0.4), ("Omits", 0.3))
 
 
 def pose_formats() -> dict[str, Exporter]:

@@ -20,18 +20,6 @@ from viewer.media.kept_files import (
     with_checksum,
 )
 
-__all__ = [
-    "load_arranged",
-    "load_closed_panels",
-    "load_layout",
-    "load_recent",
-    "remember",
-    "save_arranged",
-    "save_closed_panels",
-    "save_layout",
-    "state_folder",
-]
-
 _MOST = 12
 _Say = Callable[[str], object]
 

@@ -14,8 +14,6 @@ from viewer.formats import all_or_none, check_targets
 from viewer.phrases import printable
 from viewer.progress import receiving
 
-__all__ = ["save_files", "save_in_background"]
-
 
 def save_files(
     state: AppState, act: Callable[[], object], files: list[Path], saved: object = None

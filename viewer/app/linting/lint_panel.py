@@ -1,4 +1,4 @@
-"""Lint panel: errors in rigs and motions, their locations, and remedies."""
+"""Lint panel: check of the scene in a thread, errors in rigs and motions, and their remedies."""
 
 from __future__ import annotations
 
@@ -53,6 +53,100 @@ _LONGEST = 400  # maximum length of a message in the list, characters
 _LIMITS_WIDTH = 24.0  # width of the limits, in font sizes
 _FASTEST = 100.0  # highest speed that can be set, units per second
 _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
+_TITLE = "Checking the rig"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Checked:
+    """Result of a check.
+
+    Attributes
+    ----------
+    source : Scene
+        The scene that the window shows.
+    scene : Scene
+        A copy of the scene, made when the check began.
+    options : LintOptions
+        Limits of the check.
+    findings : tuple of Finding
+        Findings, most severe first.
+    n_files : int
+        Number of files of the scene that were read again.
+    notes : tuple of str
+        Changes of these files since they were opened.
+    """
+
+    source: Scene
+    scene: Scene
+    options: LintOptions
+    findings: tuple[Finding, ...]
+    n_files: int = 0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(slots=True, eq=False)
+class _Running:
+    """A check that runs in a thread, which stores its result here."""
+
+    job: CountedJob | None = None
+    result: Checked | None = None
+
+
+@dataclass(slots=True)
+class Linting:
+    """State of the Lint panel.
+
+    Attributes
+    ----------
+    options : LintOptions
+        Limits of the next check.
+    checked : Checked or None
+        The last completed check.
+    running : Running or None
+        The check in progress.
+    was_shown : bool
+        Whether the panel has been shown before: showing it for the first time starts a check.
+    severities : set of str
+        Severities to list.
+    text : str
+        Text that listed findings must contain.
+    chosen : int
+        Index of the chosen finding, -1 for none.
+    wants_aim : bool
+        Whether the camera moves to the chosen finding once the scene is posed.
+    is_edited : bool
+        Whether a moving actor was posed by hand since the check.
+    seen : tuple
+        Time and poses of moving actors in the previous frame.
+    marks : Marks or None
+        Marks of the chosen finding.
+    marks_key : object
+        Key that identifies the marks.
+    marks_note : str
+        Note about parts of the finding that are not marked; empty if all are.
+    """
+
+    options: LintOptions = field(default_factory=LintOptions)
+    checked: Checked | None = None
+    running: _Running | None = None
+    was_shown: bool = False
+    severities: set[str] = field(default_factory=lambda: set(SEVERITIES))
+    text: str = ""
+    chosen: int = -1
+    wants_aim: bool = False
+    is_edited: bool = False
+    seen: tuple[object, ...] = ()
+    marks: Marks | None = None
+    marks_key: object = None
+    marks_note: str = ""
+
+    @property
+    def finding(self) -> Finding | None:
+        """The chosen finding."""
+        known = self.checked
+        if known is None or not 0 <= self.chosen < len(known.findings):
+            return None
+        return known.findings[self.chosen]
 
 
 def draw(state: AppState) -> None:
@@ -311,102 +405,6 @@ def _draw_severity(severity: str) -> None:
         draw_list.add_circle_filled((x, y - 0.4 * r), 0.6 * line, color)
         draw_list.add_line((x, y - 0.1 * r), (x, y + 0.5 * r), color, line)
     imgui.dummy((size, size))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Checked:
-    """Result of a check.
-
-    Attributes
-    ----------
-    source : Scene
-        The scene that the window shows.
-    scene : Scene
-        A copy of the scene, made when the check began.
-    options : LintOptions
-        Limits of the check.
-    findings : tuple of Finding
-        Findings, most severe first.
-    n_files : int
-        Number of files of the scene that were read again.
-    notes : tuple of str
-        Changes of these files since they were opened.
-    """
-
-    source: Scene
-    scene: Scene
-    options: LintOptions
-    findings: tuple[Finding, ...]
-    n_files: int = 0
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(slots=True, eq=False)
-class _Running:
-    """A check that runs in a thread, which stores its result here."""
-
-    job: CountedJob | None = None
-    result: Checked | None = None
-
-
-@dataclass(slots=True)
-class Linting:
-    """State of the Lint panel.
-
-    Attributes
-    ----------
-    options : LintOptions
-        Limits of the next check.
-    checked : Checked or None
-        The last completed check.
-    running : Running or None
-        The check in progress.
-    was_shown : bool
-        Whether the panel has been shown before: showing it for the first time starts a check.
-    severities : set of str
-        Severities to list.
-    text : str
-        Text that listed findings must contain.
-    chosen : int
-        Index of the chosen finding, -1 for none.
-    wants_aim : bool
-        Whether the camera moves to the chosen finding once the scene is posed.
-    is_edited : bool
-        Whether a moving actor was posed by hand since the check.
-    seen : tuple
-        Time and poses of moving actors in the previous frame.
-    marks : Marks or None
-        Marks of the chosen finding.
-    marks_key : object
-        Key that identifies the marks.
-    marks_note : str
-        Note about parts of the finding that are not marked; empty if all are.
-    """
-
-    options: LintOptions = field(default_factory=LintOptions)
-    checked: Checked | None = None
-    running: _Running | None = None
-    was_shown: bool = False
-    severities: set[str] = field(default_factory=lambda: set(SEVERITIES))
-    text: str = ""
-    chosen: int = -1
-    wants_aim: bool = False
-    is_edited: bool = False
-    seen: tuple[object, ...] = ()
-    marks: Marks | None = None
-    marks_key: object = None
-    marks_note: str = ""
-
-    @property
-    def finding(self) -> Finding | None:
-        """The chosen finding."""
-        known = self.checked
-        if known is None or not 0 <= self.chosen < len(known.findings):
-            return None
-        return known.findings[self.chosen]
-
-
-_TITLE = "Checking the rig"
 
 
 def check_rig(state: AppState) -> None:

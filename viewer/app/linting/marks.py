@@ -19,8 +19,6 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import actor_points
 
-__all__ = ["aim", "marks_of", "show_finding"]
-
 _MOST = 3000  # maximum number of marked vertices, and of marked triangle edges
 _FEW = 200  # up to this number, triangles also have a central mark: tiny edges cover no pixel
 _AROUND, _AROUND_JOINTS = 0.06, 0.15  # extents shown around a finding, relative to the actor's size

@@ -16,15 +16,6 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor
 
-__all__ = [
-    "NOT_ONE",
-    "animation_texts",
-    "choose_animation",
-    "no_animations",
-    "played",
-    "step_animation",
-]
-
 NOT_ONE = -2
 """Index of a motion that is not one of the figure's animations."""
 

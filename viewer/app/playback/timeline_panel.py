@@ -1,4 +1,4 @@
-"""Timeline panel: playback buttons, settings, a ruler for scrubbing, and a track per actor."""
+"""Timeline panel: playback buttons, settings and tracks; actions on time and the playback range."""
 
 from __future__ import annotations
 
@@ -37,6 +37,9 @@ from viewer.rig.scene import Actor, Motion
 
 _WIDEST_LIST = 16.0  # maximum width of the list of animations, in font sizes
 _CLAMP = imgui.SliderFlags_.always_clamp
+_gaps: Memo[Motion, bool] = Memo()
+_LIMITS = (0.01, 1000.0)
+"""Lowest and highest rate that can be set, frames per second."""
 
 
 def draw(state: AppState) -> None:
@@ -172,9 +175,6 @@ def _draw_range(state: AppState) -> None:
         clock.set_range(start, end)
 
 
-_gaps: Memo[Motion, bool] = Memo()
-
-
 def _no_gaps(state: AppState) -> str:
     """Return the reason why gaps cannot be interpolated; empty if they can or files are read."""
     if state.of(Files).stream is not None or any(
@@ -188,10 +188,6 @@ def _has_gaps(clip: Motion) -> bool:
     if isinstance(clip, Clip | TransformClip):
         return False
     return _gaps.get(clip, None, lambda: not clip.timing.holds or not clip.timing.present.all())
-
-
-_LIMITS = (0.01, 1000.0)
-"""Lowest and highest rate that can be set, frames per second."""
 
 
 def rate_of(state: AppState) -> float:

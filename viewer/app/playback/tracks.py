@@ -32,6 +32,7 @@ _NARROWEST_GAP = 1.0  # points between two bars of minimum width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
 _KEY, _KEY_SIZE = (0.0, 0.0, 0.0, 0.55), 0.16  # RGBA colour; size relative to the height of a track
 _LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
+_times: Memo[Clip | TransformClip, Floats] = Memo(kept=4)
 
 
 def draw_tracks(state: AppState) -> None:
@@ -244,9 +245,6 @@ def _nice_step(smallest: float) -> int:
     """
     power = 10 ** max(math.floor(math.log10(max(smallest, 1.0))), 0)
     return next(f * power for f in (1, 2, 5, 10) if f * power >= smallest - 1e-9)
-
-
-_times: Memo[Clip | TransformClip, Floats] = Memo(kept=4)
 
 
 def key_times(actor: Actor, joint: int) -> Floats:

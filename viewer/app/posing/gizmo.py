@@ -1,7 +1,12 @@
-"""Picking, dragging and releasing of handles in the view.
+"""Handles of the posing tools in the view: picking, dragging, release, and drawing.
 
 ImGuizmo rotates matrices about three orthogonal axes; joints here have one, two or three DOFs with
-limits, about axes that may be oblique, so rings and arrows are custom.
+limits, about axes that may be oblique, so rings and arrows are custom. Like the image of the scene,
+handles are drawn behind the panels, so they are drawn after the image.
+
+The arc of a limit covers the directions that the bone can reach: it starts at the bone's current
+direction perpendicular to the axis, and its ends are the limits. If the bone is parallel to the
+axis, as for a twist, one of the joint's own axes is used instead.
 """
 
 from __future__ import annotations
@@ -54,6 +59,82 @@ _DOT_REACH = 14.0
 _BESIDE = 22.0  # distance in points from a handle within which a drag does not orbit
 _STILL = 2.0  # maximum movement of the pointer during a click, window coordinates
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
+_Color: TypeAlias = tuple[float, float, float, float]
+_AXES = ((0.98, 0.36, 0.33), (0.45, 0.86, 0.38), (0.36, 0.60, 1.0), (0.92, 0.92, 0.92))
+_HOT = (1.0, 0.92, 0.55)
+_LIMIT = (1.0, 0.70, 0.10)
+_CHAIN = (0.45, 0.90, 0.95)
+_BEHIND = 0.28  # opacity of the far side of a ring
+_MOST_DOTS = 300  # maximum number of joints for which dots are drawn
+_ARC_RADIUS = 0.62  # radius of an arc, relative to that of the rings
+_GAP = 10.0  # points between a ring and its text
+_ALONG = 0.35  # sine of the angle between bone and axis below which the rotation is not visible
+_STEP = math.radians(4.0)  # between two points of an arc
+_WHOLE = 2.0 * math.pi
+_ROUNDING = 1e-6  # tolerance within which a value is at a limit, radians
+
+
+class _Pen:
+    """Draws points of the scene as lines in the window; sizes are in points."""
+
+    def __init__(self, frame: ViewFrame) -> None:
+        self.frame, self.list = frame, imgui.get_background_draw_list()
+        self.scale = frame.scale
+
+    def line(self, points: Floats, color: _Color, thickness: float) -> None:
+        """Draw a line through (N, 3) points, unless one of them is behind the eye."""
+        seen = self.frame.project(points)
+        if np.isfinite(seen).all():
+            ink = imgui.get_color_u32(color)
+            self.list.add_polyline(
+                [(x, y) for x, y in seen.tolist()], ink, thickness * self.scale, 0
+            )
+
+    def fan(self, center: Floats, points: Floats, color: _Color) -> None:
+        """Fill the area between a point and a polyline."""
+        seen, middle = self.frame.project(points), self.frame.place(center)
+        if middle is None or not np.isfinite(seen).all():
+            return
+        rows: list[ImVec2Like] = [imgui.ImVec2(x, y) for x, y in [middle, *seen.tolist()]]
+        self.list.add_concave_poly_filled(rows, imgui.get_color_u32(color))
+
+    def dot(self, point: Floats, radius: float, color: _Color, filled: bool = True) -> None:
+        """Draw a disc, or a circle, around a point."""
+        place = self.frame.place(point)
+        if place is None:
+            return
+        ink = imgui.get_color_u32(color)
+        if filled:
+            self.list.add_circle_filled(place, radius * self.scale, ink)
+        else:
+            self.list.add_circle(place, radius * self.scale, ink, 0, 2.0 * self.scale)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _LimitArc:
+    """The range of one rotation DOF.
+
+    Attributes
+    ----------
+    dof : int
+        Row of the DOF table.
+    color : int
+        0, 1, 2 for x, y, z.
+    axis, start : (3,)
+        Rotation axis, and the current direction perpendicular to it: unit vectors, scene space.
+    low, high : float
+        Limits relative to the current value, radians about the axis; low <= 0 <= high.
+    is_limited : bool
+        Whether the value is at a limit.
+    """
+
+    dof: int
+    color: int
+    axis: Floats
+    start: Floats
+    low: float
+    high: float
+    is_limited: bool
 
 
 def use_handles(state: AppState) -> bool:
@@ -223,57 +304,6 @@ def choose_joint(state: AppState) -> bool:
     if joint >= 0:
         select_joint(state, joint)
     return joint >= 0
-
-
-# Drawing of the handles: joints, chain, limit arcs, rings, arrows, and their labels.
-#
-# Like the image of the scene, they are drawn behind the panels, so they must be drawn after it.
-
-_Color: TypeAlias = tuple[float, float, float, float]
-_AXES = ((0.98, 0.36, 0.33), (0.45, 0.86, 0.38), (0.36, 0.60, 1.0), (0.92, 0.92, 0.92))
-_HOT = (1.0, 0.92, 0.55)
-_LIMIT = (1.0, 0.70, 0.10)
-_CHAIN = (0.45, 0.90, 0.95)
-_BEHIND = 0.28  # opacity of the far side of a ring
-_MOST_DOTS = 300  # maximum number of joints for which dots are drawn
-_ARC_RADIUS = 0.62  # radius of an arc, relative to that of the rings
-_GAP = 10.0  # points between a ring and its text
-
-
-class _Pen:
-    """Draws points of the scene as lines in the window; sizes are in points."""
-
-    def __init__(self, frame: ViewFrame) -> None:
-        self.frame, self.list = frame, imgui.get_background_draw_list()
-        self.scale = frame.scale
-
-    def line(self, points: Floats, color: _Color, thickness: float) -> None:
-        """Draw a line through (N, 3) points, unless one of them is behind the eye."""
-        seen = self.frame.project(points)
-        if np.isfinite(seen).all():
-            ink = imgui.get_color_u32(color)
-            self.list.add_polyline(
-                [(x, y) for x, y in seen.tolist()], ink, thickness * self.scale, 0
-            )
-
-    def fan(self, center: Floats, points: Floats, color: _Color) -> None:
-        """Fill the area between a point and a polyline."""
-        seen, middle = self.frame.project(points), self.frame.place(center)
-        if middle is None or not np.isfinite(seen).all():
-            return
-        rows: list[ImVec2Like] = [imgui.ImVec2(x, y) for x, y in [middle, *seen.tolist()]]
-        self.list.add_concave_poly_filled(rows, imgui.get_color_u32(color))
-
-    def dot(self, point: Floats, radius: float, color: _Color, filled: bool = True) -> None:
-        """Draw a disc, or a circle, around a point."""
-        place = self.frame.place(point)
-        if place is None:
-            return
-        ink = imgui.get_color_u32(color)
-        if filled:
-            self.list.add_circle_filled(place, radius * self.scale, ink)
-        else:
-            self.list.add_circle(place, radius * self.scale, ink, 0, 2.0 * self.scale)
 
 
 def draw_gizmo(state: AppState) -> None:
@@ -494,45 +524,6 @@ def _text_box(
     for (text, color), size in zip(lines, sizes, strict=True):
         pen.list.add_text((left, top), imgui.get_color_u32(color), text)
         top += size.y
-
-
-# Arcs of rotation limits, about the current axes of a joint.
-#
-# An arc covers the directions that the bone can reach: it starts at the bone's current direction
-# perpendicular to the axis, and its ends are the limits. If the bone is parallel to the axis, as
-# for a twist, one of the joint's own axes is used instead.
-
-_ALONG = 0.35  # sine of the angle between bone and axis below which the rotation is not visible
-_STEP = math.radians(4.0)
-_WHOLE = 2.0 * math.pi
-_ROUNDING = 1e-6  # tolerance within which a value is at a limit, radians
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _LimitArc:
-    """The range of one rotation DOF.
-
-    Attributes
-    ----------
-    dof : int
-        Row of the DOF table.
-    color : int
-        0, 1, 2 for x, y, z.
-    axis, start : (3,)
-        Rotation axis, and the current direction perpendicular to it: unit vectors, scene space.
-    low, high : float
-        Limits relative to the current value, radians about the axis; low <= 0 <= high.
-    is_limited : bool
-        Whether the value is at a limit.
-    """
-
-    dof: int
-    color: int
-    axis: Floats
-    start: Floats
-    low: float
-    high: float
-    is_limited: bool
 
 
 def limit_arcs(joint: PosedJoint, pose: Pose) -> list[_LimitArc]:

@@ -19,8 +19,6 @@ from viewer.rig.memo import Memo
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.posing.pose_vector import set_joint_rotations
 
-__all__ = ["draw"]
-
 _REACH = 3.0  # range of a slider; larger values can be typed
 _CLAMP = imgui.SliderFlags_.always_clamp
 _coefficients: Memo[Hand, Floats] = Memo()

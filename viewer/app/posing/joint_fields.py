@@ -33,6 +33,9 @@ _LABEL_WIDTH = 4.2  # width of a label, in font sizes
 _LARGEST = 1e9
 _NOTICEABLE = 1e-4  # tolerance for rounding, relative to the longest bone or a scale of 1
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
+_SAME = 1e-9  # tolerance for equal rotations
+_rotations: Memo[Skeleton, Floats] = Memo()
+_numbers: Memo[Skeleton, Floats] = Memo()
 
 
 @dataclass(slots=True)
@@ -147,11 +150,6 @@ def _is_reset(text: str) -> bool:
         return False
     show_tooltip(f"{text}\ndrag, or Ctrl+click to type a value; double-click to reset")
     return imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
-
-
-_SAME = 1e-9  # tolerance for equal rotations
-_rotations: Memo[Skeleton, Floats] = Memo()
-_numbers: Memo[Skeleton, Floats] = Memo()
 
 
 def is_ball(figure: Figure, joint: int) -> bool:

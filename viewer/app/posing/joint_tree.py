@@ -9,8 +9,6 @@ from viewer.data_classes import dataclass
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 
-__all__ = ["JointTree", "joint_tree", "select_joint"]
-
 _MOST_OPENED = 128  # rigs with more joints are initially collapsed
 
 

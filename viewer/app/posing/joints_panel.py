@@ -70,6 +70,16 @@ _DEEPEST = 14  # maximum number of indented levels: chains of thousands must sta
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
 _MAY_TYPE_BEYOND = imgui.SliderFlags_.none
 _STAYS_WITHIN = imgui.SliderFlags_.always_clamp
+_Rows: TypeAlias = tuple[tuple[int, int, int], ...]
+_OWN_NUMBERS = -2
+"""Value used instead of a DOF for the row with the raw pose values of the body model."""
+_TRANSLATION, _SCALE = -3, -4
+"""Values used instead of a DOF for the rows with the translation and the scale of a joint."""
+_LONGEST = 60  # maximum length of a name in characters
+_known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
+_known_rows: Memo[Skeleton, _Rows] = Memo(kept=4)
+_SEEN, _DOUBTFUL = (0.30, 0.55, 0.38, 1.0), (0.62, 0.42, 0.22, 1.0)
+_NAME_WIDTH = 0.55  # width of the names, as a fraction of the panel's width
 
 
 def draw(state: AppState) -> None:
@@ -307,16 +317,6 @@ def _value_text(value: float, kind: int, in_degrees: bool) -> str:
     return angle_text(value, in_degrees) if kind >= FIRST_ROTATION else number_text(value)
 
 
-_Rows: TypeAlias = tuple[tuple[int, int, int], ...]
-_OWN_NUMBERS = -2
-"""Value used instead of a DOF for the row with the raw pose values of the body model."""
-_TRANSLATION, _SCALE = -3, -4
-"""Values used instead of a DOF for the rows with the translation and the scale of a joint."""
-_LONGEST = 60  # maximum length of a name in characters
-_known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
-_known_rows: Memo[Skeleton, _Rows] = Memo(kept=4)
-
-
 def _row_labels(skeleton: Skeleton) -> tuple[str, ...]:
     """Return the displayed labels of all joints."""
 
@@ -410,10 +410,6 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             return rest
     return moved if changed and math.isfinite(moved) and abs(moved) < 1e9 else value
-
-
-_SEEN, _DOUBTFUL = (0.30, 0.55, 0.38, 1.0), (0.62, 0.42, 0.22, 1.0)
-_NAME_WIDTH = 0.55  # width of the names, as a fraction of the panel's width
 
 
 def _draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> None:

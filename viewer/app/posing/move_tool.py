@@ -20,20 +20,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.posing.inverse_kinematics import chain_above, reach
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = [
-    "LENGTH",
-    "Arrow",
-    "MoveHandle",
-    "ReachHandle",
-    "arrows",
-    "grab_arrow",
-    "longest_chain",
-    "shift_text",
-    "shifts",
-    "translation_dofs",
-    "used_chain",
-]
-
 LENGTH = 72.0
 """Length of the arrows, points."""
 

@@ -14,8 +14,6 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["PosedJoint", "posed_joint"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedJoint:

@@ -1,4 +1,4 @@
-"""State of the posing tools, the interface of handles, and the result of a drag."""
+"""Posing: the state of the tools and of a drag, and actions on the pose and shape of an actor."""
 
 from __future__ import annotations
 
@@ -48,6 +48,7 @@ ORIENTATIONS = {
     "world": "World axes",
 }
 """Orientations of rings and arrows, for joints that can rotate about or move along all axes."""
+_RANDOM = 10  # number of random coefficients: the first have the largest variance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,9 +217,6 @@ def pause_for_edit(state: AppState) -> None:
         else "sampled motions cannot be keyed"
     )
     state.say_status(f"{stopped} clip overwrites this pose when the time changes; {kept}")
-
-
-_RANDOM = 10  # number of random coefficients: the first have the largest variance
 
 
 def _record(state: AppState) -> PoseRecord | None:

@@ -24,17 +24,6 @@ from viewer.rig.posing.inverse_kinematics import rotation_axes
 from viewer.rig.posing.joint_rotation import nearest_dofs, rotates_freely, rotation_dofs
 from viewer.rig.skeleton import Skeleton, dof_label, joint_label
 
-__all__ = [
-    "RADIUS",
-    "Ring",
-    "RotateHandle",
-    "circle",
-    "grab_ring",
-    "limit_text",
-    "rings",
-    "toward_eye",
-]
-
 RADIUS = 78.0
 """Radius of the rings, points."""
 

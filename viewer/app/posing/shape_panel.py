@@ -1,4 +1,4 @@
-"""Shape panel: sliders of shape coefficients, expressions and morphs, and body measures."""
+"""Shape panel: sliders of the blend shapes, measurements, and shapes that cannot be read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Application of the preferences to the running window: theme, scale, font and keys."""
+"""Application of the preferences to the running window: theme, scale, font and keys.
+
+The theme may follow the desktop, if it can be queried: macOS, Windows, and desktops with gsettings.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,11 @@ from viewer.app.core.widgets import KeyNames
 from viewer.app.features import KEYS
 from viewer.app.preferences.key_map import label_of
 from viewer.app.preferences.preferences import Appearance, Preferences, save_preferences
+
+_PATIENCE = 1.0  # time limit in seconds: some desktops do not respond
+_GSETTINGS = ("gsettings", "get", "org.gnome.desktop.interface", "color-scheme")
+_DEFAULTS = ("defaults", "read", "-g", "AppleInterfaceStyle")
+_PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"
 
 
 def start_with(state: AppState, preferences: Preferences) -> None:
@@ -83,12 +91,6 @@ def follow_preferences(state: AppState) -> None:
         applied.keys = dict(preferences.keys)
         names = {key.label: label_of(key, preferences.keys) for key in KEYS}
         state.of(KeyNames).changed = {usual: name for usual, name in names.items() if name != usual}
-
-
-_PATIENCE = 1.0  # time limit in seconds: some desktops do not respond
-_GSETTINGS = ("gsettings", "get", "org.gnome.desktop.interface", "color-scheme")
-_DEFAULTS = ("defaults", "read", "-g", "AppleInterfaceStyle")
-_PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"
 
 
 def system_theme() -> str:

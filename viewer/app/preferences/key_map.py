@@ -8,8 +8,6 @@ from imgui_bundle import imgui
 
 from viewer.app.features import KEYS, Shortcut
 
-__all__ = ["FIXED", "chord_name", "chords_of", "conflicts", "label_of", "parse_chord", "pressed"]
-
 FIXED = ("Esc",)
 """Labels of keys that cannot be changed."""
 

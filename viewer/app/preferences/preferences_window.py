@@ -38,8 +38,6 @@ from viewer.models import load_model_folder
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES
 
-__all__ = ["close_preferences", "draw_preferences", "open_preferences"]
-
 _TITLE = "Preferences"
 _SIZE = (36.0, 42.0)  # initial size of the window, in font sizes
 _ALWAYS_CLAMP = imgui.SliderFlags_.always_clamp

@@ -1,4 +1,4 @@
-"""The Record window: settings for images, a contact sheet or a video of the view."""
+"""The Record window: settings for images, a contact sheet or a video of the view; its preview."""
 
 from __future__ import annotations
 
@@ -59,6 +59,183 @@ _TITLE = "Record"
 _WINDOW = (30.0, 42.5)  # initial size of the window, in font sizes
 _MOST_PIXELS = 16384
 _MOST_CELLS = 400
+KINDS = {
+    ".mp4": "MP4 video (H.264)",
+    ".webm": "WebM video (VP9)",
+    ".gif": "Animated GIF",
+    "pictures": "Numbered pictures (PNG)",
+    "sheet": "Contact sheet (PNG)",
+}
+"""Kinds of recordings, with their labels."""
+_VIDEO_KINDS = (".mp4", ".webm", ".gif")
+"""Kinds that are a video file, by its suffix."""
+_LEAST_PIXELS = 16
+"""Minimum width and height of a recording."""
+_WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
+
+
+@dataclass(slots=True)
+class RecordSettings:
+    """Settings of a recording.
+
+    Attributes
+    ----------
+    kind : str
+        A key of ``KINDS``.
+    size : str
+        A key of the available sizes.
+    own_size : (int, int)
+        Width and height for the size ``"own"``.
+    rate : float
+        Frames per second; 0 for the scene's own rate.
+    turntable : bool
+        Whether the camera orbits once around the scene.
+    seconds : float
+        Duration of the orbit if there is no motion.
+    n_cells : int
+        Number of frames in a contact sheet.
+    quality : int
+        Quality of the compression of videos, 0 to 100.
+    look : str
+        Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
+        the view, or normal if the view is final and there are several frames.
+    samples : int
+        Samples per pixel; 0 for those of the view.
+    background : str
+        As in ``DisplayOptions``; empty for the background of the view.
+    follows : bool
+        Whether the camera follows the same actor or joint as in the view.
+    frames : (int, int) or None
+        First and last frame, numbered as in the timeline; None for the playback range.
+    """
+
+    kind: str = ".mp4"
+    size: str = "view"
+    own_size: tuple[int, int] = (1280, 720)
+    rate: float = 0.0
+    turntable: bool = False
+    seconds: float = 6.0
+    n_cells: int = 12
+    quality: int = 75
+    look: str = ""
+    samples: int = 0
+    background: str = ""
+    follows: bool = True
+    frames: tuple[int, int] | None = None
+
+    @property
+    def is_transparent(self) -> bool:
+        """Whether the background is transparent and the file format supports transparency."""
+        return self.background == "transparent" and self.kind != ".mp4"
+
+    def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
+        """Return the width and height of the recording for a given size of the view."""
+        if self.size == "view":
+            wide, high = (max(round(side), _LEAST_PIXELS) for side in view)
+            # Videos need even sizes; losing a row of the view does not matter.
+            return wide - wide % 2, high - high % 2
+        if self.size == "own":
+            return self.own_size
+        width, _, height = self.size.partition("x")
+        return int(width), int(height)
+
+
+@dataclass(slots=True)
+class RecordingState:
+    """State of the Record window.
+
+    Attributes
+    ----------
+    settings : RecordSettings or None
+        Settings shown in the window; None while it is closed.
+    wanted : Path or None
+        Target file of a recording that starts after the frame.
+    preview : int
+        ID of the preview's texture; 0 if there is none.
+    """
+
+    settings: RecordSettings | None = None
+    wanted: Path | None = None
+    preview: int = 0
+
+
+class Preview:
+    """Draws the preview into a texture whenever the preview changes.
+
+    Parameters
+    ----------
+    programs : Programs
+        Programs of the context that is current in every call.
+    """
+
+    def __init__(self, programs: Programs) -> None:
+        self._programs, self.context = programs, programs.context
+        self.target: Target | None = None
+        self._renderer: Renderer | None = None
+        self._drawn: object = None
+        self._old: list[Target] = []
+
+    def draw(self, state: AppState, key: object) -> None:
+        """Draw the preview if the Record window is open and the image has changed.
+
+        Parameters
+        ----------
+        state : AppState
+            State with the settings; receives the texture.
+        key : object
+            Identifies the image of the view.
+        """
+        recording = state.of(RecordingState)
+        settings = recording.settings
+        self._release_old()
+        if settings is None:
+            self._drawn, recording.preview = None, 0
+            self._retire()
+            self._release_renderer()
+            return
+        size = _preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
+        wanted = (key, size, settings.look, settings.background, settings.kind, settings.samples)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        recording.preview = self._draw(state, settings, size)
+
+    def _draw(self, state: AppState, settings: RecordSettings, size: tuple[int, int]) -> int:
+        """Draw the preview and return the ID of its texture."""
+        options = recorded_options(state, settings, 2)
+        target = self.target
+        if target is None or (target.size, target.asked_samples) != (size, options.samples):
+            self._retire()
+            self.target = target = Target(self.context, size, options.samples)
+        camera = state.camera.copy()
+        selected = (state.chosen_actor, state.selected_joint)
+        # The view's renderer may still be averaging its own image.
+        renderer = self._renderer = self._renderer or Renderer(self._programs)
+        renderer.draw(state.scene, camera, options, target, state.box, selected)
+        target.resolve()
+        return int(target.texture.glo)
+
+    def _retire(self) -> None:
+        """Release the target in the next frame: panels of this frame may show its texture."""
+        if self.target is not None:
+            self._old.append(self.target)
+            self.target = None
+
+    def _release_old(self) -> None:
+        for target in self._old:
+            target.release()
+        self._old.clear()
+
+    def release(self) -> None:
+        """Release everything, as when the window is closed."""
+        self._retire()
+        self._release_old()
+        self._release_renderer()
+
+    def _release_renderer(self) -> None:
+        if self._renderer is not None:
+            self._renderer.release()
+            self._renderer = None
 
 
 def open_record_dialog(state: AppState) -> None:
@@ -241,105 +418,6 @@ def _start(state: AppState, paths: list[Path]) -> None:
     recording.wanted = paths[0]
 
 
-KINDS = {
-    ".mp4": "MP4 video (H.264)",
-    ".webm": "WebM video (VP9)",
-    ".gif": "Animated GIF",
-    "pictures": "Numbered pictures (PNG)",
-    "sheet": "Contact sheet (PNG)",
-}
-"""Kinds of recordings, with their labels."""
-_VIDEO_KINDS = (".mp4", ".webm", ".gif")
-"""Kinds that are a video file, by its suffix."""
-_LEAST_PIXELS = 16
-"""Minimum width and height of a recording."""
-
-
-@dataclass(slots=True)
-class RecordSettings:
-    """Settings of a recording.
-
-    Attributes
-    ----------
-    kind : str
-        A key of ``KINDS``.
-    size : str
-        A key of the available sizes.
-    own_size : (int, int)
-        Width and height for the size ``"own"``.
-    rate : float
-        Frames per second; 0 for the scene's own rate.
-    turntable : bool
-        Whether the camera orbits once around the scene.
-    seconds : float
-        Duration of the orbit if there is no motion.
-    n_cells : int
-        Number of frames in a contact sheet.
-    quality : int
-        Quality of the compression of videos, 0 to 100.
-    look : str
-        Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
-        the view, or normal if the view is final and there are several frames.
-    samples : int
-        Samples per pixel; 0 for those of the view.
-    background : str
-        As in ``DisplayOptions``; empty for the background of the view.
-    follows : bool
-        Whether the camera follows the same actor or joint as in the view.
-    frames : (int, int) or None
-        First and last frame, numbered as in the timeline; None for the playback range.
-    """
-
-    kind: str = ".mp4"
-    size: str = "view"
-    own_size: tuple[int, int] = (1280, 720)
-    rate: float = 0.0
-    turntable: bool = False
-    seconds: float = 6.0
-    n_cells: int = 12
-    quality: int = 75
-    look: str = ""
-    samples: int = 0
-    background: str = ""
-    follows: bool = True
-    frames: tuple[int, int] | None = None
-
-    @property
-    def is_transparent(self) -> bool:
-        """Whether the background is transparent and the file format supports transparency."""
-        return self.background == "transparent" and self.kind != ".mp4"
-
-    def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
-        """Return the width and height of the recording for a given size of the view."""
-        if self.size == "view":
-            wide, high = (max(round(side), _LEAST_PIXELS) for side in view)
-            # Videos need even sizes; losing a row of the view does not matter.
-            return wide - wide % 2, high - high % 2
-        if self.size == "own":
-            return self.own_size
-        width, _, height = self.size.partition("x")
-        return int(width), int(height)
-
-
-@dataclass(slots=True)
-class RecordingState:
-    """State of the Record window.
-
-    Attributes
-    ----------
-    settings : RecordSettings or None
-        Settings shown in the window; None while it is closed.
-    wanted : Path or None
-        Target file of a recording that starts after the frame.
-    preview : int
-        ID of the preview's texture; 0 if there is none.
-    """
-
-    settings: RecordSettings | None = None
-    wanted: Path | None = None
-    preview: int = 0
-
-
 def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:
     """Return the display options of a recording.
 
@@ -402,88 +480,6 @@ def recorded_times(state: AppState, settings: RecordSettings) -> tuple[Floats, l
         chosen = np.unique(np.rint(np.linspace(0, last, settings.n_cells)).astype(int))
         return times[chosen], (first + chosen).tolist(), rate
     return times, list(range(first, first + len(times))), rate
-
-
-_WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
-
-
-class Preview:
-    """Draws the preview into a texture whenever the preview changes.
-
-    Parameters
-    ----------
-    programs : Programs
-        Programs of the context that is current in every call.
-    """
-
-    def __init__(self, programs: Programs) -> None:
-        self._programs, self.context = programs, programs.context
-        self.target: Target | None = None
-        self._renderer: Renderer | None = None
-        self._drawn: object = None
-        self._old: list[Target] = []
-
-    def draw(self, state: AppState, key: object) -> None:
-        """Draw the preview if the Record window is open and the image has changed.
-
-        Parameters
-        ----------
-        state : AppState
-            State with the settings; receives the texture.
-        key : object
-            Identifies the image of the view.
-        """
-        recording = state.of(RecordingState)
-        settings = recording.settings
-        self._release_old()
-        if settings is None:
-            self._drawn, recording.preview = None, 0
-            self._retire()
-            self._release_renderer()
-            return
-        size = _preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
-        wanted = (key, size, settings.look, settings.background, settings.kind, settings.samples)
-        if wanted == self._drawn:
-            return
-        self._drawn = wanted
-        recording.preview = self._draw(state, settings, size)
-
-    def _draw(self, state: AppState, settings: RecordSettings, size: tuple[int, int]) -> int:
-        """Draw the preview and return the ID of its texture."""
-        options = recorded_options(state, settings, 2)
-        target = self.target
-        if target is None or (target.size, target.asked_samples) != (size, options.samples):
-            self._retire()
-            self.target = target = Target(self.context, size, options.samples)
-        camera = state.camera.copy()
-        selected = (state.chosen_actor, state.selected_joint)
-        # The view's renderer may still be averaging its own image.
-        renderer = self._renderer = self._renderer or Renderer(self._programs)
-        renderer.draw(state.scene, camera, options, target, state.box, selected)
-        target.resolve()
-        return int(target.texture.glo)
-
-    def _retire(self) -> None:
-        """Release the target in the next frame: panels of this frame may show its texture."""
-        if self.target is not None:
-            self._old.append(self.target)
-            self.target = None
-
-    def _release_old(self) -> None:
-        for target in self._old:
-            target.release()
-        self._old.clear()
-
-    def release(self) -> None:
-        """Release everything, as when the window is closed."""
-        self._retire()
-        self._release_old()
-        self._release_renderer()
-
-    def _release_renderer(self) -> None:
-        if self._renderer is not None:
-            self._renderer.release()
-            self._renderer = None
 
 
 def _preview_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -37,6 +37,51 @@ from viewer.rig.scene import Scene
 _FULL = 360.0  # full revolution, degrees
 
 
+class RecordedMarks:
+    """Annotations of a moving scene: those of the pinned vertex and of the chosen finding.
+
+    Parameters
+    ----------
+    state : AppState
+        State with the marks and the explanation; they are copied, so later changes have no effect.
+    """
+
+    def __init__(self, state: AppState) -> None:
+        weights = state.of(Weights)
+        linting = state.of(Linting)
+        self._pinned, self._draws_lines = weights.pinned, weights.draws_lines
+        self._finding: Finding | None = linting.finding if linting.marks else None
+        self._skinning = deepcopy(state.options.skinning)
+        self._binding = state.options.show == "binding"
+
+    def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
+        """Return the annotations of one frame.
+
+        Parameters
+        ----------
+        scene : Scene
+            Posed scene with the actors of the state, or copies of them.
+        size : (int, int)
+            Width and height of the image, pixels.
+
+        Raises
+        ------
+        ViewerError
+            If a figure's shapes cannot be read.
+        """
+        found = []
+        if self._finding is not None:
+            places = places_of(self._finding, scene, self._skinning, self._binding)
+            found.append(mark_annotation(marks_of(places)[0]))
+        pinned = self._pinned
+        if pinned is not None and not self._binding:
+            actor = scene.actors[pinned.actor]
+            if actor.pose is not None and actor.is_drawn:
+                why = explain(actor.figure, actor.pose, self._skinning, pinned.vertex)
+                found.append(vertex_annotation(why, actor, self._draws_lines, size))
+        return found
+
+
 def _recording_steps(
     state: AppState,
     programs: Programs,
@@ -156,51 +201,6 @@ def _sink(
     from viewer.media.video import VideoSink
 
     return VideoSink(files[0], size, rate, settings.quality, settings.is_transparent), size
-
-
-class RecordedMarks:
-    """Annotations of a moving scene: those of the pinned vertex and of the chosen finding.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the marks and the explanation; they are copied, so later changes have no effect.
-    """
-
-    def __init__(self, state: AppState) -> None:
-        weights = state.of(Weights)
-        linting = state.of(Linting)
-        self._pinned, self._draws_lines = weights.pinned, weights.draws_lines
-        self._finding: Finding | None = linting.finding if linting.marks else None
-        self._skinning = deepcopy(state.options.skinning)
-        self._binding = state.options.show == "binding"
-
-    def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
-        """Return the annotations of one frame.
-
-        Parameters
-        ----------
-        scene : Scene
-            Posed scene with the actors of the state, or copies of them.
-        size : (int, int)
-            Width and height of the image, pixels.
-
-        Raises
-        ------
-        ViewerError
-            If a figure's shapes cannot be read.
-        """
-        found = []
-        if self._finding is not None:
-            places = places_of(self._finding, scene, self._skinning, self._binding)
-            found.append(mark_annotation(marks_of(places)[0]))
-        pinned = self._pinned
-        if pinned is not None and not self._binding:
-            actor = scene.actors[pinned.actor]
-            if actor.pose is not None and actor.is_drawn:
-                why = explain(actor.figure, actor.pose, self._skinning, pinned.vertex)
-                found.append(vertex_annotation(why, actor, self._draws_lines, size))
-        return found
 
 
 def start_recording(state: AppState, renderer: Renderer) -> None:

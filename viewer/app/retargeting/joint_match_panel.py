@@ -1,4 +1,4 @@
-"""Joint match panel: which joint of a motion drives each joint of the figure."""
+"""Joint match panel: which joint of a motion drives each joint of the figure, and joint maps."""
 
 from __future__ import annotations
 
@@ -52,6 +52,108 @@ _AT_REST = "(at rest)"
 _WIDE = 44.0  # font sizes: a narrower panel has the skeletons below the table
 _TABLE = 0.56  # fraction of a wide panel's width
 _MOST_DRIVEN = 3  # maximum number of names listed after a joint that is already used
+_MATCHED = (0.45, 0.78, 1.0, 1.0)
+_HOVERED = (1.0, 0.86, 0.35, 1.0)
+_NEAR = 0.7  # distance in font sizes within which a joint is hovered
+_DOT = 0.16  # radius of a joint, font sizes
+_DRAG = 0.01  # radians per pixel
+_Box = tuple[float, float, float, float]
+_LONG = 1.3  # ratio of length to width from which a body is shown from the side
+_SIDE_VIEW = -1.1  # yaw of the view from the side, radians
+_SUFFIXES = (".txt",)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Side:
+    """One of the two skeletons.
+
+    Attributes
+    ----------
+    name : str
+        Name of the figure or the motion.
+    labels : tuple of J str
+        Labels of its joints.
+    joints : (N,) int32
+        Joints that are shown.
+    parents : (J,)
+        Parents of its joints.
+    points : (J, 3)
+        Joints at rest seen from the front: to the body's left, up, and forward.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    joints: Ints
+    parents: Ints
+    points: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """A match of joints with everything that the panel draws.
+
+    Attributes
+    ----------
+    drive, figure : Drive, Figure
+        The drive and the figure that were matched.
+    target, source : Side
+        The figure and the motion.
+    partners : (J,)
+        Joint of the motion for each joint of the figure, -1 for none.
+    origins : tuple of J str
+        How each joint was matched, see ``Matches``.
+    driven : dict
+        Joints of the figure that each joint of the motion drives.
+    """
+
+    drive: Drive
+    figure: Figure
+    target: _Side
+    source: _Side
+    partners: Ints
+    origins: tuple[str, ...]
+    driven: dict[int, list[int]]
+
+    @property
+    def n_driven(self) -> int:
+        """Number of joints of the figure that are driven."""
+        return int((self.partners[self.target.joints] >= 0).sum())
+
+    @property
+    def unused(self) -> list[int]:
+        """Joints of the motion that drive no joint."""
+        return [joint for joint in self.source.joints.tolist() if joint not in self.driven]
+
+
+@dataclass(slots=True)
+class JointMatch:
+    """State of the panel.
+
+    Attributes
+    ----------
+    filter : str
+        Text that the names of a listed pair must contain.
+    source_filter : str
+        Text that the names offered in an open list must contain.
+    only_unmatched : bool
+        Whether only joints without a partner are listed.
+    yaw : float
+        Rotation of the drawn skeletons about the up axis, radians.
+    hovered : (set of int, set of int)
+        Joints of the figure and of the motion under the mouse, and their partners.
+    scrolls_to : int
+        Joint to whose row the table scrolls, -1 for none.
+    shown : Shown or None
+        The match, computed again when the drive or the figure changes.
+    """
+
+    filter: str = ""
+    source_filter: str = ""
+    only_unmatched: bool = False
+    yaw: float = 0.0
+    hovered: tuple[set[int], set[int]] = field(default_factory=lambda: (set(), set()))
+    scrolls_to: int = -1
+    shown: _Shown | None = None
 
 
 def draw(state: AppState) -> None:
@@ -218,14 +320,6 @@ def _draw_choice(state: AppState, shown: _Shown, joint: int, partner: int) -> No
     imgui.end_combo()
 
 
-_MATCHED = (0.45, 0.78, 1.0, 1.0)
-_HOVERED = (1.0, 0.86, 0.35, 1.0)
-_NEAR = 0.7  # distance in font sizes within which a joint is hovered
-_DOT = 0.16  # radius of a joint, font sizes
-_DRAG = 0.01  # radians per pixel
-_Box = tuple[float, float, float, float]
-
-
 def _draw_preview(state: AppState, shown: _Shown, size: tuple[float, float]) -> None:
     """Draw both skeletons at rest; a click selects a joint of the figure, a drag orbits.
 
@@ -359,103 +453,6 @@ def _at(point: Floats) -> tuple[float, float]:
     return float(point[0]), float(point[1])
 
 
-_LONG = 1.3  # ratio of length to width from which a body is shown from the side
-_SIDE_VIEW = -1.1  # yaw of the view from the side, radians
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Side:
-    """One of the two skeletons.
-
-    Attributes
-    ----------
-    name : str
-        Name of the figure or the motion.
-    labels : tuple of J str
-        Labels of its joints.
-    joints : (N,) int32
-        Joints that are shown.
-    parents : (J,)
-        Parents of its joints.
-    points : (J, 3)
-        Joints at rest seen from the front: to the body's left, up, and forward.
-    """
-
-    name: str
-    labels: tuple[str, ...]
-    joints: Ints
-    parents: Ints
-    points: Floats
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shown:
-    """A match of joints with everything that the panel draws.
-
-    Attributes
-    ----------
-    drive, figure : Drive, Figure
-        The drive and the figure that were matched.
-    target, source : Side
-        The figure and the motion.
-    partners : (J,)
-        Joint of the motion for each joint of the figure, -1 for none.
-    origins : tuple of J str
-        How each joint was matched, see ``Matches``.
-    driven : dict
-        Joints of the figure that each joint of the motion drives.
-    """
-
-    drive: Drive
-    figure: Figure
-    target: _Side
-    source: _Side
-    partners: Ints
-    origins: tuple[str, ...]
-    driven: dict[int, list[int]]
-
-    @property
-    def n_driven(self) -> int:
-        """Number of joints of the figure that are driven."""
-        return int((self.partners[self.target.joints] >= 0).sum())
-
-    @property
-    def unused(self) -> list[int]:
-        """Joints of the motion that drive no joint."""
-        return [joint for joint in self.source.joints.tolist() if joint not in self.driven]
-
-
-@dataclass(slots=True)
-class JointMatch:
-    """State of the panel.
-
-    Attributes
-    ----------
-    filter : str
-        Text that the names of a listed pair must contain.
-    source_filter : str
-        Text that the names offered in an open list must contain.
-    only_unmatched : bool
-        Whether only joints without a partner are listed.
-    yaw : float
-        Rotation of the drawn skeletons about the up axis, radians.
-    hovered : (set of int, set of int)
-        Joints of the figure and of the motion under the mouse, and their partners.
-    scrolls_to : int
-        Joint to whose row the table scrolls, -1 for none.
-    shown : Shown or None
-        The match, computed again when the drive or the figure changes.
-    """
-
-    filter: str = ""
-    source_filter: str = ""
-    only_unmatched: bool = False
-    yaw: float = 0.0
-    hovered: tuple[set[int], set[int]] = field(default_factory=lambda: (set(), set()))
-    scrolls_to: int = -1
-    shown: _Shown | None = None
-
-
 def shown_match(state: AppState) -> _Shown | None:
     """Return the match of the chosen actor's joints; None if no motion drives it.
 
@@ -494,9 +491,6 @@ def _side(figure: Figure, points: Floats) -> _Side:
     skeleton = figure.require_skeleton()
     joints = shown_joints(skeleton)
     return _Side(figure.name, joint_labels(skeleton), joints, skeleton.parents, points)
-
-
-_SUFFIXES = (".txt",)
 
 
 def is_automatic(state: AppState) -> str:

@@ -20,21 +20,6 @@ from viewer.rig.pose import placement_matrix, pose_key
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
 
-__all__ = [
-    "aligned_template",
-    "as_similarity",
-    "box_fit",
-    "ghost_of",
-    "ghost_place",
-    "is_posed_since",
-    "move_by_hand",
-    "placing_now",
-    "posed_template",
-    "set_aside",
-    "similarity_now",
-    "target_place",
-]
-
 # Messages about the fit of the template, which remain valid when it is moved.
 _DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")
 _GAP = 1.25  # distance between target and template side by side, relative to their mean width

@@ -1,4 +1,4 @@
-"""Results of rigging: display in place of the target, colours, motion, and saving."""
+"""Results of rigging: display in place of the target, their section of the Rig panel, saving."""
 
 from __future__ import annotations
 
@@ -60,6 +60,12 @@ _RESULT_COLORS = {
 """Scalar quantities that show how the weights of a result were found, with their labels."""
 TARGET = "target"
 """Key of the original mesh among the versions; the others are named after methods."""
+_TRIAL = "trial motion"
+"""Name of the clip."""
+_ANGLE = math.radians(35.0)
+_LONGEST, _WHOLE = 0.9, 20.0
+"""Maximum duration of the motion of one joint, and of all joints, in seconds."""
+_LINES_HEIGHT = 9.0  # number of visible lines of the report
 
 
 def compare(first: Result, second: Result) -> Comparison:
@@ -289,13 +295,6 @@ def _save_rigged(state: AppState, result: Result, path: Path) -> None:
     save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, result)
 
 
-_TRIAL = "trial motion"
-"""Name of the clip."""
-_ANGLE = math.radians(35.0)
-_LONGEST, _WHOLE = 0.9, 20.0
-"""Maximum duration of the motion of one joint, and of all joints, in seconds."""
-
-
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
     """Return a motion that begins and ends in a pose; None if no joint can rotate.
 
@@ -336,9 +335,6 @@ def _channel(skeleton: Skeleton, dof: int, value: float, start: float, seconds: 
     bent[[0, 3]] = value
     times = start + seconds * np.array([0.0, 0.3, 0.7, 1.0])
     return Channel(dof, times, bent, (("smooth", "smooth"),) * 4)
-
-
-_LINES_HEIGHT = 9.0  # number of visible lines of the report
 
 
 def draw_results(state: AppState) -> None:

@@ -81,6 +81,23 @@ _MOST_ITERATIONS, _MOST_INFLUENCES = 50, 16
 _NEAREST_WHY = 'the method "nearest" has no such option'
 _ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
 _GAP = 1.2  # distance of the template from other actors, relative to its width
+_FEWEST = 3  # minimum number of landmarks
+_DOUBTFUL = 0.03  # error relative to the target's size, as in the report
+_STRETCHED = "stretched, pose kept"
+_METHODS = {
+    "in place": "about the shared origin",
+    "search": "by closest points",
+    "fit": "pose and limbs fitted",
+    "landmarks": "by landmarks",
+    "given": "by hand",
+}
+"""Labels of the alignment methods, the values of ``Alignment.how``."""
+_POSES = "; joints are rotated and limbs resized if that fits much better"
+_FITS = (
+    "; joints are rotated and limbs resized, or the whole template is stretched, if that fits much "
+    "better"
+)
+_SCALE_TEXTS = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 
 
 def draw(state: AppState) -> None:
@@ -285,25 +302,6 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         choices.max_influences = max(most, 0)
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
         explain("transfer the template's pose correctives, if any", why)
-
-
-_FEWEST = 3  # minimum number of landmarks
-_DOUBTFUL = 0.03  # error relative to the target's size, as in the report
-_STRETCHED = "stretched, pose kept"
-_METHODS = {
-    "in place": "about the shared origin",
-    "search": "by closest points",
-    "fit": "pose and limbs fitted",
-    "landmarks": "by landmarks",
-    "given": "by hand",
-}
-"""Labels of the alignment methods, the values of ``Alignment.how``."""
-_POSES = "; joints are rotated and limbs resized if that fits much better"
-_FITS = (
-    "; joints are rotated and limbs resized, or the whole template is stretched, if that fits much "
-    "better"
-)
-_SCALE_TEXTS = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 
 
 def _draw_alignment(state: AppState) -> None:

@@ -1,4 +1,4 @@
-"""State of the Rig panel: target and template, the template's placement, and the results."""
+"""State of the Rig panel: target, template and results; the choice of target and template."""
 
 from __future__ import annotations
 
@@ -40,6 +40,9 @@ TOOLS = {
 """Tools to align the template with the target by hand: label and tooltip."""
 GHOSTS = {"": "hidden", "translucent": "translucent", "wireframe": "wireframe", "solid": "solid"}
 """Styles in which the template is drawn, with their labels."""
+_BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
+_FILE = "file"
+_posed: Memo[Skin, Mesh] = Memo()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -282,11 +285,6 @@ class Rigging:
     def restore(self, kept: object | None) -> None:
         """Restore the template's placement."""
         self.placing = kept if isinstance(kept, Placing) else None
-
-
-_BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
-_FILE = "file"
-_posed: Memo[Skin, Mesh] = Memo()
 
 
 def targets(state: AppState) -> list[Actor]:

@@ -1,4 +1,9 @@
-"""Tools to move the template by hand, and the update of the Rig panel in each frame."""
+"""Tools to move the template by hand, and the update of the Rig panel in each frame.
+
+The gizmo is ImGuizmo with a custom ring for scaling. ImGuizmo rotates and translates a matrix in
+float32, so its results are projected back to similarities. Its scale handles cannot be grabbed from
+a distance, so a plain ring replaces them.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +38,19 @@ from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import RayHit, first_hit, surface_point
 from viewer.rig.geometry.transform import apply_transform, translation_matrix
 from viewer.rig.mesh import Mesh, bounding_box
+
+_TEMPLATE_INK, _TARGET_INK = (0.35, 0.70, 1.0, 1.0), (1.0, 0.75, 0.30, 1.0)
+_RIM = (0.0, 0.0, 0.0, 0.8)
+_DOT = 5.0  # radius, window coordinates
+RADIUS = 80.0
+"""Radius of the scaling ring, window coordinates."""
+_G = imguizmo.im_guizmo
+_OPERATIONS = {"move": _G.OPERATION.translate, "rotate": _G.OPERATION.rotate}
+_SIZE = 0.22  # size of the gizmo, in clip space
+_FAR = 50.0  # eye distance of the substitute for a parallel projection, in half heights of the view
+_REACH = 8.0  # distance within which the ring can be grabbed, window coordinates
+_LEAST = 0.02  # minimum factor: dragging to the centre must not make the template vanish
+_INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 
 
 def choose_rig_tool(state: AppState, tool: str) -> None:
@@ -108,11 +126,6 @@ def draw_rig_tools(state: AppState) -> None:
     else:
         _use_gizmo(state, template)
     ink.pop_clip_rect()
-
-
-_TEMPLATE_INK, _TARGET_INK = (0.35, 0.70, 1.0, 1.0), (1.0, 0.75, 0.30, 1.0)
-_RIM = (0.0, 0.0, 0.0, 0.8)
-_DOT = 5.0  # radius, window coordinates
 
 
 def _show_both(state: AppState) -> None:
@@ -205,23 +218,6 @@ def _draw_dot(
     ink.add_circle_filled(seen, _DOT, imgui.get_color_u32(color))
     for shift, shade in ((1.0, rim), (0.0, imgui.get_color_u32(color))):
         ink.add_text((seen[0] + _DOT + 3.0 + shift, seen[1] - 16.0 + shift), shade, text)
-
-
-# Gizmo that moves the template over the target: ImGuizmo with a custom ring for scaling.
-#
-# ImGuizmo rotates and translates a matrix in float32, so its results are projected back to
-# similarities. Its scale handles cannot be grabbed from a distance, so a plain ring replaces
-# them.
-
-RADIUS = 80.0
-"""Radius of the scaling ring, window coordinates."""
-_G = imguizmo.im_guizmo
-_OPERATIONS = {"move": _G.OPERATION.translate, "rotate": _G.OPERATION.rotate}
-_SIZE = 0.22  # size of the gizmo, in clip space
-_FAR = 50.0  # eye distance of the substitute for a parallel projection, in half heights of the view
-_REACH = 8.0  # distance within which the ring can be grabbed, window coordinates
-_LEAST = 0.02  # minimum factor: dragging to the centre must not make the template vanish
-_INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 
 
 def _use_gizmo(state: AppState, template: Template) -> None:

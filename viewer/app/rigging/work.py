@@ -63,6 +63,7 @@ _STEPS = {
 }
 """Progress labels for the steps of the transfer."""
 _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the mesh's name
+_Progress = Callable[[float, str], None]
 
 
 def _begin(state: AppState, title: str, act: Callable[[Report], _Finish], output: str = "") -> None:
@@ -332,9 +333,6 @@ def _put(state: AppState, results: list[Result], placing: Placing | None) -> Non
     _keep(state, results[0].template)
     state.of(Rigging).placing = placing
     put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)
-
-
-_Progress = Callable[[float, str], None]
 
 
 def align_template(

@@ -16,8 +16,6 @@ from viewer.app.view.camera_panel import fly_to
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
 
-__all__ = ["AxisGizmo", "draw_axis_gizmo", "gizmo_rect", "holds_gizmo", "is_over_gizmo"]
-
 _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
 _RADIUS, _ARM, _END = 40.0, 31.0, 8.5  # radii of the disc, of the arms and of their ends, points

@@ -1,4 +1,4 @@
-"""Camera panel: distance, azimuth, inclination, projection and named views."""
+"""Camera panel, and the actions on the camera: fit, look along an axis or through a camera."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from viewer.rig.scene import actor_points
 
 _CLAMP = imgui.SliderFlags_.always_clamp
 _LOG = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+_AROUND = 0.12  # extent shown around a joint, relative to the actor's size
 
 
 def draw(state: AppState) -> None:
@@ -95,9 +96,6 @@ def _draw_views(state: AppState) -> None:
 def _digits(size: float) -> str:
     """Return a format with enough digits for the figure's unit."""
     return "%.3g" if size < 0.1 or size > 1e4 else "%.2f"
-
-
-_AROUND = 0.12  # extent shown around a joint, relative to the actor's size
 
 
 def fit_view(state: AppState) -> None:

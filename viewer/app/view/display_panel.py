@@ -1,4 +1,4 @@
-"""Display panel: visible parts of figures, shading, background and joint overlays."""
+"""Display panel and View menu: visible parts, shading, background, overlays, and their actions."""
 
 from __future__ import annotations
 
@@ -63,6 +63,19 @@ _BACKGROUNDS = {
     "transparent": "Transparent",
     "#": "Colour",
 }
+_CLAMP = imgui.SliderFlags_.always_clamp
+JOINT_TOGGLES = {
+    "xray": ("X-ray", "B"),
+    "joint_names": ("Joint names", "J"),
+    "joint_axes": ("Joint axes", "Shift+J"),
+}
+"""Display options for joints, with their label and key."""
+_SURFACE_TOGGLES = {
+    "wireframe": ("Wireframe", "W"),
+    "normals": ("Vertex normals", "N"),
+    "texture": ("Texture", "T"),
+}
+_ACTIONS = "view.camera_actions"
 
 
 def draw(state: AppState) -> None:
@@ -110,9 +123,6 @@ def draw(state: AppState) -> None:
     options.quality = choice(state, "Quality", options.quality, QUALITIES)
     if options.quality != "draft":
         options.shadows = checkbox(state, "Shadows", options.shadows)
-
-
-_CLAMP = imgui.SliderFlags_.always_clamp
 
 
 def _draw_surface(state: AppState) -> None:
@@ -271,20 +281,6 @@ def toggle_gizmo(state: AppState) -> None:
 def reset_lights(state: AppState) -> None:
     """Reset both lights, the ambient light and the highlight to their defaults."""
     state.options.lights = Lights()
-
-
-JOINT_TOGGLES = {
-    "xray": ("X-ray", "B"),
-    "joint_names": ("Joint names", "J"),
-    "joint_axes": ("Joint axes", "Shift+J"),
-}
-"""Display options for joints, with their label and key."""
-_SURFACE_TOGGLES = {
-    "wireframe": ("Wireframe", "W"),
-    "normals": ("Vertex normals", "N"),
-    "texture": ("Texture", "T"),
-}
-_ACTIONS = "view.camera_actions"
 
 
 def draw_view_menu(state: AppState) -> None:

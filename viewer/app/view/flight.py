@@ -10,8 +10,6 @@ from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 
-__all__ = ["Flight", "advance_flight", "fly_from"]
-
 _SECONDS = 0.2
 
 

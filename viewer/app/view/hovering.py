@@ -1,4 +1,4 @@
-"""The joint or actor under the pointer, which a click would select."""
+"""The joint or actor under the pointer, which a click would select, and the click in progress."""
 
 from __future__ import annotations
 
@@ -44,6 +44,23 @@ class Hovered:
     place: tuple[float, float] = (-1.0, -1.0)
     since: float = 0.0
     is_waiting: bool = False
+
+
+@dataclass(slots=True)
+class Picking:
+    """State of picking in the view.
+
+    Attributes
+    ----------
+    wanted : (x, y, aims) or None
+        Position of a click, relative to the upper left corner of the view, and whether the camera
+        is aimed there.
+    menu_at : (x, y) or None
+        Position of a right click without a drag.
+    """
+
+    wanted: tuple[float, float, bool] | None = None
+    menu_at: tuple[float, float] | None = None
 
 
 def hover_joint(state: AppState) -> None:
@@ -128,20 +145,3 @@ def _is_free(state: AppState) -> bool:
     is_inside = x <= io.mouse_pos.x < x + width and y <= io.mouse_pos.y < y + height
     is_free = is_inside and not is_held and not io.want_capture_mouse and not state.error
     return is_free and not wants_vertex(state.of(Weights)) and not is_over_gizmo(state)
-
-
-@dataclass(slots=True)
-class Picking:
-    """State of picking in the view.
-
-    Attributes
-    ----------
-    wanted : (x, y, aims) or None
-        Position of a click, relative to the upper left corner of the view, and whether the camera
-        is aimed there.
-    menu_at : (x, y) or None
-        Position of a right click without a drag.
-    """
-
-    wanted: tuple[float, float, bool] | None = None
-    menu_at: tuple[float, float] | None = None

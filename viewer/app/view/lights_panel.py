@@ -19,8 +19,6 @@ from viewer.app.view.display_panel import reset_lights
 from viewer.rendering.options import Color, Light
 from viewer.rig.srgb import decode_color, encode_color
 
-__all__ = ["draw"]
-
 _CLAMP = imgui.SliderFlags_.always_clamp
 _LOG = imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.logarithmic
 

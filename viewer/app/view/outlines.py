@@ -71,14 +71,11 @@ def _pinned(state: AppState) -> list[Outlined]:
     ]
 
 
-# Image of the outlines over the view, separate from the image of the scene.
-#
-# The item under the pointer changes often, whereas the image of the scene, which may be the
-# average of many passes, is cached.
-
-
 class OutlineLayer:
-    """Draws outlines when they or the image of the scene change.
+    """Draws outlines over the view when they or the image of the scene change.
+
+    The item under the pointer changes often, whereas the image of the scene, which may be the
+    average of many passes, is cached: so outlines have an image of their own.
 
     Parameters
     ----------

@@ -33,8 +33,6 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
 
-__all__ = ["Spot", "answer_picks", "spot_at", "take_pick", "vertex_at"]
-
 _LONGEST = 40  # maximum length of a name in characters
 _REST = 0.2  # seconds without mouse movement before a vertex is described
 

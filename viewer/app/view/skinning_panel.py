@@ -18,8 +18,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.scalars import strongest
 from viewer.rig.skinning import METHODS, Skinning
 
-__all__ = ["draw"]
-
 _CLAMP = imgui.SliderFlags_.always_clamp
 _ENGINE = 4  # influences per vertex in most game engines
 

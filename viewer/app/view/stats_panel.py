@@ -12,8 +12,6 @@ from viewer.rig.scene import Scene
 from viewer.rig.skeleton import shown_joints
 from viewer.rig.skin import influence_counts
 
-__all__ = ["draw"]
-
 _LONGEST = 400  # maximum length of a text in characters
 _known: Memo[Scene, tuple[tuple[str, str], ...]] = Memo()
 

@@ -9,8 +9,6 @@ from viewer.app.core.widgets import Rect, begin_overlay, overlay_rect
 from viewer.phrases import printable
 from viewer.rendering.overlay.legend import Legend, LegendEntry, legend_columns
 
-__all__ = ["draw_legend"]
-
 _GAP = 10.0  # points from the edges of the view
 _BAR = (40.0 / 3.0, 0.8)  # width and height of the bar, in font sizes
 _TALL, _WIDE = 0.8, 0.4  # fractions of the view's height and width available for names

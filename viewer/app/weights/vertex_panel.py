@@ -1,4 +1,8 @@
-"""Vertex panel: all intermediate values of the skinning of the pinned vertex."""
+"""Vertex panel: all intermediate values of the skinning of the pinned vertex.
+
+In the view, lines lead from the vertex to its images under each joint alone; a vertex under the
+mouse has a short text.
+"""
 
 from __future__ import annotations
 
@@ -46,6 +50,22 @@ _DIGIT = 0.56  # width of a digit, in font sizes
 _SMALLEST, _FEWEST = 0.75, 3  # smallest font scale and number of decimals, for a narrow panel
 _PADDING = 2.0  # points at each side of a number
 _SPARE = 6.0  # reserve in points, because font sizes are rounded to whole pixels
+# Pixels in an image of standard height.
+_THINNEST, _THICKEST = 1.0, 5.0  # line widths for the smallest and largest weight
+_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot; dark borders of dots and lines
+_FAINTEST = 0.35
+_LONGEST_CELL = 24  # maximum length of a name in characters
+_DARK, _LIGHT = (0.05, 0.06, 0.08, 0.8), (1.0, 1.0, 1.0, 1.0)
+_palettes: Memo[Skeleton, Bytes] = Memo()
+_AWAY = 16.0  # points between the mouse and the text
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """State of the window, and the number of decimals to show."""
+
+    state: AppState
+    digits: int
 
 
 def draw(state: AppState) -> None:
@@ -109,14 +129,6 @@ def _fitting(room: float, font_size: float) -> tuple[float, int]:
         if scale >= _SMALLEST:
             break
     return max(scale, _SMALLEST), digits
-
-
-@dataclass(frozen=True, slots=True)
-class _Sheet:
-    """State of the window, and the number of decimals to show."""
-
-    state: AppState
-    digits: int
 
 
 def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
@@ -291,15 +303,6 @@ def _draw_number(value: float, digits: int) -> None:
     imgui.text_unformatted(text)
 
 
-# Pixels in an image of standard height.
-_THINNEST, _THICKEST = 1.0, 5.0  # line widths for the smallest and largest weight
-_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot; dark borders of dots and lines
-_FAINTEST = 0.35
-_LONGEST_CELL = 24  # maximum length of a name in characters
-_DARK, _LIGHT = (0.05, 0.06, 0.08, 0.8), (1.0, 1.0, 1.0, 1.0)
-_palettes: Memo[Skeleton, Bytes] = Memo()
-
-
 def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
     """Return the colours of the influences, as for dominant joints: (K, 3), sRGB.
 
@@ -422,9 +425,6 @@ def draw_hovered(state: AppState) -> None:
     for radius, color in ((0.5 * (_DOT + _RIM), _DARK), (0.5 * _DOT, _LIGHT)):
         draw_list.add_circle((across, down), radius, imgui.get_color_u32(color), 0, 2.0)
     draw_list.pop_clip_rect()
-
-
-_AWAY = 16.0  # points between the mouse and the text
 
 
 def draw_hover_text(state: AppState) -> None:

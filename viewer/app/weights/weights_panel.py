@@ -1,4 +1,4 @@
-"""State of the Weights and Vertex panels: hovering, picking, and the pinned vertex."""
+"""Weights panel: heat maps of scalar quantities, and the vertex that is hovered or pinned."""
 
 from __future__ import annotations
 
@@ -47,6 +47,12 @@ from viewer.rig.scalars import (
     shown_unit,
     split_name,
 )
+
+_LONGEST = 40  # maximum length of a name in characters
+_FIELD = 7.0  # width of a field, in font sizes
+_WHOLE = ("discrete", "categorical")
+_FIRST = ("weight", "field", "class", "parts")
+"""Quantities to show initially, in order of preference."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,11 +148,6 @@ class Weights:
 def wants_vertex(view: Weights) -> bool:
     """Return whether a click pins a vertex: with Alt, or while vertices are picked."""
     return view.picks_vertices or imgui.get_io().key_alt
-
-
-_LONGEST = 40  # maximum length of a name in characters
-_FIELD = 7.0  # width of a field, in font sizes
-_WHOLE = ("discrete", "categorical")
 
 
 def draw(state: AppState) -> None:
@@ -313,10 +314,6 @@ def _draw_vertex_tools(state: AppState) -> None:
         same_line_if_room(f"Unpin {view.pinned.vertex}")
         if button(state, f"Unpin {view.pinned.vertex}###unpin"):
             unpin(state)
-
-
-_FIRST = ("weight", "field", "class", "parts")
-"""Quantities to show initially, in order of preference."""
 
 
 def no_view(state: AppState, key: str) -> str:
