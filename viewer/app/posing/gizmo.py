@@ -370,23 +370,18 @@ def _draw_arcs(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
     """Draw the limits of the joint's rotations."""
     assert state.actor.pose is not None  # limits imply a posed joint
     unit = pen.frame.unit_length(posed.center)
-    found = limit_arcs(posed, state.actor.pose)
-    for rank, arc in enumerate(found):
+    for rank, arc in enumerate(limit_arcs(posed, state.actor.pose)):
         # Each arc is a little smaller than the previous one, because axes may coincide.
-        _draw_arc(pen, posed.center, arc, (_ARC_RADIUS - 0.07 * rank) * RADIUS * unit)
-
-
-def _draw_arc(pen: _Pen, center: Floats, arc: _LimitArc, radius: float) -> None:
-    color = _AXES[arc.color]
-    points = arc_points(arc, center, radius)
-    pen.fan(center, points, (*color, 0.10))
-    pen.line(points, (*color, 0.85), 2.0)
-    for end in (points[0], points[-1]):
-        pen.line(np.stack([center, end]), (*color, 0.55), 1.0)
-    present = center + 1.08 * radius * arc.start
-    ink = (*_LIMIT, 1.0) if arc.is_limited else (*color, 1.0)
-    pen.line(np.stack([center, present]), ink, 2.5)
-    pen.dot(present, 3.5, ink)
+        radius, color = (_ARC_RADIUS - 0.07 * rank) * RADIUS * unit, _AXES[arc.color]
+        points = arc_points(arc, posed.center, radius)
+        pen.fan(posed.center, points, (*color, 0.10))
+        pen.line(points, (*color, 0.85), 2.0)
+        for end in (points[0], points[-1]):
+            pen.line(np.stack([posed.center, end]), (*color, 0.55), 1.0)
+        present = posed.center + 1.08 * radius * arc.start
+        ink = (*_LIMIT, 1.0) if arc.is_limited else (*color, 1.0)
+        pen.line(np.stack([posed.center, present]), ink, 2.5)
+        pen.dot(present, 3.5, ink)
 
 
 def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:

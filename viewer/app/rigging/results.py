@@ -312,11 +312,15 @@ def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
     if not dofs:
         return None
     seconds = min(_LONGEST, _WHOLE / len(dofs))
-    channels = tuple(
-        _channel(skeleton, dof, float(pose.dofs[dof]), number * seconds, seconds)
-        for number, dof in enumerate(dofs)
-    )
-    return Clip(_TRIAL, channels, 0.0, seconds * len(dofs))
+    channels = []
+    for number, dof in enumerate(dofs):
+        # The joint bends one way and back the other way, and ends where it began.
+        value, (low, high) = float(pose.dofs[dof]), skeleton.dof_limits[dof]
+        bent = np.clip([value, value + _ANGLE, value - _ANGLE, value], low, high)
+        bent[[0, 3]] = value
+        times = number * seconds + seconds * np.array([0.0, 0.3, 0.7, 1.0])
+        channels.append(Channel(dof, times, bent, (("smooth", "smooth"),) * 4))
+    return Clip(_TRIAL, tuple(channels), 0.0, seconds * len(dofs))
 
 
 def _bending_dof(skeleton: Skeleton, joint: int) -> int:
@@ -327,14 +331,6 @@ def _bending_dof(skeleton: Skeleton, joint: int) -> int:
     ranges = np.ptp(skeleton.dof_limits[own], axis=1)
     own, ranges = own[ranges > 0.0], ranges[ranges > 0.0]
     return int(own[np.argmax(ranges)]) if len(own) else -1
-
-
-def _channel(skeleton: Skeleton, dof: int, value: float, start: float, seconds: float) -> Channel:
-    low, high = skeleton.dof_limits[dof]
-    bent = np.clip([value, value + _ANGLE, value - _ANGLE, value], low, high)
-    bent[[0, 3]] = value
-    times = start + seconds * np.array([0.0, 0.3, 0.7, 1.0])
-    return Channel(dof, times, bent, (("smooth", "smooth"),) * 4)
 
 
 def draw_results(state: AppState) -> None:
