@@ -79,9 +79,7 @@ ALLOWED_IN_APP = {
     "weights": {"core", "layout", "files", "posing", "weights"},
     "view": {"core", "features", "posing", "weights", "view"},
     "manual": {"core", "manual"},
-    "palette": {
-        *("core", "features", "layout", "playback", "posing", "view", "weights", "palette"),
-    },
+    "palette": {"core", "features", "layout", "playback", "posing", "view", "palette"},
     "context_menu": {
         *("core", "features", "actors", "posing", "weights", "view", "palette", "context_menu"),
     },

@@ -17,7 +17,7 @@ from imgui_bundle import imgui
 from PIL import Image
 
 from viewer.app import menus
-from viewer.app.posing import posing as pose_actions
+from viewer.app.posing import posing
 
 KEYS = [
     *"rskwntgfhzyoamcvedqx",
@@ -117,7 +117,7 @@ def _body_files(folder):
 def _keep_inside(folder, monkeypatch):
     """Let dialogs browse any folder, but write only into the given folder."""
     monkeypatch.setenv("HOME", str(folder))
-    for module, name in ((pose_actions, "save_pose"), (menus, "save_export")):
+    for module, name in ((posing, "save_pose"), (menus, "save_export")):
         save = getattr(module, name)
 
         def save_inside(state, path, save=save):

@@ -7,7 +7,7 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app.core import theme
-from viewer.app.curves import plot as plotted_keys
+from viewer.app.curves import plot
 from viewer.app.manual import Manual
 from viewer.rendering.overlay.typeface import interface_font
 
@@ -66,10 +66,8 @@ def test_selected_keys_and_their_handles_contrast_with_the_plot(curves, monkeypa
     theme.set_theme(panels)
     shown = []
     for name in ("ink", "faint"):
-        color_of = getattr(plotted_keys, name)
-        monkeypatch.setattr(
-            plotted_keys, name, lambda x, of=color_of: shown.append(of(x)) or shown[-1]
-        )
+        color_of = getattr(plot, name)
+        monkeypatch.setattr(plot, name, lambda x, of=color_of: shown.append(of(x)) or shown[-1])
     curves.click("key arm.x 1")
     curves.step(2)
     background = _luminance(imgui.get_style().color_(imgui.Col_.window_bg))
