@@ -168,8 +168,8 @@ def test_pose_is_held_in_gaps_and_marked(family, tmp_path):
     expected = motion.vectors.reshape(4, 72)[rows]
     assert_allclose(arrays["poses"], expected, rtol=0, atol=ATOL)
     assert notes[1:] == [
-        "missing frames 10, 13 to 14: the last pose is held, at the start the first, and the "
-        "frames are marked in present"
+        "missing frames 10, 13 to 14: the last pose is held, or the first one at the start, and "
+        "the frames are marked in present"
     ]
     back = read(Source.open(tmp_path / "a.npz"))
     assert (back.timing.rows >= 0).tolist() == arrays["present"].tolist()

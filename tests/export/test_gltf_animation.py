@@ -121,7 +121,11 @@ def test_constant_placement_gets_no_channel(tmp_path):
 @pytest.mark.parametrize(
     ("gaps", "angles", "text"),
     [
-        ("hold", [0, 0, 0.5, 0.5, 0.5, 1.5, 1.5], "the last pose is held, at the start the first"),
+        (
+            "hold",
+            [0, 0, 0.5, 0.5, 0.5, 1.5, 1.5],
+            "the last pose is held, or the first one at the start",
+        ),
         ("interpolate", [0, 0, 0.5, 5 / 6, 7 / 6, 1.5, 1.5], "interpolated, held at both ends"),
     ],
 )

@@ -345,7 +345,8 @@ def test_rest_rotations_are_part_of_the_pose_of_the_file(tmp_path):
         "split at texture seams: 5 vertices become 7 in the .skin",
         "1 joint has a rest rotation, a constraint or another order of rotations: the pose in the "
         "file contains its whole rotation (tip)",
-        "limits of 1 joint are omitted, because its angles in the file are others: tip",
+        "limits of 1 joint are omitted, because its angles in the file are defined differently: "
+        "tip",
     ]
 
 

@@ -107,10 +107,11 @@ MESSAGES = {
     "treated as present in every frame",
     "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
     "their order",
-    "F007.video-lists": "lists in a list: {people} people in {frames:#frame} assumed, because no "
-    "number tells the people apart; write one to each dict as person_id",
+    "F007.video-lists": "nested lists: {people} people in {frames:#frame} assumed, because no ID, "
+    "gender or shape tells the people apart; add person_id to each dict",
     "F007.video-axes": "poses with two axes before the joints: {people} people in {frames:#frame} "
-    "assumed, the shorter axis; add person_id with a number for each person to tell which",
+    "assumed, because the shorter axis is usually that of the people; add person_id with a number "
+    "for each person to be certain",
     "F007.video-same-frame": "{n:#row} ignored: the person is in an earlier row of the same frame",
     "F002.video-identity": "{item:text}: expected a number or a name for each person or frame, "
     "found {found}",

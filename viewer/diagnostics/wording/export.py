@@ -179,7 +179,7 @@ MESSAGES = {
     "X005.skel-turned": "{n:#joint|has|have} a rest rotation, a constraint or another order of "
     "rotations: the pose in the file contains {n:?its|their} whole rotation ({names:list8})",
     "X005.skel-unlimited": "limits of {n:#joint} are omitted, because {n:?its|their} angles in the "
-    "file are others: {names:list8}",
+    "file are defined differently: {names:list8}",
     "X005.skel-scaled": "joints are scaled, which .skel cannot store: the bindings of the .skin "
     "scale the vertices, and bones keep their lengths when the file is posed",
     "X005.skel-names": "{n:#joint name|is|are} changed, because .skel has no braces or keywords in "
@@ -214,8 +214,7 @@ MESSAGES = {
     "{n:?is|are} shifted to begin at 0: {names:list8}",
     "X005.t-pose": "the rest pose is a T-pose, as VRM requires: joints are rotated by up to "
     "{degrees:.3g} degrees",
-    "X005.vrm-repaired": "corrected, because the VRM file had it against the specification: "
-    "{names:list}",
+    "X005.vrm-repaired": "corrected, because the VRM file violated the specification: {names:list}",
     "X005.vrm-licence": "programs may refuse a VRM 1.0 file with a licence other than {licence}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
@@ -274,7 +273,7 @@ PHRASES = {
     # Replacements of missing frames
     "held-last": "the last pose is held",
     "held-first": "the first pose is held",
-    "held-both": "the last pose is held, at the start the first",
+    "held-both": "the last pose is held, or the first one at the start",
     "pose-held": "{poses}",
     "pose-held-and-marked": "{poses}, and the frames are marked in present",
     "interpolated": "interpolated",

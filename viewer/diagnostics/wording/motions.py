@@ -144,8 +144,7 @@ MESSAGES = {
     "F007.rest-axes": "rest pose of {motion:text}: a T-pose, in which its joint axes are parallel "
     "to the body's, because its zero pose is not a standing pose"
     "{window:?| (--source-rest overrides it)}",
-    "F007.rest-straight": "limbs of {motion:text} that hardly bend, so their roll is assumed: "
-    "{names:list}",
+    "F007.rest-straight": "roll assumed for limbs of {motion:text} that hardly bend: {names:list}",
     "F007.rest-lying": "rest pose of {motion:text}: estimated from trunk, knees and elbows, with "
     "an assumed slope of the feet, because the person never stands"
     "{window:?| (--source-rest overrides it)}",
