@@ -51,59 +51,38 @@ _WIDTH = 28.0  # in font sizes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Question:
-    """A question with buttons.
-
-    Attributes
-    ----------
-    title : str
-        Title of its dialog.
-    lines : tuple of str
-        Its paragraphs.
-    answers : tuple of (str, str, callable)
-        Label, tooltip and action of each button.
-    """
+    """A question with buttons."""
 
     title: str
+    """Title of its dialog."""
     lines: tuple[str, ...]
+    """Its paragraphs."""
     answers: tuple[tuple[str, str, Callable[[AppState], None]], ...]
+    """Label, tooltip and action of each button."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unsaved:
-    """Edits that would be lost.
-
-    Attributes
-    ----------
-    text : str
-        Description of the edits.
-    ask : callable
-        Opens the dialog that saves them, given the state.
-    """
+    """Edits that would be lost."""
 
     text: str
+    """Description of the edits."""
     ask: Callable[[AppState], None]
+    """Opens the dialog that saves them, given the state."""
 
 
 @dataclass(slots=True)
 class Closing:
-    """Progress of a request to quit; also used before files replace the scene.
-
-    Attributes
-    ----------
-    is_requested : bool
-        Whether the user asked to quit.
-    waits : bool
-        Whether the running job is finished first.
-    discards : bool
-        Whether the user agreed to lose the unsaved edits.
-    is_over : bool
-        Whether the window closes.
-    """
+    """Progress of a request to quit; also used before files replace the scene."""
 
     is_requested: bool = False
+    """Whether the user asked to quit."""
     waits: bool = False
+    """Whether the running job is finished first."""
     discards: bool = False
+    """Whether the user agreed to lose the unsaved edits."""
     is_over: bool = False
+    """Whether the window closes."""
 
     def withdraw(self) -> None:
         """Keep the window open until the user asks to quit again."""

@@ -32,18 +32,12 @@ _LONGEST = 40  # maximum length of a name in characters
 
 @dataclass(slots=True)
 class ContextMenu:
-    """State of the menu.
-
-    Attributes
-    ----------
-    spot : Spot or None
-        The item that was hit; None for the background.
-    is_wanted : bool
-        Whether the menu opens in the next frame.
-    """
+    """State of the menu."""
 
     spot: Spot | None = None
+    """The item that was hit; None for the background."""
     is_wanted: bool = False
+    """Whether the menu opens in the next frame."""
 
 
 def answer_right_click(

@@ -43,57 +43,38 @@ Preferences store an action of ``KEYS`` by its name, so the name stays when the 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Entry of a panel, with the properties that the layout needs.
-
-    Attributes
-    ----------
-    feature : str
-        Folder of the panel's module, ``<name>_panel.py``.
-    title : str
-        Title of its tab.
-    place : str
-        Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
-    needs : str
-        Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
-        ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
-        motion of another skeleton; empty if the panel is always available.
-    leads : bool
-        Whether it is brought to the front of its tabs when a scene makes it available.
-    on_demand : bool
-        Whether it is closed until the user opens it.
-    """
+    """Entry of a panel, with the properties that the layout needs."""
 
     feature: str
+    """Folder of the panel's module, ``<name>_panel.py``."""
     title: str
+    """Title of its tab."""
     place: str
+    """Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards."""
     needs: str = ""
+    """Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
+    ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
+    motion of another skeleton; empty if the panel is always available."""
     leads: bool = False
+    """Whether it is brought to the front of its tabs when a scene makes it available."""
     on_demand: bool = False
+    """Whether it is closed until the user opens it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shortcut:
-    """A key and its action.
-
-    Attributes
-    ----------
-    chords : tuple of int
-        ImGui's key codes with modifiers.
-    label : str
-        Name of the key.
-    text : str
-        Effect of the key, as shown in lists of keys.
-    action : str
-        Module and function within ``viewer.app``, called with the state.
-    arguments : tuple
-        Additional arguments of the action.
-    """
+    """A key and its action."""
 
     chords: tuple[int, ...]
+    """ImGui's key codes with modifiers."""
     label: str
+    """Name of the key."""
     text: str
+    """Effect of the key, as shown in lists of keys."""
     action: str
+    """Module and function within ``viewer.app``, called with the state."""
     arguments: tuple[object, ...] = ()
+    """Additional arguments of the action."""
 
     @property
     def name(self) -> str:
@@ -107,25 +88,17 @@ class Shortcut:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """An action without a key, for the command palette.
-
-    Attributes
-    ----------
-    text : str
-        Name of the action.
-    action : str
-        Module and function within ``viewer.app``; called with the state.
-    arguments : tuple
-        Additional arguments of the action.
-    why : str
-        Function of the state that returns the reason why the action is disabled; empty if it is
-        always enabled.
-    """
+    """An action without a key, for the command palette."""
 
     text: str
+    """Name of the action."""
     action: str
+    """Module and function within ``viewer.app``; called with the state."""
     arguments: tuple[object, ...] = ()
+    """Additional arguments of the action."""
     why: str = ""
+    """Function of the state that returns the reason why the action is disabled; empty if it is
+    always enabled."""
 
     def run(self, state: AppState) -> None:
         """Run the action."""

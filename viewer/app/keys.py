@@ -39,27 +39,19 @@ _Bound = tuple[imgui.Key, bool, Shortcut]
 
 @dataclass(slots=True)
 class Keyboard:
-    """State of the keyboard.
-
-    Attributes
-    ----------
-    is_listed : bool
-        Whether the list of keys is shown.
-    modifiers : int
-        Modifiers in the previous frame, as ImGui's bits.
-    has_menu : bool
-        Whether a menu or list was open when keys were last handled. ImGui may have closed it since.
-    chosen : dict
-        The user's keys for which the table below was made, as in ``Preferences.keys``.
-    bound : dict
-        Keys in the order of the table of keys, by the modifiers that are held with them.
-    """
+    """State of the keyboard."""
 
     is_listed: bool = False
+    """Whether the list of keys is shown."""
     modifiers: int = 0
+    """Modifiers in the previous frame, as ImGui's bits."""
     has_menu: bool = False
+    """Whether a menu or list was open when keys were last handled. ImGui may have closed it
+    since."""
     chosen: dict[str, str] = field(default_factory=dict)
+    """The user's keys for which the table below was made, as in ``Preferences.keys``."""
     bound: dict[int, list[_Bound]] = field(default_factory=dict)
+    """Keys in the order of the table of keys, by the modifiers that are held with them."""
 
     def of(self, chosen: Mapping[str, str], held: int) -> list[_Bound]:
         """Return the keys that run an action while these modifiers are held."""

@@ -25,24 +25,16 @@ _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 
 @dataclass(slots=True)
 class ShownPanels:
-    """Panels whose state differs from the default.
-
-    Attributes
-    ----------
-    closed : set of str
-        Panels open by default that were closed.
-    opened : set of str
-        On-demand panels that were opened.
-    wants_reset : bool
-        Whether the default layout is to be restored.
-    fronts : list of str
-        Titles of panels to bring to the front of their tabs once they are drawn.
-    """
+    """Panels whose state differs from the default."""
 
     closed: set[str] = field(default_factory=set)
+    """Panels open by default that were closed."""
     opened: set[str] = field(default_factory=set)
+    """On-demand panels that were opened."""
     wants_reset: bool = False
+    """Whether the default layout is to be restored."""
     fronts: list[str] = field(default_factory=list)
+    """Titles of panels to bring to the front of their tabs once they are drawn."""
 
 
 class _Sizes(NamedTuple):
@@ -66,27 +58,18 @@ class _Sizes(NamedTuple):
 
 @dataclass(slots=True)
 class Layout:
-    """State of the arrangement.
-
-    Attributes
-    ----------
-    is_arranged : bool
-        Whether the user has moved or resized panels; the arrangement is then kept.
-    sizes : Sizes or None
-        Sizes for which the panels were last arranged.
-    nodes : dict
-        Dock nodes of the left side, the right side and the bottom.
-    fronts : list of str
-        Titles of panels to bring to the front once they are drawn.
-    found : tuple
-        Docks of panels and sizes of nodes in the previous frame.
-    """
+    """State of the arrangement."""
 
     is_arranged: bool = False
+    """Whether the user has moved or resized panels; the arrangement is then kept."""
     sizes: _Sizes | None = None
+    """Sizes for which the panels were last arranged."""
     nodes: dict[str, int] = field(default_factory=dict)
+    """Dock nodes of the left side, the right side and the bottom."""
     fronts: list[str] = field(default_factory=list)
+    """Titles of panels to bring to the front once they are drawn."""
     found: tuple[object, ...] = ()
+    """Docks of panels and sizes of nodes in the previous frame."""
 
 
 def is_open(state: AppState, name: str) -> bool:

@@ -30,37 +30,24 @@ _MARKS = re.compile(r"`|\*\*")
 
 @dataclass(slots=True)
 class Manual:
-    """State of the manual's window.
-
-    Attributes
-    ----------
-    topic : str
-        A key of ``viewer.manual.PAGES``; empty while the window is closed.
-    pages : dict
-        Blocks of the pages shown so far, by topic.
-    """
+    """State of the manual's window."""
 
     topic: str = ""
+    """A key of ``viewer.manual.PAGES``; empty while the window is closed."""
     pages: dict[str, list[Block]] = field(default_factory=dict)
+    """Blocks of the pages shown so far, by topic."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One part of a page.
-
-    Attributes
-    ----------
-    kind : str
-        ``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``.
-    text : str
-        One line of text to wrap, or all lines of a code block; empty for tables.
-    rows : tuple of tuples of str
-        Cells of a table; the header comes first.
-    """
+    """One part of a page."""
 
     kind: str
+    """``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``."""
     text: str = ""
+    """One line of text to wrap, or all lines of a code block; empty for tables."""
     rows: tuple[tuple[str, ...], ...] = ()
+    """Cells of a table; the header comes first."""
 
 
 def draw_manual_menu(state: AppState) -> None:

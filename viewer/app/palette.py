@@ -37,58 +37,38 @@ _BOUNDARIES = " _-.:/#("
 
 @dataclass(slots=True)
 class Palette:
-    """State of the palette.
-
-    Attributes
-    ----------
-    is_open : bool
-        Whether it is shown.
-    has_focus : bool
-        Whether its text box has had the focus since it was opened.
-    query : str
-        Typed text.
-    row : int
-        Highlighted row.
-    known : list of Entry
-        Entries of the scene for which it was opened.
-    shown : list of int
-        Indices of matching entries, best first.
-    matched : str or None
-        Query that these entries match.
-    """
+    """State of the palette."""
 
     is_open: bool = False
+    """Whether it is shown."""
     has_focus: bool = False
+    """Whether its text box has had the focus since it was opened."""
     query: str = ""
+    """Typed text."""
     row: int = 0
+    """Highlighted row."""
     known: list[_Entry] = field(default_factory=list)
+    """Entries of the scene for which it was opened."""
     shown: list[int] = field(default_factory=list)
+    """Indices of matching entries, best first."""
     matched: str | None = None
+    """Query that these entries match."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """An entry that can be found and run.
-
-    Attributes
-    ----------
-    text : str
-        Name of the entry.
-    kind : str
-        Category in one word.
-    run : callable
-        Called with the state.
-    key : str
-        Keyboard shortcut; empty for none.
-    why : str
-        Reason why the entry cannot be run now; empty if it can.
-    """
+    """An entry that can be found and run."""
 
     text: str
+    """Name of the entry."""
     kind: str
+    """Category in one word."""
     run: Callable[[AppState], None]
+    """Called with the state."""
     key: str = ""
+    """Keyboard shortcut; empty for none."""
     why: str = ""
+    """Reason why the entry cannot be run now; empty if it can."""
 
 
 def toggle_palette(state: AppState) -> None:

@@ -12,21 +12,14 @@ from viewer.rig.motion.follow import followed_point
 
 @dataclass(slots=True)
 class Following:
-    """Target that the camera follows.
-
-    Attributes
-    ----------
-    target : (int, int) or None
-        Indices of an actor and of its joint; joint -1 for the actor's centre.
-    place : (3,) or None
-        Position of the target when the camera was last moved.
-    n_posed : int
-        Value of the clock's ``n_posed`` at that time.
-    """
+    """Target that the camera follows."""
 
     target: tuple[int, int] | None = None
+    """Indices of an actor and of its joint; joint -1 for the actor's centre."""
     place: Floats | None = None
+    """Position of the target when the camera was last moved: (3,)."""
     n_posed: int = 0
+    """Value of the clock's ``n_posed`` at that time."""
 
 
 def follow_actor(state: AppState) -> None:

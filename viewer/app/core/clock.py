@@ -50,62 +50,44 @@ class Clock:
     """Clock that advances the time of a scene, ``Scene.time``, and poses the actors for it.
 
     Playback follows the wall clock: a slow machine drops frames but stays in sync.
-
-    Attributes
-    ----------
-    scene : Scene
-        Scene that the clock drives.
-    playing : bool
-        Whether time advances.
-    speed : float
-        Seconds of motion per second, -4 to 4.
-    mode : str
-        A key of ``MODES``.
-    start, end : float
-        Playback range, seconds.
-    whole : (float, float)
-        Time range of all clips, seconds.
-    frame_rate : float
-        Frames per second for stepping and frame numbers: the rate of the chosen actor's capture,
-        so that each of its frames can be reached, or of the longest capture if it has none.
-    origin : float
-        Time of that capture's first frame, seconds.
-    first_frame : int
-        Number of that frame in its file.
-    keyed_rate : float
-        Frames per second for scenes without sampled motion: the rate that was set, or else the
-        rate of the keys.
-    has_frames : bool
-        Whether any motion is sampled: each frame is then shown for its whole duration.
-    interpolate_gaps : bool
-        Whether captures are interpolated in their gaps.
-    has_motion : bool
-        Whether any actor has a motion.
-    posed_for : PosedFor or None
-        Key of the current poses; time may have advanced since.
-    n_posed : int
-        Number of times the actors were posed.
     """
 
     scene: Scene = field(default_factory=lambda: Scene([]))
+    """Scene that the clock drives."""
     playing: bool = False
+    """Whether time advances."""
     speed: float = 1.0
+    """Seconds of motion per second, -4 to 4."""
     mode: str = "loop"
+    """A key of ``MODES``."""
     start: float = 0.0
     end: float = 0.0
+    """Playback range, seconds."""
     whole: tuple[float, float] = (0.0, 0.0)
+    """Time range of all clips, seconds."""
     frame_rate: float = DEFAULT_RATE
+    """Frames per second for stepping and frame numbers: the rate of the chosen actor's capture, so
+    that each of its frames can be reached, or of the longest capture if it has none."""
     origin: float = 0.0
+    """Time of that capture's first frame, seconds."""
     keyed_rate: float = DEFAULT_RATE
+    """Frames per second for scenes without sampled motion: the rate that was set, or else the rate
+    of the keys."""
     _is_rate_set: bool = False
     first_frame: int = 0
+    """Number of that frame in its file."""
     has_frames: bool = False
+    """Whether any motion is sampled: each frame is then shown for its whole duration."""
     interpolate_gaps: bool = False
+    """Whether captures are interpolated in their gaps."""
     has_motion: bool = False
+    """Whether any actor has a motion."""
     _over: float = 0.0  # seconds elapsed in the last frame of the range
     _is_returning: bool = False  # whether ping-pong playback runs backwards
     posed_for: PosedFor | None = None
+    """Key of the current poses; time may have advanced since."""
     n_posed: int = 0
+    """Number of times the actors were posed."""
     _grid: tuple[object, ...] = ()  # key of the capture that defines the frames
 
     @property

@@ -13,15 +13,10 @@ from viewer.rig.scene import Actor
 
 @dataclass(slots=True)
 class Animations:
-    """Edited keys of animations of the scene that are not being played.
-
-    Attributes
-    ----------
-    edited : dict
-        Clips by actor and index of the animation; clips without edits are omitted.
-    """
+    """Edited keys of animations of the scene that are not being played."""
 
     edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
+    """Clips by actor and index of the animation; clips without edits are omitted."""
 
 
 def edited_aside(animations: Animations, actor: Actor) -> dict[int, TransformClip]:

@@ -34,17 +34,12 @@ class _MotionExtent:
 
     A capture is sampled while it is being read: the step between sampled frames doubles whenever
     there are too many. Once reading is complete, the same frames are sampled as for a recording.
-
-    Attributes
-    ----------
-    is_done : bool
-        Whether all frames have been sampled.
-    was_edited : bool
-        Whether a shape or a motion has been edited since the scene was opened.
     """
 
     is_done: bool = False
+    """Whether all frames have been sampled."""
     was_edited: bool = False
+    """Whether a shape or a motion has been edited since the scene was opened."""
     _clouds: dict[float, Floats] = field(default_factory=dict)  # points by time in seconds
     _kept: dict[float, Floats] = field(default_factory=dict)  # samples taken before an edit
     _shapes: tuple[bytes, ...] = ()
@@ -157,22 +152,15 @@ class _MotionExtent:
 
 @dataclass(slots=True)
 class Framing:
-    """Camera fitting state.
-
-    Attributes
-    ----------
-    is_fitting : bool
-        Whether the camera is refitted when the view is resized or more of the motion is known.
-        Cleared as soon as anything else moves the camera.
-    extent : MotionExtent
-        Extent of the scene over its motion.
-    points : (N, 3) or None
-        Points to which the camera is fitted; None for those of the extent.
-    """
+    """Camera fitting state."""
 
     is_fitting: bool = False
+    """Whether the camera is refitted when the view is resized or more of the motion is known.
+    Cleared as soon as anything else moves the camera."""
     extent: _MotionExtent = field(default_factory=_MotionExtent)
+    """Extent of the scene over its motion."""
     points: Floats | None = None
+    """(N, 3): points to which the camera is fitted; None for those of the extent."""
     _placed: tuple[object, ...] | None = None  # key of the camera's position when it was fitted
     _fitted: tuple[object, ...] | None = None  # size of the view at the last fit
     _is_stale: bool = True  # whether more of the motion is known than at the last fit

@@ -17,21 +17,14 @@ _NOTE_SECONDS = 4.0  # seconds for which a short message is shown
 
 @dataclass(slots=True)
 class Message:
-    """A message that was shown once or several times.
-
-    Attributes
-    ----------
-    text : str
-        Text as shown.
-    kind : str
-        One of ``KINDS``.
-    count : int
-        Number of times it was shown.
-    """
+    """A message that was shown once or several times."""
 
     text: str
+    """Text as shown."""
     kind: str
+    """One of ``KINDS``."""
     count: int = 1
+    """Number of times it was shown."""
 
 
 @dataclass(slots=True)
@@ -80,24 +73,16 @@ class Note:
 
 @dataclass(slots=True)
 class Messages:
-    """All messages, and those that are currently shown.
-
-    Attributes
-    ----------
-    notes : list of Note
-        Messages shown over the view.
-    log : MessageLog
-        All messages.
-    is_open : bool
-        Whether the window "Messages" is open.
-    lists_status : bool
-        Whether it also lists messages of kind ``status``.
-    """
+    """All messages, and those that are currently shown."""
 
     notes: list[Note] = field(default_factory=list)
+    """Messages shown over the view."""
     log: MessageLog = field(default_factory=MessageLog)
+    """All messages."""
     is_open: bool = False
+    """Whether the window "Messages" is open."""
     lists_status: bool = False
+    """Whether it also lists messages of kind ``status``."""
     _logged_error: str = ""  # displayed error that is already in the log
 
     def show(self, text: str, is_status: bool = False) -> None:

@@ -47,78 +47,54 @@ class Stats:
 
 @dataclass(slots=True)
 class AppState:
-    """State that all features share; ``of`` gives the state of a single feature.
-
-    Attributes
-    ----------
-    scene, camera, options : Scene, Camera, DisplayOptions
-        The scene, its point of view and its display settings.
-    box : (2, 3)
-        Bounding box of the scene in its current shape, in its initial pose or over its whole
-        motion. The grid is at its bottom.
-    paths : tuple of Path
-        The files of the scene; empty for the bundled figure.
-    opened_at : float
-        Time at which the scene was opened, seconds since the epoch.
-    motion_settings : MotionSettings or None
-        Settings with which its motions were read, if any were given.
-    chosen_actor : int
-        Index of the actor to which panels apply.
-    is_actor_selected : bool
-        Whether the user selected that actor: it then has an outline if there are several actors.
-    n_choices : int
-        Number of times an actor was chosen; features compare it to detect outdated state.
-    selected_joint : int
-        Selected joint of the chosen actor; -1 for none.
-    in_degrees : bool
-        Whether rotations are shown in degrees instead of radians.
-    panels_visible : bool
-        Whether panels and menus are drawn.
-    view_rect : (x, y, width, height)
-        The part of the window that panels leave free, in window coordinates.
-    item_rects : dict
-        Last rectangle of each labelled widget: (x0, y0, x1, y1), which tests click.
-    wants : set of str
-        Requests to the window, served after the frame: "screenshot", "quit", "open dialog".
-    error : str
-        Error message shown above everything else; empty if there is none.
-    messages : Messages
-        All messages, and those currently shown.
-    stats : Stats
-        Statistics of the last frame.
-    history : History
-        Undo history.
-    framing : Framing
-        State of the camera's fitting.
-    clock : Clock
-        Advances the scene's time, and poses the actors for it.
-    job : Job or None
-        Job that runs in the background or between frames.
-    """
+    """State that all features share; ``of`` gives the state of a single feature."""
 
     scene: Scene
     camera: Camera
     options: DisplayOptions
+    """The scene, its point of view and its display settings."""
     box: Floats
+    """(2, 3): bounding box of the scene in its current shape, in its initial pose or over its whole
+    motion. The grid is at its bottom."""
     paths: tuple[Path, ...] = ()
+    """The files of the scene; empty for the bundled figure."""
     opened_at: float = field(default_factory=time.time)
+    """Time at which the scene was opened, seconds since the epoch."""
     motion_settings: MotionSettings | None = None
+    """Settings with which its motions were read, if any were given."""
     chosen_actor: int = 0
+    """Index of the actor to which panels apply."""
     is_actor_selected: bool = False
+    """Whether the user selected that actor: it then has an outline if there are several actors."""
     n_choices: int = 0
+    """Number of times an actor was chosen; features compare it to detect outdated state."""
     selected_joint: int = -1
+    """Selected joint of the chosen actor; -1 for none."""
     in_degrees: bool = True
+    """Whether rotations are shown in degrees instead of radians."""
     panels_visible: bool = True
+    """Whether panels and menus are drawn."""
     view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+    """The part of the window that panels leave free, in window coordinates: (x, y, width,
+    height)."""
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    """Last rectangle of each labelled widget: (x0, y0, x1, y1), which tests click."""
     wants: set[str] = field(default_factory=set)
+    """Requests to the window, served after the frame: "screenshot", "quit", "open dialog"."""
     error: str = ""
+    """Error message shown above everything else; empty if there is none."""
     messages: Messages = field(default_factory=Messages)
+    """All messages, and those currently shown."""
     stats: Stats = field(default_factory=Stats)
+    """Statistics of the last frame."""
     history: History = field(default_factory=History)
+    """Undo history."""
     framing: Framing = field(default_factory=Framing)
+    """State of the camera's fitting."""
     clock: Clock = field(default_factory=Clock)
+    """Advances the scene's time, and poses the actors for it."""
     job: Job | None = None
+    """Job that runs in the background or between frames."""
     _parts: dict[type[Any], Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -51,17 +51,12 @@ class History:
     Undo and redo of an edit of actors, poses or clips go to the time of the edit. The clock then
     poses all actors by their restored clips, and poses edited by hand are restored on top of that.
     Undoing a change of the display alone changes neither time nor poses.
-
-    Attributes
-    ----------
-    feature : Undoable or None
-        State of the feature whose value is undone with the scene.
-    first_poses : dict
-        Poses of actors before their first edit by hand; actors that were not posed are omitted.
     """
 
     feature: _Undoable | None = None
+    """State of the feature whose value is undone with the scene."""
     first_poses: dict[Actor, PoseKey] = field(default_factory=dict)
+    """Poses of actors before their first edit by hand; actors that were not posed are omitted."""
     _seen: _Snapshot | None = None  # state of the last frame
     _before: _Snapshot | None = None  # state before an edit in progress
     _clocked: dict[Actor, tuple[Motion, float, PoseKey | None]] = field(default_factory=dict)
@@ -291,33 +286,22 @@ class _Look:
 
 @dataclass(frozen=True, slots=True)
 class _Snapshot:
-    """Everything that undo covers.
-
-    Attributes
-    ----------
-    actors : tuple of Actor
-        Actors of the scene.
-    poses : tuple of PoseKey or None
-        One per actor.
-    by_hand : tuple of bool
-        Whether an actor's pose differs from that of its clip at ``time``.
-    looks : tuple of Look
-        One per actor.
-    options : DisplayOptions
-        Display settings of the scene.
-    time : float
-        Time of the scene's clock, seconds.
-    kept : object or None
-        Value of a feature that undo restores with the scene; compared by identity.
-    """
+    """Everything that undo covers."""
 
     actors: tuple[Actor, ...]
+    """Actors of the scene."""
     poses: tuple[PoseKey | None, ...]
+    """One per actor."""
     by_hand: tuple[bool, ...]
+    """Whether an actor's pose differs from that of its clip at ``time``."""
     looks: tuple[_Look, ...]
+    """One per actor."""
     options: DisplayOptions
+    """Display settings of the scene."""
     time: float
+    """Time of the scene's clock, seconds."""
     kept: object | None = None
+    """Value of a feature that undo restores with the scene; compared by identity."""
 
 
 def _extended(look: _Look, actor: Actor | None) -> _Look:

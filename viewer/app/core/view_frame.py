@@ -18,21 +18,14 @@ _NEAREST = 1e-9  # smallest w in clip space: points with a smaller w are at or b
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewFrame:
-    """The camera's projection and the part of the window that it fills.
-
-    Attributes
-    ----------
-    matrix : (4, 4)
-        Scene to clip space, projection @ view.
-    rect : (x, y, width, height)
-        Window coordinates.
-    scale : float
-        Window coordinates per point, the unit of handles: the scale of the interface.
-    """
+    """The camera's projection and the part of the window that it fills."""
 
     matrix: Floats
+    """Scene to clip space, projection @ view: (4, 4)."""
     rect: tuple[float, float, float, float]
+    """Window coordinates: (x, y, width, height)."""
     scale: float = 1.0
+    """Window coordinates per point, the unit of handles: the scale of the interface."""
 
     def project(self, points: Floats) -> Floats:
         """Return the projections of points: (..., 3) to (..., 2), NaN for those behind the eye."""

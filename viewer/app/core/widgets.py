@@ -25,15 +25,10 @@ Rect = tuple[float, float, float, float]
 
 @dataclass(slots=True)
 class KeyNames:
-    """Keys changed by the user.
-
-    Attributes
-    ----------
-    changed : dict
-        Maps the label of a key in the table of keys to the name of the key that replaces it.
-    """
+    """Keys changed by the user."""
 
     changed: dict[str, str] = field(default_factory=dict)
+    """Maps the label of a key in the table of keys to the name of the key that replaces it."""
 
 
 @dataclass(slots=True)

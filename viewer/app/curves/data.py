@@ -32,27 +32,18 @@ Points = tuple[Floats, Floats]
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A curve of the plot, as an entry of the list.
-
-    Attributes
-    ----------
-    group : str
-        Name of the joint or keypoint, used as heading.
-    number : int
-        Index of the joint or keypoint; -1 for the whole figure, -2 for blend shapes.
-    name : str
-        Name of the channel: ``"x"``, ``"ty"``, ``"sz"`` …, or of a blend shape.
-    axis : int
-        0 to 2 for x, y, z.
-    is_angle : bool
-        Whether the values are radians.
-    """
+    """A curve of the plot, as an entry of the list."""
 
     group: str
+    """Name of the joint or keypoint, used as heading."""
     number: int
+    """Index of the joint or keypoint; -1 for the whole figure, -2 for blend shapes."""
     name: str
+    """Name of the channel: ``"x"``, ``"ty"``, ``"sz"`` …, or of a blend shape."""
     axis: int
+    """0 to 2 for x, y, z."""
     is_angle: bool
+    """Whether the values are radians."""
 
     @property
     def label(self) -> str:

@@ -59,33 +59,22 @@ _SECONDS = 2.0  # duration of a new clip
 
 @dataclass(slots=True)
 class Curves:
-    """State of the Curves panel; the edited clip belongs to the actor.
-
-    Attributes
-    ----------
-    rows : tuple of int
-        Selected curves as rows of ``curves_of``, in the order of selection.
-    keys : frozenset of (row, key)
-        Selected keys.
-    filter : str
-        Text that the names of listed curves must contain.
-    wants_fit : bool
-        Whether the axes are fitted in the next frame.
-    wants_scroll : bool
-        Whether the list scrolls to the first selected curve in the next frame.
-    owner : (int, str, int)
-        Key of the actor, motion and number of curves for which ``rows`` are valid.
-    joint : int
-        Joint whose curves were last selected.
-    """
+    """State of the Curves panel; the edited clip belongs to the actor."""
 
     rows: tuple[int, ...] = ()
+    """Selected curves as rows of ``curves_of``, in the order of selection."""
     keys: frozenset[KeyPlace] = frozenset()
+    """Selected keys: (row, key)."""
     filter: str = ""
+    """Text that the names of listed curves must contain."""
     wants_fit: bool = True
+    """Whether the axes are fitted in the next frame."""
     wants_scroll: bool = False
+    """Whether the list scrolls to the first selected curve in the next frame."""
     owner: tuple[int, str, int] = (-1, "", 0)
+    """Key of the actor, motion and number of curves for which ``rows`` are valid."""
     joint: int = -1
+    """Joint whose curves were last selected."""
 
     def choose(self, rows: tuple[int, ...]) -> None:
         """Select curves, and fit the axes to them."""

@@ -71,24 +71,17 @@ _SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness factors that distinguish t
 
 @dataclass(frozen=True, slots=True)
 class _Plot:
-    """State of the plot in this frame.
-
-    Attributes
-    ----------
-    state : AppState
-        State that is shown and changed.
-    curves : tuple of Curve
-        All curves of the motion.
-    limits : (low, high, bottom, top)
-        Ranges of clip time, in seconds, and of values, in the displayed unit.
-    scale : (float, float)
-        Pixels per second and per displayed unit.
-    """
+    """State of the plot in this frame."""
 
     state: AppState
+    """State that is shown and changed."""
     curves: tuple[Curve, ...]
+    """All curves of the motion."""
     limits: tuple[float, float, float, float]
+    """Ranges of clip time, in seconds, and of values, in the displayed unit: (low, high, bottom,
+    top)."""
     scale: tuple[float, float]
+    """Pixels per second and per displayed unit."""
 
     @property
     def view(self) -> Curves:

@@ -31,36 +31,24 @@ _WAITING = 4  # maximum number of parts in the queue: limits memory
 
 @dataclass(slots=True)
 class Files:
-    """State of opening files.
-
-    Attributes
-    ----------
-    dialog : FileDialog or None
-        File dialog that is open.
-    wants_open : list of Path
-        Files to open after the frame.
-    loader : Loader or None
-        Loader of files that are being opened.
-    stream : Stream or None
-        Reader of captures that are not yet complete.
-    recent : list of tuple of str
-        Groups of files that were opened together, latest first.
-    rig : str
-        Rig of the body model that is opened next; empty for its default.
-    models : dict
-        Body models that were found, by name; searched for when the menu opens.
-    model_folder : Path or None
-        Folder of body models; read when the window "Preferences" opens.
-    """
+    """State of opening files."""
 
     dialog: FileDialog | None = None
+    """File dialog that is open."""
     wants_open: list[Path] = field(default_factory=list)
+    """Files to open after the frame."""
     loader: Loader | None = None
+    """Loader of files that are being opened."""
     stream: Stream | None = None
+    """Reader of captures that are not yet complete."""
     recent: list[tuple[str, ...]] = field(default_factory=list)
+    """Groups of files that were opened together, latest first."""
     rig: str = ""
+    """Rig of the body model that is opened next; empty for its default."""
     models: dict[str, Path] = field(default_factory=dict)
+    """Body models that were found, by name; searched for when the menu opens."""
     model_folder: Path | None = None
+    """Folder of body models; read when the window "Preferences" opens."""
 
 
 class Loader:

@@ -58,30 +58,20 @@ _TITLE = "Checking the rig"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """Result of a check.
-
-    Attributes
-    ----------
-    source : Scene
-        The scene that the window shows.
-    scene : Scene
-        A copy of the scene, made when the check began.
-    options : LintOptions
-        Limits of the check.
-    findings : tuple of Finding
-        Findings, most severe first.
-    n_files : int
-        Number of files of the scene that were read again.
-    notes : tuple of str
-        Changes of these files since they were opened.
-    """
+    """Result of a check."""
 
     source: Scene
+    """The scene that the window shows."""
     scene: Scene
+    """A copy of the scene, made when the check began."""
     options: LintOptions
+    """Limits of the check."""
     findings: tuple[Finding, ...]
+    """Findings, most severe first."""
     n_files: int = 0
+    """Number of files of the scene that were read again."""
     notes: tuple[str, ...] = ()
+    """Changes of these files since they were opened."""
 
 
 @dataclass(slots=True, eq=False)
@@ -94,51 +84,34 @@ class _Running:
 
 @dataclass(slots=True)
 class Linting:
-    """State of the Lint panel.
-
-    Attributes
-    ----------
-    options : LintOptions
-        Limits of the next check.
-    checked : Checked or None
-        The last completed check.
-    running : Running or None
-        The check in progress.
-    was_shown : bool
-        Whether the panel has been shown before: showing it for the first time starts a check.
-    severities : set of str
-        Severities to list.
-    text : str
-        Text that listed findings must contain.
-    chosen : int
-        Index of the chosen finding, -1 for none.
-    wants_aim : bool
-        Whether the camera moves to the chosen finding once the scene is posed.
-    is_edited : bool
-        Whether a moving actor was posed by hand since the check.
-    seen : tuple
-        Time and poses of moving actors in the previous frame.
-    marks : Marks or None
-        Marks of the chosen finding.
-    marks_key : object
-        Key that identifies the marks.
-    marks_note : str
-        Note about parts of the finding that are not marked; empty if all are.
-    """
+    """State of the Lint panel."""
 
     options: LintOptions = field(default_factory=LintOptions)
+    """Limits of the next check."""
     checked: Checked | None = None
+    """The last completed check."""
     running: _Running | None = None
+    """The check in progress."""
     was_shown: bool = False
+    """Whether the panel has been shown before: showing it for the first time starts a check."""
     severities: set[str] = field(default_factory=lambda: set(SEVERITIES))
+    """Severities to list."""
     text: str = ""
+    """Text that listed findings must contain."""
     chosen: int = -1
+    """Index of the chosen finding, -1 for none."""
     wants_aim: bool = False
+    """Whether the camera moves to the chosen finding once the scene is posed."""
     is_edited: bool = False
+    """Whether a moving actor was posed by hand since the check."""
     seen: tuple[object, ...] = ()
+    """Time and poses of moving actors in the previous frame."""
     marks: Marks | None = None
+    """Marks of the chosen finding."""
     marks_key: object = None
+    """Key that identifies the marks."""
     marks_note: str = ""
+    """Note about parts of the finding that are not marked; empty if all are."""
 
     @property
     def finding(self) -> Finding | None:

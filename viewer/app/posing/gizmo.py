@@ -112,29 +112,21 @@ class _Pen:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LimitArc:
-    """The range of one rotation DOF.
-
-    Attributes
-    ----------
-    dof : int
-        Row of the DOF table.
-    color : int
-        0, 1, 2 for x, y, z.
-    axis, start : (3,)
-        Rotation axis, and the current direction perpendicular to it: unit vectors, scene space.
-    low, high : float
-        Limits relative to the current value, radians about the axis; low <= 0 <= high.
-    is_limited : bool
-        Whether the value is at a limit.
-    """
+    """The range of one rotation DOF."""
 
     dof: int
+    """Row of the DOF table."""
     color: int
+    """0, 1, 2 for x, y, z."""
     axis: Floats
     start: Floats
+    """(3,): rotation axis, and the current direction perpendicular to it: unit vectors, scene
+    space."""
     low: float
     high: float
+    """Limits relative to the current value, radians about the axis; low <= 0 <= high."""
     is_limited: bool
+    """Whether the value is at a limit."""
 
 
 def use_handles(state: AppState) -> bool:

@@ -40,18 +40,12 @@ _numbers: Memo[Skeleton, Floats] = Memo()
 
 @dataclass(slots=True)
 class _Unlocked:
-    """Joints of the chosen actor whose translation and scale are listed on request.
-
-    Attributes
-    ----------
-    joints : frozenset of int
-        Indices of the joints.
-    n_choices : int
-        The state's ``n_choices`` for which the indices are valid.
-    """
+    """Joints of the chosen actor whose translation and scale are listed on request."""
 
     joints: frozenset[int] = frozenset()
+    """Indices of the joints."""
     n_choices: int = -1
+    """The state's ``n_choices`` for which the indices are valid."""
 
 
 def unlocked_joints(state: AppState) -> frozenset[int]:

@@ -14,24 +14,16 @@ _MOST_OPENED = 128  # rigs with more joints are initially collapsed
 
 @dataclass(slots=True)
 class JointTree:
-    """State of the joint tree.
-
-    Attributes
-    ----------
-    filter : str
-        Text that the names of listed joints or captured points must contain.
-    opened : set of int
-        Joints whose DOFs and children are listed.
-    scrolls_to : int
-        Joint to which the list scrolls, -1 for none.
-    n_choices : int
-        The state's ``n_choices`` for which filter and open rows are valid.
-    """
+    """State of the joint tree."""
 
     filter: str = ""
+    """Text that the names of listed joints or captured points must contain."""
     opened: set[int] = field(default_factory=set)
+    """Joints whose DOFs and children are listed."""
     scrolls_to: int = -1
+    """Joint to which the list scrolls, -1 for none."""
     n_choices: int = -1
+    """The state's ``n_choices`` for which filter and open rows are valid."""
 
 
 def joint_tree(state: AppState) -> JointTree:

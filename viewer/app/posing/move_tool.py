@@ -32,18 +32,12 @@ _MET = 1e-3  # remaining distance above which it is shown, relative to the figur
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrow:
-    """A direction in which a joint can be translated.
-
-    Attributes
-    ----------
-    axis : (3,)
-        Unit vector, scene space.
-    color : int
-        0, 1, 2 for x, y, z.
-    """
+    """A direction in which a joint can be translated."""
 
     axis: Floats
+    """Unit vector, scene space: (3,)."""
     color: int
+    """0, 1, 2 for x, y, z."""
 
 
 def longest_chain(skeleton: Skeleton, joint: int) -> int:

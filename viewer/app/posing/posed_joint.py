@@ -17,24 +17,16 @@ from viewer.rig.skeleton import Skeleton
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedJoint:
-    """One joint of a posed and placed actor.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-        Skeleton of the actor's figure in its current shape.
-    joint : int
-        Index of the joint.
-    placement : (4, 4)
-        Figure space to scene, including the figure's own translation and scale.
-    world : (J, 4, 4)
-        Joint space to scene, all joints.
-    """
+    """One joint of a posed and placed actor."""
 
     skeleton: Skeleton
+    """Skeleton of the actor's figure in its current shape."""
     joint: int
+    """Index of the joint."""
     placement: Floats
+    """Figure space to scene, including the figure's own translation and scale: (4, 4)."""
     world: Floats
+    """Joint space to scene, all joints: (J, 4, 4)."""
 
     @property
     def center(self) -> Floats:

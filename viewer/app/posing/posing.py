@@ -53,27 +53,18 @@ _RANDOM = 10  # number of random coefficients: the first have the largest varian
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """Result of a drag.
-
-    Attributes
-    ----------
-    pose : Pose
-        Pose within the joint limits.
-    text : str
-        Description of the change, shown next to the handle.
-    limited : tuple of int
-        DOFs whose limits restrict the drag.
-    target : (3,) or None
-        Position of the pointer in scene space, if the joint could not reach it.
-    angle : float or None
-        Angle of rotation by a ring, radians.
-    """
+    """Result of a drag."""
 
     pose: Pose
+    """Pose within the joint limits."""
     text: str
+    """Description of the change, shown next to the handle."""
     limited: tuple[int, ...] = ()
+    """DOFs whose limits restrict the drag."""
     target: Floats | None = None
+    """Position of the pointer in scene space, if the joint could not reach it: (3,)."""
     angle: float | None = None
+    """Angle of rotation by a ring, radians."""
 
 
 class Handle(Protocol):
@@ -100,31 +91,21 @@ class Handle(Protocol):
 
 @dataclass(slots=True, eq=False)
 class Drag:
-    """A drag in progress.
-
-    Attributes
-    ----------
-    actor : Actor
-        Actor whose pose changes.
-    handle : Handle
-        The handle that is held.
-    outcome : Outcome
-        Latest result.
-    asked : tuple
-        Key of the pointer's position, the modifier and the camera for which the result was
-        computed.
-    has_moved : bool
-        Whether the pointer has moved; a click on a handle changes nothing.
-    is_over : bool
-        Whether the drag was cancelled and only waits for the release of the button.
-    """
+    """A drag in progress."""
 
     actor: Actor
+    """Actor whose pose changes."""
     handle: Handle
+    """The handle that is held."""
     outcome: Outcome
+    """Latest result."""
     asked: tuple[object, ...] = ()
+    """Key of the pointer's position, the modifier and the camera for which the result was
+    computed."""
     has_moved: bool = False
+    """Whether the pointer has moved; a click on a handle changes nothing."""
     is_over: bool = False
+    """Whether the drag was cancelled and only waits for the release of the button."""
 
 
 @dataclass(slots=True)
@@ -133,64 +114,43 @@ class HeldVector:
 
     Beyond pi, a shorter vector describes the same rotation, so the rotation does not determine the
     vector.
-
-    Attributes
-    ----------
-    joint : int
-        Joint of the actor that was chosen at that time.
-    vector : (3,)
-        The vector as edited.
-    rotation : (3, 3)
-        Rotation of the joint.
-    n_choices : int
-        The state's ``n_choices``: for another actor the joint is invalid.
     """
 
     joint: int
+    """Joint of the actor that was chosen at that time."""
     vector: Floats
+    """The vector as edited: (3,)."""
     rotation: Floats
+    """Rotation of the joint: (3, 3)."""
     n_choices: int
+    """The state's ``n_choices``: for another actor the joint is invalid."""
 
 
 @dataclass(slots=True)
 class Posing:
-    """State of the tools and panels for posing.
-
-    Attributes
-    ----------
-    tool : str
-        A key of ``TOOLS``.
-    orientation : str
-        A key of ``ORIENTATIONS``.
-    chain_length : int
-        Number of joints above a dragged joint that may rotate; 0 for the default of two, excluding
-        the root.
-    drag : Drag or None
-        The handle that is held.
-    has_missed : bool
-        Whether a press narrowly missed a handle and its button is still down.
-    as_vectors : bool
-        Whether ball joints are edited as rotation vectors instead of angles about x, y, z.
-    held_vector : HeldVector or None
-        The rotation vector being edited.
-    shape_filter : str
-        Text that the names of listed shapes must contain, for figures with many shapes.
-    shape_seed : int
-        Seed of the last random shape.
-    n_hand_components : int
-        Number of principal components of the hands that have sliders.
-    """
+    """State of the tools and panels for posing."""
 
     tool: str = "select"
+    """A key of ``TOOLS``."""
     orientation: str = "local"
+    """A key of ``ORIENTATIONS``."""
     chain_length: int = 0
+    """Number of joints above a dragged joint that may rotate; 0 for the default of two, excluding
+    the root."""
     drag: Drag | None = None
+    """The handle that is held."""
     has_missed: bool = False
+    """Whether a press narrowly missed a handle and its button is still down."""
     as_vectors: bool = False
+    """Whether ball joints are edited as rotation vectors instead of angles about x, y, z."""
     held_vector: HeldVector | None = None
+    """The rotation vector being edited."""
     shape_filter: str = ""
+    """Text that the names of listed shapes must contain, for figures with many shapes."""
     shape_seed: int = 0
+    """Seed of the last random shape."""
     n_hand_components: int = 6
+    """Number of principal components of the hands that have sliders."""
 
     @property
     def is_on(self) -> bool:

@@ -36,24 +36,16 @@ _STEPS = 72
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """A circle about a joint that rotates it.
-
-    Attributes
-    ----------
-    axis : (3,)
-        Unit vector, scene space.
-    color : int
-        0, 1, 2 for x, y, z; 3 for the line of sight.
-    size : float
-        Radius, window coordinates.
-    dof : int
-        DOF that it changes; -1 for the whole joint.
-    """
+    """A circle about a joint that rotates it."""
 
     axis: Floats
+    """Unit vector, scene space: (3,)."""
     color: int
+    """0, 1, 2 for x, y, z; 3 for the line of sight."""
     size: float = RADIUS
+    """Radius, window coordinates."""
     dof: int = -1
+    """DOF that it changes; -1 for the whole joint."""
 
 
 def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> list[Ring]:

@@ -31,71 +31,47 @@ UPS = {"": "detect from the bodies", "y": "y", "z": "z", "-y": "-y", "-z": "-z"}
 
 @dataclass(slots=True)
 class Preferences:
-    """The user's preferences; the defaults are those of a new installation.
-
-    Attributes
-    ----------
-    theme : str
-        A key of ``THEMES``.
-    scale : float
-        Scale of the interface; 0 for that of the monitor.
-    font_size : float
-        Points at scale 1.
-    in_degrees : bool
-        Whether angles are shown in degrees instead of radians.
-    quality : str
-        Quality of the view, a key of ``viewer.rendering.options.QUALITIES``.
-    samples : int
-        Samples per pixel.
-    up : str
-        A key of ``UPS``.
-    keys : dict
-        Keys that differ from the default: maps names of actions to names of keys.
-    """
+    """The user's preferences; the defaults are those of a new installation."""
 
     theme: str = "dark"
+    """A key of ``THEMES``."""
     scale: float = 0.0
+    """Scale of the interface; 0 for that of the monitor."""
     font_size: float = 15.0
+    """Points at scale 1."""
     in_degrees: bool = True
+    """Whether angles are shown in degrees instead of radians."""
     quality: str = "final"
+    """Quality of the view, a key of ``viewer.rendering.options.QUALITIES``."""
     samples: int = 4
+    """Samples per pixel."""
     up: str = ""
+    """A key of ``UPS``."""
     keys: dict[str, str] = field(default_factory=dict)
+    """Keys that differ from the default: maps names of actions to names of keys."""
 
 
 @dataclass(slots=True)
 class Appearance:
-    """State of the window "Preferences", and the choices already applied.
-
-    Attributes
-    ----------
-    is_open : bool
-        Whether the window is open.
-    captured : str
-        Name of the action whose key is pressed next, or ``CAPTURED``; empty if none.
-    screen_scale : float
-        Scale of the interface that suits the monitor.
-    given_scale : float or None
-        Scale given on the command line, which takes precedence.
-    system_theme : str
-        Theme of the system, ``"dark"`` or ``"light"``; empty if unknown.
-    theme : str
-        Theme that is applied.
-    scale, font_size : float
-        Scale and font size that are applied.
-    keys : dict or None
-        Changed keys that are applied.
-    """
+    """State of the window "Preferences", and the choices already applied."""
 
     is_open: bool = False
+    """Whether the window is open."""
     captured: str = ""
+    """Name of the action whose key is pressed next, or ``CAPTURED``; empty if none."""
     screen_scale: float = 1.0
+    """Scale of the interface that suits the monitor."""
     given_scale: float | None = None
+    """Scale given on the command line, which takes precedence."""
     system_theme: str = ""
+    """Theme of the system, ``"dark"`` or ``"light"``; empty if unknown."""
     theme: str = "dark"
+    """Theme that is applied."""
     scale: float = 1.0
     font_size: float = 15.0
+    """Scale and font size that are applied."""
     keys: dict[str, str] | None = None
+    """Changed keys that are applied."""
 
 
 Value = TypeVar("Value", str, float, int, bool)

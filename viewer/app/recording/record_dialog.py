@@ -76,52 +76,35 @@ _WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
 
 @dataclass(slots=True)
 class RecordSettings:
-    """Settings of a recording.
-
-    Attributes
-    ----------
-    kind : str
-        A key of ``KINDS``.
-    size : str
-        A key of the available sizes.
-    own_size : (int, int)
-        Width and height for the size ``"own"``.
-    rate : float
-        Frames per second; 0 for the scene's own rate.
-    turntable : bool
-        Whether the camera orbits once around the scene.
-    seconds : float
-        Duration of the orbit if there is no motion.
-    n_cells : int
-        Number of frames in a contact sheet.
-    quality : int
-        Quality of the compression of videos, 0 to 100.
-    look : str
-        Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
-        the view, or normal if the view is final and there are several frames.
-    samples : int
-        Samples per pixel; 0 for those of the view.
-    background : str
-        As in ``DisplayOptions``; empty for the background of the view.
-    follows : bool
-        Whether the camera follows the same actor or joint as in the view.
-    frames : (int, int) or None
-        First and last frame, numbered as in the timeline; None for the playback range.
-    """
+    """Settings of a recording."""
 
     kind: str = ".mp4"
+    """A key of ``KINDS``."""
     size: str = "view"
+    """A key of the available sizes."""
     own_size: tuple[int, int] = (1280, 720)
+    """Width and height for the size ``"own"``."""
     rate: float = 0.0
+    """Frames per second; 0 for the scene's own rate."""
     turntable: bool = False
+    """Whether the camera orbits once around the scene."""
     seconds: float = 6.0
+    """Duration of the orbit if there is no motion."""
     n_cells: int = 12
+    """Number of frames in a contact sheet."""
     quality: int = 75
+    """Quality of the compression of videos, 0 to 100."""
     look: str = ""
+    """Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of the
+    view, or normal if the view is final and there are several frames."""
     samples: int = 0
+    """Samples per pixel; 0 for those of the view."""
     background: str = ""
+    """As in ``DisplayOptions``; empty for the background of the view."""
     follows: bool = True
+    """Whether the camera follows the same actor or joint as in the view."""
     frames: tuple[int, int] | None = None
+    """First and last frame, numbered as in the timeline; None for the playback range."""
 
     @property
     def is_transparent(self) -> bool:
@@ -142,21 +125,14 @@ class RecordSettings:
 
 @dataclass(slots=True)
 class RecordingState:
-    """State of the Record window.
-
-    Attributes
-    ----------
-    settings : RecordSettings or None
-        Settings shown in the window; None while it is closed.
-    wanted : Path or None
-        Target file of a recording that starts after the frame.
-    preview : int
-        ID of the preview's texture; 0 if there is none.
-    """
+    """State of the Record window."""
 
     settings: RecordSettings | None = None
+    """Settings shown in the window; None while it is closed."""
     wanted: Path | None = None
+    """Target file of a recording that starts after the frame."""
     preview: int = 0
+    """ID of the preview's texture; 0 if there is none."""
 
 
 class Preview:

@@ -65,54 +65,36 @@ _SUFFIXES = (".txt",)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Side:
-    """One of the two skeletons.
-
-    Attributes
-    ----------
-    name : str
-        Name of the figure or the motion.
-    labels : tuple of J str
-        Labels of its joints.
-    joints : (N,) int32
-        Joints that are shown.
-    parents : (J,)
-        Parents of its joints.
-    points : (J, 3)
-        Joints at rest seen from the front: to the body's left, up, and forward.
-    """
+    """One of the two skeletons."""
 
     name: str
+    """Name of the figure or the motion."""
     labels: tuple[str, ...]
+    """Labels of its joints."""
     joints: Ints
+    """Joints that are shown: (N,) int32."""
     parents: Ints
+    """Parents of its joints: (J,)."""
     points: Floats
+    """(J, 3): joints at rest seen from the front: to the body's left, up, and forward."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """A match of joints with everything that the panel draws.
-
-    Attributes
-    ----------
-    drive, figure : Drive, Figure
-        The drive and the figure that were matched.
-    target, source : Side
-        The figure and the motion.
-    partners : (J,)
-        Joint of the motion for each joint of the figure, -1 for none.
-    origins : tuple of J str
-        How each joint was matched, see ``Matches``.
-    driven : dict
-        Joints of the figure that each joint of the motion drives.
-    """
+    """A match of joints with everything that the panel draws."""
 
     drive: Drive
     figure: Figure
+    """The drive and the figure that were matched."""
     target: _Side
     source: _Side
+    """The figure and the motion."""
     partners: Ints
+    """Joint of the motion for each joint of the figure, -1 for none: (J,)."""
     origins: tuple[str, ...]
+    """How each joint was matched, see ``Matches``."""
     driven: dict[int, list[int]]
+    """Joints of the figure that each joint of the motion drives."""
 
     @property
     def n_driven(self) -> int:
@@ -127,33 +109,22 @@ class _Shown:
 
 @dataclass(slots=True)
 class JointMatch:
-    """State of the panel.
-
-    Attributes
-    ----------
-    filter : str
-        Text that the names of a listed pair must contain.
-    source_filter : str
-        Text that the names offered in an open list must contain.
-    only_unmatched : bool
-        Whether only joints without a partner are listed.
-    yaw : float
-        Rotation of the drawn skeletons about the up axis, radians.
-    hovered : (set of int, set of int)
-        Joints of the figure and of the motion under the mouse, and their partners.
-    scrolls_to : int
-        Joint to whose row the table scrolls, -1 for none.
-    shown : Shown or None
-        The match, computed again when the drive or the figure changes.
-    """
+    """State of the panel."""
 
     filter: str = ""
+    """Text that the names of a listed pair must contain."""
     source_filter: str = ""
+    """Text that the names offered in an open list must contain."""
     only_unmatched: bool = False
+    """Whether only joints without a partner are listed."""
     yaw: float = 0.0
+    """Rotation of the drawn skeletons about the up axis, radians."""
     hovered: tuple[set[int], set[int]] = field(default_factory=lambda: (set(), set()))
+    """Joints of the figure and of the motion under the mouse, and their partners."""
     scrolls_to: int = -1
+    """Joint to whose row the table scrolls, -1 for none."""
     shown: _Shown | None = None
+    """The match, computed again when the drive or the figure changes."""
 
 
 def draw(state: AppState) -> None:

@@ -47,61 +47,40 @@ _posed: Memo[Skin, Mesh] = Memo()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """A rigged figure whose rig is transferred.
-
-    Attributes
-    ----------
-    key : str
-        Key in the list of templates.
-    figure : Figure
-        Figure with mesh, skeleton and skin.
-    pose : Pose
-        Pose of the figure; for an actor of the scene, its current pose.
-    clip : Motion or None
-        Motion of the figure.
-    actor : Actor or None
-        Actor of the scene; None if the template was read from files.
-    paths : tuple of Path
-        The files of the template; empty for an actor.
-    """
+    """A rigged figure whose rig is transferred."""
 
     key: str
+    """Key in the list of templates."""
     figure: Figure
+    """Figure with mesh, skeleton and skin."""
     pose: Pose
+    """Pose of the figure; for an actor of the scene, its current pose."""
     clip: Motion | None = None
+    """Motion of the figure."""
     actor: Actor | None = None
+    """Actor of the scene; None if the template was read from files."""
     paths: tuple[Path, ...] = ()
+    """The files of the template; empty for an actor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placing:
-    """Placement of the posed template in the target's frame.
-
-    Attributes
-    ----------
-    similarity : Similarity
-        Transform from template to target.
-    alignment : Alignment or None
-        Alignment with its errors; None until they have been measured.
-    settings : AlignmentSettings
-        Settings that reproduce the placement.
-    fitted : Template or None
-        The template with rotated joints and resized limbs; None if it fits unchanged.
-    lines : tuple of Diagnostic
-        Messages about the fit.
-    meshes : tuple of object
-        Target mesh and template figure for which the placement is valid.
-    pose : tuple
-        Key of the template's pose for which the placement was found.
-    """
+    """Placement of the posed template in the target's frame."""
 
     similarity: Similarity
+    """Transform from template to target."""
     alignment: Alignment | None
+    """Alignment with its errors; None until they have been measured."""
     settings: AlignmentSettings
+    """Settings that reproduce the placement."""
     fitted: Template | None
+    """The template with rotated joints and resized limbs; None if it fits unchanged."""
     lines: tuple[Diagnostic, ...]
+    """Messages about the fit."""
     meshes: tuple[object, object]
+    """Target mesh and template figure for which the placement is valid."""
     pose: tuple[object, ...]
+    """Key of the template's pose for which the placement was found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,43 +93,29 @@ class Landmark:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """A target that was rigged.
-
-    Attributes
-    ----------
-    method : str
-        A key of ``METHODS``.
-    rigged : Rigged
-        Result of the transfer.
-    actor : Actor
-        Actor that shows the rigged figure.
-    target : Actor
-        Actor whose mesh was rigged.
-    template : Template
-        Template whose rig was transferred.
-    """
+    """A target that was rigged."""
 
     method: str
+    """A key of ``METHODS``."""
     rigged: Rigged
+    """Result of the transfer."""
     actor: Actor
+    """Actor that shows the rigged figure."""
     target: Actor
+    """Actor whose mesh was rigged."""
     template: Template
+    """Template whose rig was transferred."""
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Differences between two results for one target.
-
-    Attributes
-    ----------
-    weights : float
-        Mean over vertices of sum_j |w - w'|; 2 if no joint is common to both results at any vertex.
-    dominant : float
-        Fraction of vertices with the same dominant joint.
-    """
+    """Differences between two results for one target."""
 
     weights: float
+    """Mean over vertices of sum_j |w - w'|; 2 if no joint is common to both results at any
+    vertex."""
     dominant: float
+    """Fraction of vertices with the same dominant joint."""
 
 
 @dataclass(slots=True, eq=False)
@@ -164,119 +129,80 @@ class Running:
 
 @dataclass(slots=True)
 class RigChoices:
-    """Settings of the panel's controls.
-
-    Attributes
-    ----------
-    up, facing : str
-        Up and forward axes of the target; empty to search for them.
-    scale : str
-        One of ``SCALES``.
-    refines : bool
-        Whether an alignment is refined by closest points.
-    fits : bool
-        Whether the template's joints are rotated and its limbs resized if necessary.
-    method, joints : str
-        As in ``TransferSettings``.
-    max_distance : float
-        Maximum distance of a match, relative to the target's size.
-    max_angle : float
-        Maximum angle between the normals of a match, degrees.
-    smoothing : int
-        Number of smoothing iterations.
-    max_influences : int
-        Maximum number of influences per vertex; 0 for all.
-    correctives : bool
-        Whether pose correctives are transferred.
-    """
+    """Settings of the panel's controls."""
 
     up: str = ""
     facing: str = ""
+    """Up and forward axes of the target; empty to search for them."""
     scale: str = "uniform"
+    """One of ``SCALES``."""
     refines: bool = True
+    """Whether an alignment is refined by closest points."""
     fits: bool = True
+    """Whether the template's joints are rotated and its limbs resized if necessary."""
     method: str = "robust"
     joints: str = "surface"
+    """As in ``TransferSettings``."""
     max_distance: float = 0.05
+    """Maximum distance of a match, relative to the target's size."""
     max_angle: float = 30.0
+    """Maximum angle between the normals of a match, degrees."""
     smoothing: int = 0
+    """Number of smoothing iterations."""
     max_influences: int = 0
+    """Maximum number of influences per vertex; 0 for all."""
     correctives: bool = True
+    """Whether pose correctives are transferred."""
 
 
 @dataclass(slots=True)
 class Rigging:
-    """State of the Rig panel.
-
-    Attributes
-    ----------
-    scene : Scene or None
-        Scene for which the state is valid.
-    target : Actor or None
-        Actor whose mesh is to be rigged.
-    template_key : str
-        Chosen entry in the list of templates.
-    template : Template or None
-        Template that was read from files; the template of an actor is built on each use.
-    choices : RigChoices
-        Settings of the controls.
-    placing : Placing or None
-        Placement of the template; None until it has been aligned or moved.
-    ghost : str
-        A key of ``GHOSTS``.
-    tool : str
-        A key of ``TOOLS``.
-    holds_mouse : bool
-        Whether the pointer is on a handle of the gizmo, or holds one.
-    scaling : (float, float) or None
-        While the scaling ring is dragged: the pointer's distance from the centre and the
-        template's scale at the start of the drag.
-    was_dragged : bool
-        Whether the gizmo has moved the template since its error was measured.
-    landmarks : list of Landmark
-        Pairs of clicked points.
-    pending : RayHit or None
-        Point of the template whose counterpart on the target has not been clicked yet.
-    aside : (3,)
-        Offset of the template from the target while landmarks are clicked.
-    match_fraction : float or None
-        Fraction of matched vertices, as shown by the target's colours.
-    running : Running or None
-        Job that is running.
-    results : dict of str to Result
-        Latest result of each method, all for the same target.
-    comparison : Comparison or None
-        Comparison of the results of both methods.
-    scrolls : int
-        Number of frames in which the panel still scrolls to the result.
-    ghost_key, ghost_figure : object, Figure or None
-        Key of the template's pose, and its mesh in that pose.
-    shown : Ghost or None
-        Template that is drawn over the scene; the same object as long as it looks the same.
-    """
+    """State of the Rig panel."""
 
     scene: Scene | None = None
+    """Scene for which the state is valid."""
     target: Actor | None = None
+    """Actor whose mesh is to be rigged."""
     template_key: str = ""
+    """Chosen entry in the list of templates."""
     template: Template | None = None
+    """Template that was read from files; the template of an actor is built on each use."""
     choices: RigChoices = field(default_factory=RigChoices)
+    """Settings of the controls."""
     placing: Placing | None = None
+    """Placement of the template; None until it has been aligned or moved."""
     ghost: str = "translucent"
+    """A key of ``GHOSTS``."""
     tool: str = ""
+    """A key of ``TOOLS``."""
     holds_mouse: bool = False
+    """Whether the pointer is on a handle of the gizmo, or holds one."""
     scaling: tuple[float, float] | None = None
+    """While the scaling ring is dragged: the pointer's distance from the centre and the template's
+    scale at the start of the drag."""
     was_dragged: bool = False
+    """Whether the gizmo has moved the template since its error was measured."""
     landmarks: list[Landmark] = field(default_factory=list)
+    """Pairs of clicked points."""
     pending: RayHit | None = None
+    """Point of the template whose counterpart on the target has not been clicked yet."""
     aside: Floats = field(default_factory=lambda: np.zeros(3))
+    """Offset of the template from the target while landmarks are clicked: (3,)."""
     match_fraction: float | None = None
+    """Fraction of matched vertices, as shown by the target's colours."""
     running: Running | None = None
+    """Job that is running."""
     results: dict[str, Result] = field(default_factory=dict)
+    """Latest result of each method, all for the same target."""
     comparison: Comparison | None = None
+    """Comparison of the results of both methods."""
     scrolls: int = 0
+    """Number of frames in which the panel still scrolls to the result."""
     ghost_key: object = None
     ghost_figure: Figure | None = None
+    """Key of the template's pose, and its mesh in that pose."""
     shown: Ghost | None = None
+    """Template that is drawn over the scene; the same object as long as it looks the same."""
 
     def kept(self) -> object | None:
         """Return the template's placement, which is undone with the scene."""

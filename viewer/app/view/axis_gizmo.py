@@ -28,18 +28,12 @@ _SAME = 1e-6  # tolerance for equal directions
 
 @dataclass(slots=True)
 class AxisGizmo:
-    """State of the gizmo.
-
-    Attributes
-    ----------
-    is_shown : bool
-        Whether it is drawn.
-    is_held : bool
-        Whether a press began on it and the button is still down.
-    """
+    """State of the gizmo."""
 
     is_shown: bool = True
+    """Whether it is drawn."""
     is_held: bool = False
+    """Whether a press began on it and the button is still down."""
 
 
 class _End(NamedTuple):

@@ -29,21 +29,14 @@ class _Place:
 
 @dataclass(slots=True)
 class Flight:
-    """Animation in progress.
-
-    Attributes
-    ----------
-    ends : (_Place, _Place) or None
-        Camera positions at its start and end; None if the camera is at rest.
-    seconds : float
-        Time since its start.
-    placed : _Place or None
-        Position at which the animation last placed the camera.
-    """
+    """Animation in progress."""
 
     ends: tuple[_Place, _Place] | None = None
+    """Camera positions at its start and end; None if the camera is at rest."""
     seconds: float = 0.0
+    """Time since its start."""
     placed: _Place | None = None
+    """Position at which the animation last placed the camera."""
 
     @property
     def is_active(self) -> bool:

@@ -23,44 +23,29 @@ _AWAY = 14.0  # points between the pointer and the name
 
 @dataclass(slots=True)
 class Hovered:
-    """The item under the pointer.
-
-    Attributes
-    ----------
-    joint : int
-        Joint of the chosen actor; -1 for none.
-    actor : int
-        Another actor; -1 for none.
-    place : (float, float)
-        Position of the pointer, window coordinates.
-    since : float
-        Time at which the pointer came to rest, seconds of ImGui's clock.
-    is_waiting : bool
-        Whether the pointer is at rest, but not yet for long enough.
-    """
+    """The item under the pointer."""
 
     joint: int = -1
+    """Joint of the chosen actor; -1 for none."""
     actor: int = -1
+    """Another actor; -1 for none."""
     place: tuple[float, float] = (-1.0, -1.0)
+    """Position of the pointer, window coordinates."""
     since: float = 0.0
+    """Time at which the pointer came to rest, seconds of ImGui's clock."""
     is_waiting: bool = False
+    """Whether the pointer is at rest, but not yet for long enough."""
 
 
 @dataclass(slots=True)
 class Picking:
-    """State of picking in the view.
-
-    Attributes
-    ----------
-    wanted : (x, y, aims) or None
-        Position of a click, relative to the upper left corner of the view, and whether the camera
-        is aimed there.
-    menu_at : (x, y) or None
-        Position of a right click without a drag.
-    """
+    """State of picking in the view."""
 
     wanted: tuple[float, float, bool] | None = None
+    """Position of a click, relative to the upper left corner of the view, and whether the camera is
+    aimed there: (x, y, aims)."""
     menu_at: tuple[float, float] | None = None
+    """Position of a right click without a drag: (x, y)."""
 
 
 def hover_joint(state: AppState) -> None:

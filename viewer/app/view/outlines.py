@@ -18,15 +18,10 @@ from viewer.rig.geometry.transform import apply_transform
 
 @dataclass(slots=True)
 class Outlines:
-    """State of the outlines.
-
-    Attributes
-    ----------
-    is_shown : bool
-        Whether outlines are drawn in the window.
-    """
+    """State of the outlines."""
 
     is_shown: bool = True
+    """Whether outlines are drawn in the window."""
 
 
 def toggle_outlines(state: AppState) -> None:

@@ -104,25 +104,17 @@ def _take_click(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """The item at a pixel.
-
-    Attributes
-    ----------
-    actor : int
-        Index of an actor.
-    joint : int
-        Joint drawn at or near the pixel, or else the one with the most influence there; -1 for
-        none.
-    vertex : int
-        Nearest vertex of the surface; -1 for none.
-    part : int
-        Part of the mesh; -1 for none.
-    """
+    """The item at a pixel."""
 
     actor: int
+    """Index of an actor."""
     joint: int
+    """Joint drawn at or near the pixel, or else the one with the most influence there; -1 for
+    none."""
     vertex: int
+    """Nearest vertex of the surface; -1 for none."""
     part: int = -1
+    """Part of the mesh; -1 for none."""
 
 
 def spot_at(

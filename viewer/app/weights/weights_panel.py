@@ -57,92 +57,60 @@ _FIRST = ("weight", "field", "class", "parts")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pinned:
-    """The vertex that the Vertex panel explains.
-
-    Attributes
-    ----------
-    actor : int
-        Index of its actor in the scene.
-    figure : Figure
-        Figure of that actor, for which the index is valid.
-    vertex : int
-        Index of the vertex.
-    """
+    """The vertex that the Vertex panel explains."""
 
     actor: int
+    """Index of its actor in the scene."""
     figure: Figure
+    """Figure of that actor, for which the index is valid."""
     vertex: int
+    """Index of the vertex."""
 
 
 @dataclass(slots=True)
 class Hover:
-    """The vertex under a mouse that does not move.
-
-    Attributes
-    ----------
-    since : float
-        Time since which neither mouse nor image has changed, seconds of ImGui's clock.
-    place : (float, float)
-        Position of the mouse, window coordinates.
-    picture : object
-        Key of the image, compared to detect a change.
-    is_known : bool
-        Whether the vertex has been determined since then.
-    lines : tuple of str
-        Hover text; empty if there is no vertex.
-    point : (3,)
-        Position of the vertex, scene space.
-    """
+    """The vertex under a mouse that does not move."""
 
     since: float = 0.0
+    """Time since which neither mouse nor image has changed, seconds of ImGui's clock."""
     place: tuple[float, float] = (-1.0, -1.0)
+    """Position of the mouse, window coordinates."""
     picture: object = None
+    """Key of the image, compared to detect a change."""
     is_known: bool = False
+    """Whether the vertex has been determined since then."""
     lines: tuple[str, ...] = ()
+    """Hover text; empty if there is no vertex."""
     point: Floats = field(default_factory=lambda: np.zeros(3))
+    """Position of the vertex, scene space: (3,)."""
 
 
 @dataclass(slots=True)
 class Weights:
-    """State of the Weights and Vertex panels.
-
-    Attributes
-    ----------
-    panel_frame : int
-        ImGui's number of the last frame in which the Weights panel was drawn.
-    always_shows_info : bool
-        Whether hover text is shown even if the Weights panel is not visible.
-    picks_vertices : bool
-        Whether clicks pin vertices instead of selecting actors and joints.
-    hover : Hover
-        The vertex under the mouse.
-    is_waiting : bool
-        Whether the mouse is still, but not yet for long enough.
-    pinned : Pinned or None
-        The vertex that is explained.
-    draws_lines : bool
-        Whether lines are drawn from the vertex to its images under each joint alone.
-    explanation : Explanation or None
-        Latest explanation of the vertex.
-    explanation_key : object
-        Key of the state for which the explanation was computed.
-    annotations : tuple of Annotation
-        Annotation of the vertex in the view; at most one.
-    annotation_key : object
-        Key of the state for which the annotation was created.
-    """
+    """State of the Weights and Vertex panels."""
 
     panel_frame: int = -1
+    """ImGui's number of the last frame in which the Weights panel was drawn."""
     always_shows_info: bool = False
+    """Whether hover text is shown even if the Weights panel is not visible."""
     picks_vertices: bool = False
+    """Whether clicks pin vertices instead of selecting actors and joints."""
     hover: Hover = field(default_factory=Hover)
+    """The vertex under the mouse."""
     is_waiting: bool = False
+    """Whether the mouse is still, but not yet for long enough."""
     pinned: _Pinned | None = None
+    """The vertex that is explained."""
     draws_lines: bool = True
+    """Whether lines are drawn from the vertex to its images under each joint alone."""
     explanation: Explanation | None = None
+    """Latest explanation of the vertex."""
     explanation_key: object = None
+    """Key of the state for which the explanation was computed."""
     annotations: tuple[Annotation, ...] = ()
+    """Annotation of the vertex in the view; at most one."""
     annotation_key: object = None
+    """Key of the state for which the annotation was created."""
 
 
 def wants_vertex(view: Weights) -> bool:
