@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewer.batching.items import Result
 from viewer.batching.tables import (
@@ -26,11 +25,11 @@ from viewer.batching.tables import (
 )
 from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError, ViewerError
-from viewer.media.captioned_sheet import CaptionedCell, captioned_sheet
-from viewer.media.image import save_image
 from viewer.media.saving import all_or_none, save_text
-from viewer.media.thumbnails import data_uri, thumbnail
 from viewer.phrases import counted, printable
+
+if TYPE_CHECKING:
+    from viewer.media.captioned_sheet import CaptionedCell
 
 PAGES = (".html", ".htm")
 """Suffixes of pages; all other suffixes are those of pictures."""
@@ -248,6 +247,8 @@ def _columns(job: str, results: Sequence[Result]) -> list[_Column]:
 
 
 def _picture(result: Result) -> str:
+    from viewer.media.thumbnails import data_uri, thumbnail
+
     pixels = thumbnail(result.outputs[0], _THUMBNAIL) if result.outputs else None
     return "" if pixels is None else f'<img alt="" src="{data_uri(pixels)}">'
 
@@ -382,6 +383,8 @@ def _text_of(value: object) -> str:
     >>> _text_of("<b> & co")
     '&lt;b&gt; &amp; co'
     """
+    from html import escape
+
     return escape(printable(value, _LONGEST))
 
 
@@ -433,6 +436,9 @@ def _document(title: str, body: Iterable[str]) -> str:
 
 def _save_sheets(path: Path, results: Sequence[Result]) -> list[str]:
     """Write one sheet or several: ``sheet.png``, ``sheet-2.png``; see ``save_overview``."""
+    from viewer.media.captioned_sheet import captioned_sheet
+    from viewer.media.image import save_image
+
     rows = ordered(results)
     shown = rows[: PER_SHEET * MOST_SHEETS]
     if not any(result.outputs or result.status not in _FINISHED for result in shown):
@@ -460,6 +466,9 @@ def _sheet_path(path: Path, number: int) -> Path:
 
 
 def _cell(result: Result) -> CaptionedCell:
+    from viewer.media.captioned_sheet import CaptionedCell
+    from viewer.media.thumbnails import thumbnail
+
     name = printable(result.item.name, 200)
     if result.status not in _FINISHED:
         return CaptionedCell(name, None, f"{result.status}\n{row_message(result)}", True)

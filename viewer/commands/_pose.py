@@ -6,6 +6,7 @@ import argparse
 import math
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.number_text import number_text
-from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning, file_method
+
+if TYPE_CHECKING:
+    from viewer.rig.posing.pose_record import PoseRecord
 
 _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 _LISTED = 12  # maximum number of names listed in a message
@@ -350,6 +352,8 @@ def is_named(text: str) -> bool:
 
 def _has_only_morphs(figure: Figure) -> bool:
     """Return whether a figure has blend shapes and all of them are morphs."""
+    from viewer.rig.morph_target import MORPH_GROUP
+
     groups = () if figure.blend_shapes is None else figure.blend_shapes.groups
     return bool(groups) and all(group == MORPH_GROUP for group in groups)
 
@@ -359,6 +363,8 @@ def _morph_record(figure: Figure, values: Floats) -> PoseRecord:
 
     Raises ViewerError if it has fewer; the message names them.
     """
+    from viewer.rig.posing.pose_record import PoseRecord
+
     names = () if figure.blend_shapes is None else figure.blend_shapes.names
     if len(values) > len(names) and values[len(names) :].any():
         raise ViewerError(
@@ -392,6 +398,8 @@ def _named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
 
 
 def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
+    from viewer.rig.posing.pose_record import PoseRecord
+
     pose = actor.require_pose()
     assert actor.figure.blend_shapes is not None  # checked by the caller
     weights = np.zeros(actor.figure.n_shapes)

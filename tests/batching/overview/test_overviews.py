@@ -9,11 +9,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from viewer.batching import overview as sheet
+from viewer.batching import overview
 from viewer.batching.items import Item, Result
 from viewer.batching.overview import check_overview, save_overview
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.interrupts import Interrupted
+from viewer.media import captioned_sheet
 from viewer.media.image import decode_picture, save_image
 
 EVIL = "<script>alert(1)</script>\" onload='x'"
@@ -130,12 +131,12 @@ def test_sheet_shows_every_picture_and_marks_failed_items(tmp_path, monkeypatch)
     assert has(pixels, red) == 2 * 60 * 80
     assert has(pixels, green) == 60 * 80
     assert has(pixels, (253, 236, 234)) > 0.8 * 240 * 120
-    monkeypatch.setattr(sheet, "PER_SHEET", 3)
+    monkeypatch.setattr(overview, "PER_SHEET", 3)
     lines = save_overview(path, "render", results)
     assert lines == [f"{path}: 3 items, 1 of them failed", f"{tmp_path / 'o-2.png'}: 1 item"]
     second = decode_picture(path, (tmp_path / "o-2.png").read_bytes())
     assert has(second, red) == 60 * 80
-    monkeypatch.setattr(sheet, "MOST_SHEETS", 1)
+    monkeypatch.setattr(overview, "MOST_SHEETS", 1)
     lines = save_overview(path, "render", results)
     assert lines[1:] == ["the sheets show the first 3 of 4 items"]
 
@@ -165,8 +166,8 @@ def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> Non
         Result(Item(index, (), "", f"{index}.glb"), "failed", 2, message="broken")
         for index in range(5)
     ]
-    monkeypatch.setattr(sheet, "PER_SHEET", 2)
-    path, drawn = tmp_path / "o.png", sheet.captioned_sheet
+    monkeypatch.setattr(overview, "PER_SHEET", 2)
+    path, drawn = tmp_path / "o.png", captioned_sheet.captioned_sheet
     path.write_bytes(b"old")
 
     def stop(cells):
@@ -174,7 +175,7 @@ def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> Non
             raise Interrupted(2)
         return drawn(cells)
 
-    monkeypatch.setattr(sheet, "captioned_sheet", stop)
+    monkeypatch.setattr(captioned_sheet, "captioned_sheet", stop)
     with pytest.raises(Interrupted):
         save_overview(path, "render", results)
     assert [one.name for one in tmp_path.iterdir()] == ["o.png"] and path.read_bytes() == b"old"
