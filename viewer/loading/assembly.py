@@ -30,21 +30,13 @@ from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
 from viewer.rig.mesh import hidden_parts
-from viewer.rig.motion.animation_choice import (
-    NONE,
-    chosen_animation,
-    counterpart,
-    own_first,
-    play_animation,
-)
-from viewer.rig.motion.body_motion import BodyMotion
-from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.transform_clip import Animation
-from viewer.rig.posing.pose_record import PARTS, PoseRecord
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.motion.body_motion import BodyMotion
+    from viewer.rig.motion.transform_clip import Animation
+    from viewer.rig.posing.pose_record import PoseRecord
 
 # Single poses of bodies, which become motions of one frame
 _RATE = 30.0  # of a motion with one frame, where it has no effect
@@ -158,6 +150,9 @@ def _lone_poses_as_motions(contents: Contents) -> Contents:
 
 def _lone_motion(path: Path, record: PoseRecord) -> BodyMotion | None:
     """Return a pose as a motion of one frame; None if it is not a pose of a known body."""
+    from viewer.rig.motion.body_motion import BodyMotion
+    from viewer.rig.motion.timing import Timing
+
     joints = _lone_joints(record)
     if joints is None or record.scale not in (None, 1.0):
         return None
@@ -191,6 +186,8 @@ def _lone_motion(path: Path, record: PoseRecord) -> BodyMotion | None:
 
 def _lone_joints(record: PoseRecord) -> tuple[tuple[str, ...], Floats] | None:
     """Return the joints other than fingers and their rotation vectors, (K, 3); None if unknown."""
+    from viewer.rig.posing.pose_record import PARTS
+
     known, parts = members_by_numbers(), record.parts
     if record.dofs or record.joint_rotations is not None:
         own, vector = record.joint_rotations, record.vector
@@ -289,6 +286,8 @@ def _animate(draft: SceneDraft, wanted: str) -> None:
     FormatError
         If the keys of a requested animation are invalid; for others, this is only a warning.
     """
+    from viewer.rig.motion.animation_choice import NONE, chosen_animation
+
     files = _files(draft)
     if not files and wanted.lower() == NONE:
         return
@@ -318,6 +317,8 @@ def _files(draft: SceneDraft) -> list[list[Actor]]:
 def _start(
     draft: SceneDraft, actors: list[Actor], chosen: Animation | None, is_requested: bool
 ) -> None:
+    from viewer.rig.motion.animation_choice import counterpart, own_first, play_animation
+
     for actor in actors:
         index = -1 if chosen is None else counterpart(actor.figure, chosen)
         if index < 0 and chosen is not None and not is_requested:
