@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import viewer
-from viewer.app.features import ACTIONS, KEYS, PANELS, panel_module
+from viewer.app.features import ACTIONS, KEYS, PANELS, _function, panel_module
 from viewer.batching.engines import ENGINES
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
@@ -73,21 +73,16 @@ def test_panels_can_draw() -> None:
         assert callable(panel_module(name).draw)
 
 
-def function_of(path: str):
-    module, _, name = path.rpartition(".")
-    return getattr(import_module(f"viewer.app.{module}"), name)
-
-
 def test_keys_and_actions_run_functions_of_the_state() -> None:
     for names in ([key.label for key in KEYS], [action.text for action in ACTIONS]):
         assert len(names) == len(set(names))
     for one in (*KEYS, *ACTIONS):
-        function = function_of(one.action)
+        function = _function(one.action)
         assert next(iter(signature(function).parameters)) == "state", one
         signature(function).bind(None, *one.arguments)
     for action in ACTIONS:
         if action.why:
-            signature(function_of(action.why)).bind(None)
+            signature(_function(action.why)).bind(None)
 
 
 def test_commands_can_run() -> None:
