@@ -374,7 +374,7 @@ def test_file_above_the_size_cap_is_refused_before_it_is_read(tmp_path):
     with path.open("wb") as stream:
         stream.truncate(3 << 30)  # sparse: it takes no disk space
     assert refusal(path) == (
-        f"{path}: expected at most 2147483648 bytes, found 3221225472 (see --max-size)"
+        f"{path}: expected at most 2,147,483,648 bytes, found 3,221,225,472 (see --max-size)"
     )
 
 

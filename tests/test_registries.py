@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import viewer
-from viewer.app.features import ACTIONS, KEYS, PANELS, _function, panel_module
+from viewer.app.features import ACTIONS, KEYS, PANELS, function_of, panel_module
 from viewer.batching.engines import ENGINES
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
@@ -77,12 +77,12 @@ def test_keys_and_actions_run_functions_of_the_state() -> None:
     for names in ([key.label for key in KEYS], [action.text for action in ACTIONS]):
         assert len(names) == len(set(names))
     for one in (*KEYS, *ACTIONS):
-        function = _function(one.action)
+        function = function_of(one.action)
         assert next(iter(signature(function).parameters)) == "state", one
         signature(function).bind(None, *one.arguments)
     for action in ACTIONS:
         if action.why:
-            signature(_function(action.why)).bind(None)
+            signature(function_of(action.why)).bind(None)
 
 
 def test_commands_can_run() -> None:

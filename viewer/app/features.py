@@ -83,7 +83,7 @@ class Shortcut:
 
     def run(self, state: AppState) -> None:
         """Run the action."""
-        _function(self.action)(state, *self.arguments)
+        function_of(self.action)(state, *self.arguments)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,14 +102,14 @@ class Action:
 
     def run(self, state: AppState) -> None:
         """Run the action."""
-        _function(self.action)(state, *self.arguments)
+        function_of(self.action)(state, *self.arguments)
 
     def reason(self, state: AppState) -> str:
         """Return the reason why it is disabled; empty if it can be run."""
-        return str(_function(self.why)(state)) if self.why else ""
+        return str(function_of(self.why)(state)) if self.why else ""
 
 
-def _function(path: str) -> Callable[..., object]:
+def function_of(path: str) -> Callable[..., object]:
     """Return a function of ``viewer.app``, imported on first use."""
     module, _, name = path.rpartition(".")
     place = _MOVED.get(module, module)

@@ -95,8 +95,8 @@ def read_pipe(path: Path, max_size: int) -> bytes | None:
                     parts.append(part)
                     size += len(part)
                     if size > max_size:
-                        values = {"most": max_size, "size": "more"}
-                        raise FormatError(Diagnostic("F001.too-large", path, values=values))
+                        values = {"most": max_size}
+                        raise FormatError(Diagnostic("F001.pipe-too-large", path, values=values))
         except OSError as problem:
             raise _unreadable(path, problem) from None
         _piped[key] = b"".join(parts)

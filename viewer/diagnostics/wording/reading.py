@@ -31,6 +31,8 @@ MESSAGES = {
     "F001.no-file": "expected a file, found {found}",
     "F001.too-large": "expected at most {most:,.0f} bytes, found {size:,.0f}"
     "{window:?| (see --max-size)}",
+    "F001.pipe-too-large": "expected at most {most:,.0f} bytes, found more"
+    "{window:?| (see --max-size)}",
     "F002.number": _NUMBER,
     "F003.number": _NUMBER,
     "F003.too-large": _BELOW,
