@@ -163,6 +163,21 @@ def test_planes_and_hollow_shapes_hold_the_point(
     assert point[0] > 0.5
 
 
+def test_scaled_plane_pushes_along_its_own_normal() -> None:
+    """The plane 3 y = 4 x through the pivot, four times as wide in x, is 3 y = x."""
+    normal = np.array([[-0.8, 0.6, 0.0]])
+    shape = Colliders(np.array([1]), np.zeros((1, 3)), normal, np.zeros(1), np.array([PLANE]))
+    springs = springs_of([0], [[1, 0, 0]], colliders=shape, obstacles=((0,),))
+    skeleton = skeleton_of(springs, (-1, -1), ((0, 1, 0), (0, 1, 0)))
+    simulation, (world, local, scales, place) = Simulation(skeleton), pose_of(skeleton)
+    tails = simulation.start(world, local, scales, place)
+    scales[1] = 4.0, 1.0, 1.0
+    world[1, :3, :3] *= scales[1]
+    tails, _ = simulation.step(tails, world, local, scales, place)
+    # (1, 0) lies 1 / sqrt(10) below; its foot (0.9, 0.3) is moved to the distance 1.
+    assert_allclose(tails.now[0] - [0, 1, 0], np.array([3, 1, 0]) / np.sqrt(10), atol=1e-12)
+
+
 @pytest.mark.parametrize("center", [-1, 0])
 def test_inertia_is_relative_to_the_center(center: int) -> None:
     springs = springs_of([1], [[0, -1, 0]], drags=0.0, center=center)

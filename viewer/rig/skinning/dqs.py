@@ -17,9 +17,8 @@ from viewer.rig.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import inverse_transposed, unit
 from viewer.rig.skin import Skin, bind_positions, strongest_first
-from viewer.rig.skinning._normals import inverse_transposed
 
 _CHUNK = 1 << 16  # number of vertices per chunk, which limits the memory for large meshes
 _RIGID = 1e-12  # tolerance within which a stretch is treated as the identity

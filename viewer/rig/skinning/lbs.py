@@ -14,10 +14,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import inverse_transposed, unit
 from viewer.rig.memo import Memo
 from viewer.rig.skin import Skin, has_influence
-from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
+from viewer.rig.skinning._normals import rigid_vertices
 
 # Number of matrices per chunk, which fits into the processor's cache and limits the memory.
 _CHUNK = 1 << 14

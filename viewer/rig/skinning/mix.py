@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import inverse_transposed, unit
 from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import dqs, lbs
-from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
+from viewer.rig.skinning._normals import rigid_vertices
 
 
 def deform(

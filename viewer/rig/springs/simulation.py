@@ -27,7 +27,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.quaternion import between, multiply, slerp
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import inverse_transposed, unit
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.springs.springs import INSIDE, PLANE, Springs
 
@@ -186,7 +186,10 @@ class Simulation:
         start = _points(matrices, shapes.offsets[which])
         along = _points(matrices, shapes.tails[which]) - start
         delta, kinds = points - start, shapes.kinds[which]
-        normals = unit(along)
+        # A normal stays perpendicular to its scaled plane only by the inverse transpose.
+        own_normals = shapes.tails[which] - shapes.offsets[which]
+        linear = np.moveaxis(matrices[:, :3, :3], 0, -1)
+        normals = unit(inverse_transposed(linear, own_normals))
         heights = np.einsum("na,na->n", normals, delta)
         square = np.einsum("na,na->n", along, along)
         fraction = np.einsum("na,na->n", along, delta) / np.maximum(square, _SHORT)

@@ -23,8 +23,8 @@ class Colliders:
     joints : (C,) int32
         Joint that each shape follows.
     offsets, tails : (C, 3)
-        Centres of both ends in joint space; equal for a sphere. For a plane, a point on it and a
-        point in the direction of its normal.
+        Centres of both ends in joint space; equal for a sphere. For a plane, a point on it and the
+        same point moved by its normal.
     radii : (C,)
         Scene units; joints do not scale them. 0 for a plane.
     kinds : (C,) int32
