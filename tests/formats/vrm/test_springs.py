@@ -64,6 +64,15 @@ def test_joints_point_at_the_next_joint_of_their_chain(folder: Path) -> None:
     assert dict(actor.figure.facts)["springs"] == "1 chain, 3 joints, 2 colliders"
 
 
+def test_colliders_of_two_groups_push_twice(tmp_path: Path) -> None:
+    file = swinging()
+    extension = file.root["extensions"]["VRMC_springBone"]
+    extension["colliderGroups"].append({"colliders": [1, 0]})
+    extension["springs"][0]["colliderGroups"] = [0, 1]
+    springs = springs_in(opened(file, tmp_path).actors[0])
+    assert springs.obstacles == ((0, 1, 1, 0),) * 3
+
+
 def test_version_0_swings_all_joints_below_a_bone(folder: Path) -> None:
     actor = load(folder / "ada0.vrm").actors[0]
     skeleton, springs = actor.figure.require_skeleton(), springs_in(actor)

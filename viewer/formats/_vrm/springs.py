@@ -199,9 +199,13 @@ def _chain(
 
 
 def _obstacles_of(spring: Any, groups: _Groups) -> tuple[int, ...]:
-    """Return the colliders of a chain's groups, each once."""
+    """Return the colliders of a chain's groups in order, and twice if two groups have one.
+
+    Each push is followed by restoring the length, which may move the point back into the collider,
+    so a second push by the same collider moves it further.
+    """
     chosen = [g for g in listed(spring, "colliderGroups") if is_index(g, len(groups))]
-    return tuple(dict.fromkeys(index for group in chosen for index in groups[group]))
+    return tuple(index for group in chosen for index in groups[group])
 
 
 def _tail_between(tree: NodeTree, head: int, tail: int) -> Floats | None:
