@@ -178,6 +178,21 @@ def test_scaled_plane_pushes_along_its_own_normal() -> None:
     assert_allclose(tails.now[0] - [0, 1, 0], np.array([3, 1, 0]) / np.sqrt(10), atol=1e-12)
 
 
+def test_colliders_on_other_chains_are_met_where_they_have_swung() -> None:
+    """A plane hangs from a joint that has swung from +x to -y, where it is the floor y = -1."""
+    normal = np.array([[-1.0, 0.0, 0.0]])
+    shape = Colliders(np.array([1]), np.zeros((1, 3)), normal, np.zeros(1), np.array([PLANE]))
+    springs = springs_of([0, 2], [[1, 0, 0], [1, 0, 0]], colliders=shape, obstacles=((), (0,)))
+    skeleton = skeleton_of(springs, (-1, 0, -1), ((0, 0, 0), (1, 0, 0), (0, -1, 0)))
+    simulation, pose = Simulation(skeleton), pose_of(skeleton)
+    now = np.array([[0, -1, 0], [0.6, -1.8, 0]])
+    tails = replace(simulation.start(*pose), now=now, before=now)
+    tails, _ = simulation.step(tails, *pose)
+    # The second point, (0.6, -0.8) from its pivot on the floor, is lifted to (0.6, 0), then
+    # moved to the distance 1.
+    assert_allclose(tails.now, [[0, -1, 0], [1, -1, 0]], rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("center", [-1, 0])
 def test_inertia_is_relative_to_the_center(center: int) -> None:
     springs = springs_of([1], [[0, -1, 0]], drags=0.0, center=center)

@@ -12,7 +12,8 @@ the joint in its posed parent, and a step of t seconds, a step computes ::
 
 and then moves n out of each collider along the shortest path and restores its length. The joint's
 rotation is the smallest one that points it at n. Inertia, the first two terms, is evaluated in the
-space of the joint's centre. Joints are updated from the root to the tips.
+space of the joint's centre. Joints are updated from the root to the tips, after the joints that
+carry their colliders.
 
 Source: ``VRMC_springBone`` 1.0, github.com/vrm-c/vrm-specification.
 """
@@ -51,7 +52,7 @@ class Tails:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """Joints at one depth below the topmost spring joint.
+    """Joints that depend on those of the previous levels only.
 
     ``joints``, ``parents`` (L,): indices of joints; a parent may be -1.
     ``rows`` (N',): indices of the spring joints among them; ``places`` (N',): their positions in
@@ -213,13 +214,30 @@ class Simulation:
 
 
 def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
-    """Return the spring joints and all joints below them, grouped by depth."""
+    """Return the spring joints and all joints below them, each after those it depends on.
+
+    A joint depends on its parent, and a spring joint on the moving joints of its colliders, except
+    where these in turn depend on it.
+    """
     depths = np.full(skeleton.n_joints, -1)
     is_spring = np.zeros(skeleton.n_joints, dtype=np.bool_)
     is_spring[springs.joints] = True
+    needs: list[list[int]] = []
     for joint, parent in enumerate(skeleton.parents.tolist()):
-        above = depths[parent] if parent >= 0 else -1
-        depths[joint] = above + 1 if above >= 0 or is_spring[joint] else -1
+        moves = parent >= 0 and depths[parent] >= 0
+        depths[joint] = 0 if moves or is_spring[joint] else -1
+        needs.append([parent] if moves else [])
+    for joint, obstacles in zip(springs.joints.tolist(), springs.obstacles, strict=True):
+        for carrier in dict.fromkeys(springs.colliders.joints[[*obstacles]].tolist()):
+            if depths[carrier] >= 0 and not _depends(needs, carrier, joint):
+                needs[joint].append(carrier)
+    is_settled = False
+    while not is_settled:
+        is_settled = True
+        for joint in np.flatnonzero(depths >= 0).tolist():
+            depth = max((int(depths[needed]) + 1 for needed in needs[joint]), default=0)
+            is_settled &= depth == depths[joint]
+            depths[joint] = depth
     row_of = np.full(skeleton.n_joints, -1, dtype=np.int32)
     row_of[springs.joints] = np.arange(springs.n_joints)
     levels = []
@@ -230,6 +248,16 @@ def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
         hits = _hits([springs.obstacles[row] for row in rows])
         levels.append(_Level(joints, skeleton.parents[joints], rows, places, hits))
     return levels
+
+
+def _depends(needs: list[list[int]], joint: int, on: int) -> bool:
+    """Return whether a joint is another one, or depends on it directly or indirectly."""
+    seen, stack = {joint}, [joint]
+    while stack:
+        fresh = [needed for needed in needs[stack.pop()] if needed not in seen]
+        seen.update(fresh)
+        stack += fresh
+    return on in seen
 
 
 def _hits(listed: list[tuple[int, ...]]) -> tuple[tuple[Ints, Ints], ...]:
