@@ -101,7 +101,7 @@ def test_fault_is_found_and_corrected_or_refused(
     if corrected is None:
         assert code == 2 and not out.exists()
         return
-    assert code == 0 and f"against the specification: {corrected}" in text
+    assert code == 0 and f"violated the specification: {corrected}" in text
     assert _errors(out) == []
 
 
