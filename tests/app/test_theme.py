@@ -65,9 +65,21 @@ def test_coloured_text_is_legible_on_panels(hand, monkeypatch, name):
 def test_selected_keys_and_their_handles_contrast_with_the_plot(curves, monkeypatch, panels):
     theme.set_theme(panels)
     shown = []
-    for name in ("ink", "faint"):
+
+    def record(name, drawn):
+        """Record a colour of the plot where it is made of this value."""
         color_of = getattr(plot, name)
-        monkeypatch.setattr(plot, name, lambda x, of=color_of: shown.append(of(x)) or shown[-1])
+
+        def recorded(value):
+            color = color_of(value)
+            if value == drawn:
+                shown.append(color)
+            return color
+
+        monkeypatch.setattr(plot, name, recorded)
+
+    record("ink", plot._HANDLE)
+    record("faint", 1.0)
     curves.click("key arm.x 1")
     curves.step(2)
     background = _luminance(imgui.get_style().color_(imgui.Col_.window_bg))
