@@ -89,7 +89,7 @@ def test_invalid_skeleton_item_does_not_affect_other_lines(item: str, below: int
 
 def test_invalid_frame_repeats_the_previous_frame() -> None:
     good = [f"{k} 1 0" + " 0" * 12 for k in range(5)]
-    bad = [good[0], good[1].replace("1", "nan", 1), good[2], good[3] + " 7", good[4]]
+    bad = [good[0], good[1].replace("1", "up", 1), good[2], good[3] + " 7", good[4]]
     motion, faults = gone_on(bvh, frames(*bad), "a.bvh")
     assert [(fault[2], fault[3]) for fault in faults] == [("frames", [1]), ("frames", [3])]
     assert faults[1][0][::2] == ("F002.bvh-row", {"frame": 3, "expected": 15, "found": 16})

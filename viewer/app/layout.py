@@ -116,12 +116,12 @@ def _default_sizes(window: tuple[float, float], letter: float, lines: float, plo
     plots : bool
         Whether the Curves or Joint match panel is in front of the Timeline.
 
-    >>> default_sizes((1280, 800), 15.0, 8.0, False)
-    Sizes(left=281.6, right=320.0, bottom=120.0, rows=2)
-    >>> default_sizes((900, 600), 15.0, 8.0, False)
-    Sizes(left=0.0, right=270.0, bottom=120.0, rows=2)
-    >>> default_sizes((1280, 800), 30.0, 8.0, True)
-    Sizes(left=0.0, right=510.0, bottom=368.0, rows=2)
+    >>> _default_sizes((1280, 800), 15.0, 8.0, False)
+    _Sizes(left=281.6, right=320.0, bottom=120.0, rows=2)
+    >>> _default_sizes((900, 600), 15.0, 8.0, False)
+    _Sizes(left=0.0, right=270.0, bottom=120.0, rows=2)
+    >>> _default_sizes((1280, 800), 30.0, 8.0, True)
+    _Sizes(left=0.0, right=510.0, bottom=368.0, rows=2)
     """
     width, height = window
     least, most = _CURVES if plots else (max(lines, _TIMELINE[0]), _TIMELINE[1])

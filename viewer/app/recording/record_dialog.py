@@ -461,7 +461,7 @@ def recorded_times(state: AppState, settings: RecordSettings) -> tuple[Floats, l
 def _preview_size(size: tuple[int, int]) -> tuple[int, int]:
     """Return the size of the preview of an image, pixels.
 
-    >>> preview_size((1920, 1080)), preview_size((1000, 2000)), preview_size((16, 4000))
+    >>> _preview_size((1920, 1080)), _preview_size((1000, 2000)), _preview_size((16, 4000))
     ((320, 180), (100, 200), (1, 200))
     """
     factor = min(_WIDEST / size[0], _HIGHEST / size[1], 1.0)

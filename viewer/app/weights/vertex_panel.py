@@ -117,7 +117,7 @@ def _fitting(room: float, font_size: float) -> tuple[float, int]:
     digits : int
         Number of decimals: four, or three if the smallest font is still too large.
 
-    >>> fitting(300.0, 15.0), fitting(240.0, 15.0)[1], fitting(50.0, 15.0)
+    >>> _fitting(300.0, 15.0), _fitting(240.0, 15.0)[1], _fitting(50.0, 15.0)
     ((1.0, 4), 4, (0.75, 3))
     """
     scale = 0.0
