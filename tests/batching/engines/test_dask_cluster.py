@@ -32,7 +32,6 @@ from viewer.version import VERSION
 
 pytest.importorskip("distributed")
 from viewer.batching.engines import dask_cluster
-from viewer.batching.engines import dask_cluster as _worker_checks
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
@@ -197,7 +196,6 @@ def test_workers_without_the_package_or_with_another_version_are_refused(
         Missing()
     )
     monkeypatch.setattr(dask_cluster, "VERSION", "99.1")
-    monkeypatch.setattr(_worker_checks, "VERSION", "99.1")
     assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
 
 
@@ -222,7 +220,7 @@ def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeyp
     assert {one.status for one in finished(read_nothing, some, limits).values()} == {"failed"}
     finished(write_elsewhere, some[:1], limits)
     assert len(notes) == 1 and f"wrote {some[0].output}, which does not exist" in notes[0]
-    checks = _worker_checks.WorkerChecks(notes.append)
+    checks = dask_cluster.WorkerChecks(notes.append)
     outputs = [str(tmp_path / name) for name in ("a", "b", "absent/a", "absent/b", "gone/a")]
     Path(outputs[0]).touch()
     for path in outputs:
@@ -251,8 +249,6 @@ def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
 
 
 def test_address_without_a_scheduler_is_reported(monkeypatch) -> None:
-    from viewer.batching.engines import dask_cluster as _clusters
-
-    monkeypatch.setattr(_clusters, "_CONNECT", 0.3)
+    monkeypatch.setattr(dask_cluster, "_CONNECT", 0.3)
     with pytest.raises(ViewerError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1 "):
         next(dask_cluster.run(items(1), Job(), Limits(cluster="tcp://127.0.0.1:1")))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from viewer.cli import run
-from viewer.commands import convert as streamed_bvh
+from viewer.commands import convert as convert_command
 from viewer.commands._progress import Progress
 from viewer.formats import Source
 from viewer.formats.bvh import streaming
@@ -27,7 +27,7 @@ def converted(tmp_path, monkeypatch, capsys):
     def convert(data, options=(), streams=True):
         source, target = tmp_path / "a.bvh", tmp_path / "b.bvh"
         source.write_bytes(data if isinstance(data, bytes) else data.encode())
-        monkeypatch.setattr(streamed_bvh, "_LARGE", 0 if streams else 1 << 40)
+        monkeypatch.setattr(convert_command, "_LARGE", 0 if streams else 1 << 40)
         code = run(["convert", str(source), "-o", str(target), "--force", *options])
         written = target.read_bytes() if target.exists() else None
         target.unlink(missing_ok=True)
@@ -41,7 +41,7 @@ def converted(tmp_path, monkeypatch, capsys):
 def streamed(converted, monkeypatch):
     """Return a function that also requires that the file was read part by part."""
     taken = []
-    known = streamed_bvh.convert_streamed
+    known = convert_command.convert_streamed
 
     def convert(*arguments):
         found = known(*arguments)
@@ -159,7 +159,7 @@ def test_roots_that_begin_to_move_late_get_position_channels(streamed):
 
 
 def test_person_field_in_the_output_name_is_replaced(tmp_path, monkeypatch):
-    monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
+    monkeypatch.setattr(convert_command, "_LARGE", 0)
     source = tmp_path / "a.bvh"
     source.write_text(motion(frames=5))
     assert run(["convert", str(source), "-o", str(tmp_path / "walk_{person}.bvh")]) == 0
@@ -233,7 +233,7 @@ def test_standard_output_receives_the_same_file(tmp_path, monkeypatch, capfdbina
     path.write_text(motion(frames=5))
     outputs = []
     for large in (0, 1 << 40):
-        monkeypatch.setattr(streamed_bvh, "_LARGE", large)
+        monkeypatch.setattr(convert_command, "_LARGE", large)
         link = tmp_path / f"{large}.bvh"
         link.symlink_to("/dev/stdout")
         assert run(["convert", str(path), "-o", str(link)]) == 0
@@ -243,7 +243,7 @@ def test_standard_output_receives_the_same_file(tmp_path, monkeypatch, capfdbina
 
 
 def test_memory_does_not_depend_on_the_number_of_frames(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
+    monkeypatch.setattr(convert_command, "_LARGE", 0)
     monkeypatch.setattr(streaming, "_PART", 20_000)
     peaks = []
     for frames in (100, 500, 5000):
@@ -260,7 +260,7 @@ def test_memory_does_not_depend_on_the_number_of_frames(tmp_path, monkeypatch, c
 
 def test_progress_is_reported_in_frames_only(tmp_path, monkeypatch):
     """Reports in two units would make the progress bar in the terminal flicker."""
-    monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
+    monkeypatch.setattr(convert_command, "_LARGE", 0)
     monkeypatch.setattr(streaming, "_PART", 2000)
     (tmp_path / "a.bvh").write_text(motion(frames=100))
     found = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from viewer.commands import doctor
-from viewer.commands import doctor as _benchmarks
 from viewer.commands.doctor import Measured, measured
 from viewer.errors import RenderError
 
@@ -14,9 +13,9 @@ pytestmark = pytest.mark.slow
 
 def test_all_measurements_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
     commands: list[list[str]] = []
-    monkeypatch.setattr(_benchmarks, "_process", lambda words, _: lambda: commands.append([*words]))
+    monkeypatch.setattr(doctor, "_process", lambda words, _: lambda: commands.append([*words]))
     for name, value in (("_SIZE", (32, 24)), ("_FRAMES", 1), ("_STARTS", 2), ("_INSTANCES", 2)):
-        monkeypatch.setattr(_benchmarks, name, value)
+        monkeypatch.setattr(doctor, name, value)
     found = [*measured()]
     assert all(one.milliseconds > 0.0 for one in found)
     assert [one.subject.partition(":")[0] for one in found].count("start to end") == 6
@@ -33,13 +32,13 @@ def test_relative_times_state_their_reference() -> None:
 
 
 def test_failure_of_a_program_is_reported_in_one_line() -> None:
-    run = _benchmarks._process(["-c", "import sys; print('x'); sys.exit('no\\nOpenGL')"], {})
+    run = doctor._process(["-c", "import sys; print('x'); sys.exit('no\\nOpenGL')"], {})
     with pytest.raises(RenderError, match=r"^OpenGL$"):
         run()
 
 
 def test_programs_receive_the_environment() -> None:
-    _benchmarks._process(["-c", "import os; assert os.environ['A'] == 'b'"], {"A": "b"})()
+    doctor._process(["-c", "import os; assert os.environ['A'] == 'b'"], {"A": "b"})()
 
 
 def test_doctor_measures_only_on_request(
@@ -48,7 +47,7 @@ def test_doctor_measures_only_on_request(
     from viewer.cli import run
 
     monkeypatch.setattr(doctor, "examine", lambda: iter(()))
-    monkeypatch.setattr(_benchmarks, "measured", lambda: iter([Measured("a", 2.0)]))
+    monkeypatch.setattr(doctor, "measured", lambda: iter([Measured("a", 2.0)]))
     assert run(["doctor"]) == 0
     assert capsys.readouterr().out == ""
     assert run(["doctor", "--bench"]) == 0
