@@ -470,11 +470,12 @@ def _numbers_of(source: Source, persons: Sequence[_Person]) -> dict[_Person, int
     """Return the number of each person; names, and people without IDs, get unused numbers."""
     found = dict.fromkeys(persons)
     numbers: dict[_Person, int] = {one: one for one in found if isinstance(one, int)}
+    used = set(numbers.values())
     for one in found:
         if not isinstance(one, int):
             start = one[0] + one[1] if isinstance(one, tuple) else 0
-            used = set(numbers.values())
             numbers[one] = next(each for each in itertools.count(start) if each not in used)
+            used.add(numbers[one])
     names = [
         f"{number}: {printable(one, 40)}" for one, number in numbers.items() if isinstance(one, str)
     ]

@@ -63,8 +63,9 @@ def moving_alone(scene: Scene) -> list[str]:
         actor = carrier_of(view, scene.actors)
         clip = None if actor is None else actor.clip
         path = None if view.mount is None else view.mount.path
-        if path is not None and isinstance(clip, TransformClip) and not clip.channels:
-            found += [view.name] if played_with(path, clip) is not None else []
+        is_still = isinstance(clip, TransformClip) and not clip.channels
+        if path is not None and is_still and played_with(path, clip) is not None:
+            found.append(view.name)
     return found
 
 
