@@ -19,8 +19,6 @@ from viewer.interrupts import Interrupted, deferred, watched
 from viewer.phrases import printable
 from viewer.streams import standard_streams
 
-__all__ = ["protect_numbers", "run"]
-
 _EPILOG = """\
 Without a command, FILES open in a window; without files, the bundled figure does.
 "viewer COMMAND --help" lists a command's options, and "viewer help" lists the manual's pages.
@@ -40,15 +38,8 @@ def run(arguments: Sequence[str]) -> int:
     Signals end the command as they would end the program; afterwards, the caller's handlers are
     restored.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Arguments without the program's name.
-
-    Returns
-    -------
-    int
-        Exit code: 0, the code of the ``ViewerError``, or 128 plus the signal number.
+    ``arguments``: arguments without the program's name. Returns exit code: 0, the code of the
+    ``ViewerError``, or 128 plus the signal number.
     """
     try:
         with watched():

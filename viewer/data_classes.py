@@ -39,17 +39,7 @@ else:
     ) -> Any:
         """Turn a class into a dataclass, as ``dataclasses.dataclass`` does.
 
-        Parameters
-        ----------
-        cls : type, optional
-            The class, if the decorator has no arguments. ``InitVar`` is not supported.
-        frozen, eq, slots, weakref_slot, kw_only : bool
-            As for the standard decorator.
-
-        Returns
-        -------
-        type or callable
-            The class, or a decorator.
+        ``cls``: the class, if the decorator has no arguments. ``InitVar`` is not supported.
         """
         options = {"slots": slots, "weakref_slot": weakref_slot, "kw_only": kw_only}
 

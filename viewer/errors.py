@@ -33,15 +33,15 @@ _LONGEST = 1000  # maximum length of a message that contains names, characters
 class ViewerError(Exception):
     """An error the user can act on; ``str()`` is its message in one line.
 
-    Parameters
-    ----------
-    problem : str or Diagnostic
-        The message, or a diagnostic that provides it.
-
     Attributes
     ----------
     diagnostic : Diagnostic or None
         The problem as data, if it concerns a file or a figure.
+
+    Parameters
+    ----------
+    problem : str or Diagnostic
+        The message, or a diagnostic that provides it.
     """
 
     exit_code = 2
@@ -64,10 +64,7 @@ class ViewerError(Exception):
 class FormatError(ViewerError):
     """A file is invalid.
 
-    Parameters
-    ----------
-    diagnostic : Diagnostic
-        Diagnostic with the file, and the line if the format has lines.
+    ``diagnostic``: diagnostic with the file, and the line if the format has lines.
     """
 
     diagnostic: Diagnostic

@@ -39,17 +39,6 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import Any
 
-__all__ = [
-    "Interrupted",
-    "Postponed",
-    "deferred",
-    "hold",
-    "poll",
-    "postponed",
-    "raising",
-    "watch_program",
-    "watched",
-]
 
 _MESSAGES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 _SIGNALS = {
@@ -60,13 +49,7 @@ _PAUSE = 0.02  # seconds before raising is attempted again
 
 
 class Interrupted(BaseException):
-    """A signal that ends the run; not an ``Exception``, so that no handler treats it as an error.
-
-    Parameters
-    ----------
-    number : int
-        The signal.
-    """
+    """A signal that ends the run; not an ``Exception``, so that no handler catches it."""
 
     def __init__(self, number: int) -> None:
         super().__init__(_SIGNALS[number])
@@ -177,10 +160,8 @@ def watched() -> Iterator[None]:
     The previous handlers are restored afterwards. Outside the main thread, this does nothing,
     because Python handles signals only in the main thread.
 
-    Raises
-    ------
-    Interrupted
-        In the block, or at its beginning if ``watch_program`` has recorded a signal.
+    Raises ``Interrupted``: in the block, or at its beginning if ``watch_program`` has recorded a
+    signal.
     """
     global _current
     outer = _mine()
@@ -199,13 +180,7 @@ def watched() -> Iterator[None]:
 
 
 def watch_program(received: Sequence[int] = ()) -> None:
-    """Record signals until the process ends; they raise where they are ``watched``.
-
-    Parameters
-    ----------
-    received : sequence of int
-        Signals recorded before; others may be appended until the handlers are installed.
-    """
+    """Record signals until the process ends; they raise where they are ``watched``."""
     global _current
     watch = _current = _Watch(is_held=True, owns_process=True)
     # Registered first, so it runs last: Python resets handlers soon after, which would let a signal
@@ -323,16 +298,7 @@ def hold() -> None:
 def poll(in_any_thread: bool = False) -> None:
     """Raise a deferred signal, at a point between complete units of work.
 
-    Parameters
-    ----------
-    in_any_thread : bool
-        Whether to raise outside the main thread too, for the last step of work for which the main
-        thread waits.
-
-    Raises
-    ------
-    Interrupted
-        If there was a signal.
+    Raises ``Interrupted`` if there was a signal.
     """
     watch = _current if in_any_thread else _mine()
     if watch is not None:

@@ -18,15 +18,8 @@ _LONGEST = 80  # maximum length of a name in characters
 def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]:
     """Return the names that resemble the given text, the most likely first.
 
-    Parameters
-    ----------
-    text : str
-        Text that was typed, compared case-insensitively.
-    names : iterable of str
-        Existing names. Empty names are skipped, repeated names count once.
-    alike : float
-        Smallest similarity ratio, as measured by difflib: 1 for equal names. Names that contain
-        the text count as having exactly this ratio, unless the text is a single letter.
+    ``alike``: smallest similarity ratio, as measured by difflib: 1 for equal names. Names that
+    contain the text count as having exactly this ratio, unless the text is a single letter.
 
     >>> near_names("left_kne", ["right_knee", "left_knee", "head"])
     ['left_knee']
@@ -72,10 +65,7 @@ def question(names: Sequence[str]) -> str:
 def name_hint(text: str, names: Iterable[str]) -> str:
     """Return the clause that follows ``no joint is called "x";`` in a message.
 
-    Returns
-    -------
-    str
-        The nearest names; if none is near, all of a short list or the beginning of a long list.
+    Returns the nearest names; if none is near, all of a short list or the beginning of a long list.
 
     >>> name_hint("tail", ["hip", "knee"])
     'there are 2: hip, knee'

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["counted", "file_size", "listed", "one_of", "printable", "quoted", "rounded"]
-
 _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 _BYTES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 
@@ -60,16 +58,8 @@ def file_size(count: int) -> str:
 def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> str:
     """Return a count with its noun and, if given, the verb that agrees with it.
 
-    Parameters
-    ----------
-    count : int
-        Number of items.
-    noun : str
-        Singular noun, whose last word is changed to the plural: ``"negative weight"``.
-    one, many : str
-        Verb for one and for several: ``"is"``, ``"are"``; no verb if omitted.
-    of : int, optional
-        The total.
+    ``noun``: singular noun, whose last word is changed to the plural: ``"negative weight"``.
+    ``one``, ``many``: verb for one and for several: ``"is"``, ``"are"``; no verb if omitted.
 
     >>> counted(1, "vertex", "has", "have"), counted(3, "vertex", "has", "have")
     ('1 vertex has', '3 vertices have')

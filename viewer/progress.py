@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-__all__ = ["Cancelled", "Receiver", "receiver", "receiving", "report", "report_bytes", "silent"]
-
 Receiver = Callable[[int, int, str, str], None]
 """Called with the completed steps, their total (0 if unknown), their unit, and a description of the
 work, empty if it is the same as before. It may raise ``Cancelled``."""

@@ -6,25 +6,14 @@ from pathlib import Path
 
 from viewer.errors import ViewerError
 
-__all__ = ["resource"]
-
 _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource(kind: str, *parts: str) -> Path:
     """Return the path of a file or folder that ships with the viewer.
 
-    Parameters
-    ----------
-    kind : str
-        ``"shaders"``, ``"assets"`` or ``"manual"``.
-    *parts : str
-        Path inside that folder.
-
-    Raises
-    ------
-    ViewerError
-        If it is missing from the installation.
+    ``kind``: ``"shaders"``, ``"assets"`` or ``"manual"``. Raises ``ViewerError`` if it is missing
+    from the installation.
     """
     # The folders are inside the package in a wheel, and next to it in a checkout.
     for base in (_PACKAGE, _PACKAGE.parent):

@@ -13,8 +13,6 @@ from typing import TextIO, cast
 from viewer.errors import OutputError
 from viewer.phrases import printable
 
-__all__ = ["is_stdout", "require_stdout", "standard_streams", "summary_stream", "write_stdout"]
-
 _STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 _MOST_LINKS = 40  # the limit of the Linux kernel
 
@@ -39,10 +37,7 @@ def is_stdout(path: str | Path) -> bool:
 def require_stdout(path: str | Path) -> None:
     """Check a path that names standard output.
 
-    Raises
-    ------
-    OutputError
-        If standard output is closed; the message gives the name.
+    Raises ``OutputError`` if standard output is closed; the message gives the name.
     """
     if is_stdout(path) and getattr(sys.stdout, "buffer", None) is None:
         raise OutputError(f"{printable(path, 300)}: standard output is closed")
@@ -51,19 +46,8 @@ def require_stdout(path: str | Path) -> None:
 def write_stdout(path: str | Path, data: bytes) -> None:
     """Write bytes to standard output.
 
-    Parameters
-    ----------
-    path : str or Path
-        Name of the stream in messages.
-    data : bytes
-        Bytes to write.
-
-    Raises
-    ------
-    OutputError
-        If the stream is closed or not writable, or its disk is full.
-    BrokenPipeError
-        If the reader has closed the stream.
+    Raises ``OutputError`` if the stream is closed or not writable, or its disk is full. Raises
+    ``BrokenPipeError`` if the reader has closed the stream.
     """
     require_stdout(path)
     try:

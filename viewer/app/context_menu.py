@@ -45,16 +45,7 @@ def answer_right_click(
 ) -> None:
     """Find the item that a right click hit, and request its menu.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the position of the click.
-    renderer : Renderer
-        Renderer that drew the scene.
-    size : (int, int)
-        Width and height of the view, pixels.
-    scale : float
-        Pixels per window coordinate.
+    ``size``: width and height of the view, pixels.
     """
     picking, menu = state.of(Picking), state.of(ContextMenu)
     place, picking.menu_at = picking.menu_at, None

@@ -46,10 +46,7 @@ def import_glfw() -> Any:
 def window_error(message: str) -> RenderError:
     """Return an error with the OpenGL version of a display on which no window can be created.
 
-    Parameters
-    ----------
-    message : str
-        GLFW's message, used if the display has no OpenGL at all.
+    ``message``: GLFW's message, used if the display has no OpenGL at all.
     """
     glfw = import_glfw()
     glfw.default_window_hints()
@@ -69,10 +66,7 @@ def window_error(message: str) -> RenderError:
 def find_display() -> None:
     """Check that a window can be opened.
 
-    Raises
-    ------
-    NoDisplay
-        If no window can be opened; the message gives the reason in one line.
+    Raises ``NoDisplay`` if no window can be opened; the message gives the reason in one line.
     """
     if sys.platform.startswith("linux"):
         names = ("DISPLAY", "WAYLAND_DISPLAY")

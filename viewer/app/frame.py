@@ -69,16 +69,7 @@ _LAID_OUT = 2  # first frame in which the panels leave room for the view, counte
 class Frame:
     """Runs and draws frames of one state in one context; the caller begins ImGui's frame.
 
-    Parameters
-    ----------
-    state : AppState
-        State that is shown and changed.
-    programs : Programs
-        Programs of the context that is current in this thread.
-    wake : callable
-        Called from other threads when a frame must be drawn.
-    keeps_recent : bool
-        Whether opened files are stored in the list of recent files.
+    ``wake``: called from other threads when a frame must be drawn.
     """
 
     def __init__(
@@ -104,14 +95,7 @@ class Frame:
     def draw(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], scale: float) -> None:
         """Run one frame between ``imgui.new_frame`` and the swap of buffers, and paint it.
 
-        Parameters
-        ----------
-        framebuffer : moderngl.Framebuffer
-            Framebuffer of the window or of the headless context.
-        size : (int, int)
-            Width and height of the framebuffer, pixels.
-        scale : float
-            Pixels per window coordinate.
+        ``size``: width and height of the framebuffer, pixels.
         """
         started = time.perf_counter()
         self.run(scale)
@@ -392,15 +376,7 @@ class Frame:
 
 
 def _save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
-    """Save an image of the scene under an unused name in the current folder.
-
-    Parameters
-    ----------
-    state : AppState
-        State that receives a message.
-    picture : callable
-        Returns the image, (H, W, 4) uint8; may raise ViewerError.
-    """
+    """Save an image of the scene under an unused name in the current folder."""
     try:
         path = free_path(Path.cwd(), state.scene.title, ".png")
         save_image(path, picture())
@@ -414,13 +390,7 @@ def _save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
 
 
 def _advance_job(state: AppState) -> bool:
-    """Perform the next step of the running job, and report how it ended.
-
-    Returns
-    -------
-    bool
-        Whether it failed in this frame.
-    """
+    """Perform the next step of the running job, and report how it ended."""
     job = state.job
     if job is None:
         return False

@@ -24,18 +24,8 @@ _SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to settle
 class HeadlessApp:
     """Runs frames of the interface in an EGL context.
 
-    Parameters
-    ----------
-    state : AppState
-        State that is shown and changed.
-    size : (int, int)
-        Size of the virtual window, in window coordinates.
-    scale : float
-        Scale of the interface.
-    pixels_per_point : float
-        Framebuffer pixels per window coordinate, as on a HiDPI screen.
-    graphics : Graphics, optional
-        An existing context to draw in, which ``release`` does not free.
+    ``pixels_per_point``: framebuffer pixels per window coordinate, as on a HiDPI screen.
+    ``graphics``: an existing context to draw in, which ``release`` does not free.
     """
 
     def __init__(

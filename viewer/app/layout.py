@@ -38,22 +38,15 @@ class ShownPanels:
 
 
 class _Sizes(NamedTuple):
-    """Sizes of the default arrangement in window coordinates.
-
-    Attributes
-    ----------
-    left, right : float
-        Widths of the sides; a narrow window has all panels on the right, and ``left`` is 0.
-    bottom : float
-        Height of the bottom panels.
-    rows : int
-        Number of rows of panels on the right.
-    """
+    """Sizes of the default arrangement in window coordinates."""
 
     left: float
     right: float
+    """Widths of the sides; a narrow window has all panels on the right, and ``left`` is 0."""
     bottom: float
+    """Height of the bottom panels."""
     rows: int
+    """Number of rows of panels on the right."""
 
 
 @dataclass(slots=True)
@@ -105,16 +98,7 @@ def reset_layout(state: AppState) -> None:
 def _default_sizes(window: tuple[float, float], letter: float, lines: float, plots: bool) -> _Sizes:
     """Return the sizes of panels for a window; the view keeps at least half of its width.
 
-    Parameters
-    ----------
-    window : (float, float)
-        Width and height in window coordinates.
-    letter : float
-        Font size in the same unit.
-    lines : float
-        Height of the Timeline's content in font sizes.
-    plots : bool
-        Whether the Curves or Joint match panel is in front of the Timeline.
+    ``letter``: font size in the same unit.
 
     >>> _default_sizes((1280, 800), 15.0, 8.0, False)
     _Sizes(left=281.6, right=320.0, bottom=120.0, rows=2)

@@ -24,19 +24,8 @@ Found = TypeVar("Found")
 class Opening(Generic[Found]):
     """Thread that opens files, reports its progress, and can be cancelled.
 
-    Parameters
-    ----------
-    title : str
-        Description of the files.
-    act : callable
-        Opens the files and returns the result; errors are raised by ``result``.
-
-    Attributes
-    ----------
-    title : str
-        Description of the files.
-    progress : (int, int, str)
-        Completed steps, their total (0 if unknown) and their unit.
+    ``progress``: completed steps, their total (0 if unknown) and their unit. ``act``: opens the
+    files and returns the result; errors are raised by ``result``.
     """
 
     def __init__(self, title: str, act: Callable[[], Found]) -> None:
@@ -88,24 +77,9 @@ class Opening(Generic[Found]):
 def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
     """Wait for the files; if it takes more than a moment, open a window with the progress.
 
-    Parameters
-    ----------
-    opening : Opening
-        The files that are being opened.
-    scale : float, optional
-        Scale of the interface; the scale of the screen if omitted.
-
-    Returns
-    -------
-    Shell or None
-        The window, if one was opened.
-
-    Raises
-    ------
-    Cancelled
-        If the user closed the window or pressed Cancel.
-    RenderError
-        If there is no usable OpenGL.
+    ``scale``: scale of the interface; the scale of the screen if omitted. Returns the window, if
+    one was opened. Raises ``Cancelled`` if the user closed the window or pressed Cancel. Raises
+    ``RenderError`` if there is no usable OpenGL.
     """
     if opening.wait(_PATIENCE):
         return None

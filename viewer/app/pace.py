@@ -50,14 +50,7 @@ class Pace:
     def step(self, key: object, options: DisplayOptions, now: float) -> Step | None:
         """Return the drawing step of this frame; None if the image is finished.
 
-        Parameters
-        ----------
-        key : object
-            Everything on which the image depends.
-        options : DisplayOptions
-            Display options with the requested quality.
-        now : float
-            Current time of any clock, seconds.
+        ``now``: current time of any clock, seconds.
         """
         is_changed = key != self._key
         faded = self._fade(is_changed, options, now)
@@ -124,14 +117,7 @@ class PictureKeys:
     ) -> tuple[object, ...]:
         """Return everything on which the image of the scene depends.
 
-        Parameters
-        ----------
-        state : AppState
-            State that is shown.
-        size : (int, int)
-            Width and height in pixels.
-        marks, ghost, annotations : Marks or None, Ghost or None, sequence of Annotation
-            Items drawn over the scene in this frame; compared by identity.
+        ``size``: width and height in pixels.
         """
         camera, options = state.camera, state.options
         if options != self._options:

@@ -297,12 +297,7 @@ def score(query: str, name: str) -> float:
     Every word of the query must match: best at the start of a word in the name, next best inside a
     word, otherwise as a sequence of letters. For ties, the shorter name comes first.
 
-    Parameters
-    ----------
-    query : str
-        Words in any order and case; empty matches everything.
-    name : str
-        Name to compare with.
+    ``query``: words in any order and case; empty matches everything.
 
     >>> score("wire", "Wireframe") > score("frame", "Wireframe") > score("wfm", "Wireframe") > 0
     True

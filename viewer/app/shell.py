@@ -50,32 +50,8 @@ _SEPARATOR = imgui.Key.gamepad_back
 class Shell:
     """Window that shows the progress of opening files, and then the files.
 
-    Parameters
-    ----------
-    title : str
-        Title of the window.
-    scale : float or None
-        Scale of the interface; the preferred scale or the screen's if omitted.
-
-    Attributes
-    ----------
-    handle, context, imgui, implot : any
-        The window and its OpenGL, ImGui and ImPlot contexts.
-    preferences, appearance : Preferences, Appearance
-        The stored preferences, and the settings applied to this window.
-    dropped : list of Path
-        Files that were dropped onto the window since the list was last cleared.
-    is_dirty : bool
-        Whether the window's contents were damaged or resized.
-    problems : list of str
-        Messages about problems that do not prevent the window from opening.
-    has_layout : bool
-        Whether a stored layout of the panels was restored.
-
-    Raises
-    ------
-    RenderError
-        If there is no usable OpenGL.
+    ``scale``: scale of the interface; the preferred scale or the screen's if omitted. Raises
+    ``RenderError`` if there is no usable OpenGL.
     """
 
     def __init__(self, title: str, scale: float | None = None) -> None:
@@ -194,15 +170,7 @@ class TypedKeys:
         self._left_out: set[int] = set()
 
     def passes(self, key: int, action: int, modifiers: int, is_typing: bool) -> bool:
-        """Return whether a key event is passed to ImGui.
-
-        Parameters
-        ----------
-        key, action, modifiers : int
-            Arguments of GLFW's key callback.
-        is_typing : bool
-            Whether a text field is active.
-        """
+        """Return whether a key event is passed to ImGui."""
         if action == _RELEASE:
             # A key that was pressed before the field became active must be released.
             is_known = key not in self._left_out
@@ -255,15 +223,7 @@ def create_context() -> moderngl.Context:
 
 
 def end_frame_before(queue: Any, key: int, action: int) -> None:
-    """Put the events before a modifier's release into a separate frame.
-
-    Parameters
-    ----------
-    queue : sequence
-        ImGui's queue of input events, to which the release has not been added yet.
-    key, action : int
-        Arguments of GLFW's key callback.
-    """
+    """Put the events before a modifier's release into a separate frame."""
     if action == _RELEASE and key in _MODIFIERS:
         end_frame(queue)
 
@@ -274,11 +234,6 @@ def end_frame(queue: Any) -> None:
     Mouse buttons require this: tabs and other widgets that may overlap react to a press only if
     they were hovered in an earlier frame, and the last motion of a drag counts only before its
     release.
-
-    Parameters
-    ----------
-    queue : sequence
-        ImGui's queue of input events.
     """
     if len(queue):
         for is_down in (True, False):

@@ -259,12 +259,7 @@ class Rest:
         An expected change may happen in the last frame after the panels were drawn, so its
         completion counts as an event. A tooltip's window also needs some frames to get its size.
 
-        Parameters
-        ----------
-        happened : bool
-            Whether there was an event, or something is moving.
-        awaits : bool
-            Whether a change is expected without an event.
+        ``awaits``: whether a change is expected without an event.
         """
         is_over = self._awaited and not awaits
         self._awaited = awaits

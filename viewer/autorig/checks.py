@@ -29,21 +29,10 @@ def newly_outside(
 ) -> tuple[int, ...]:
     """Return the joints that lie inside the template but outside the target.
 
-    Parameters
-    ----------
-    template : Figure
-        Figure with its shape applied.
-    pose : Pose
-        Pose of the template.
-    posed : (V, 3)
-        Posed vertices of the template.
-    target : Mesh
-        The mesh that was rigged.
-    joints : (J, 3) or None
-        Joint positions in the target's frame; None if they are the template's.
-    transferred : (J,) bool or None
-        Joints that are expected to be inside, unlike joints of a part that the target lacks; None
-        for all.
+    ``posed``: (V, 3), posed vertices of the template. ``joints``: (J, 3) or None, joint positions
+    in the target's frame; None if they are the template's. ``transferred``: (J,) bool or None,
+    joints that are expected to be inside, unlike joints of a part that the target lacks; None for
+    all.
     """
     own = joint_matrices(template, pose)[:, :3, 3]
     before = outside(posed, template.require_mesh().triangles, own)
@@ -56,16 +45,7 @@ def newly_outside(
 def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> float:
     """Return the largest distance of a reposed figure from the target, over the target's size.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with as many vertices as the target.
-    pose : Pose
-        The pose in which the target was found.
-    placement : (4, 4)
-        Figure space to the target's frame.
-    target : Mesh
-        The original mesh.
+    ``placement``: (4, 4), figure space to the target's frame.
     """
     again = apply_transform(placement, deform(figure, pose)[0])
     size = box_size(bounding_box(target.positions))
@@ -77,16 +57,8 @@ def check_lines(
 ) -> list[Diagnostic]:
     """Return messages about the results of the checks.
 
-    Parameters
-    ----------
-    figure : Figure
-        Provides joint names.
-    guarded : (V,) bool
-        Result of ``invert_skinning``.
-    out : tuple of int
-        Result of ``newly_outside``.
-    residual : float
-        Result of ``residual_of``.
+    ``guarded``: (V,) bool, result of ``invert_skinning``. ``out``: result of ``newly_outside``.
+    ``residual``: result of ``residual_of``.
     """
     lines = []
     if out:

@@ -43,27 +43,20 @@ _MOST_REVERSED = 0.5  # fraction of the target's area above which an island is r
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
-    """Criteria by which a vertex is matched with the template.
-
-    Attributes
-    ----------
-    max_distance : float
-        Fraction of the target's box diagonal.
-    max_angle : float
-        Radians between the normals of both surfaces.
-    near_distance, near_angle : float
-        Within this fraction of the diagonal, this angle suffices: normals of sharp and thin parts
-        of a coarse mesh are unreliable. Sheets thinner than this are matched on the side whose
-        normal agrees.
-    flipped_normals : bool
-        Also accept opposite normals. An island that is entirely inside out is reversed in any case.
-    """
+    """Criteria by which a vertex is matched with the template."""
 
     max_distance: float = 0.05
+    """Fraction of the target's box diagonal."""
     max_angle: float = math.radians(30.0)
+    """Radians between the normals of both surfaces."""
     near_distance: float = 0.005
     near_angle: float = math.radians(60.0)
+    """Within this fraction of the diagonal, this angle suffices: normals of sharp and thin parts of
+    a coarse mesh are unreliable. Sheets thinner than this are matched on the side whose normal
+    agrees."""
     flipped_normals: bool = False
+    """Also accept opposite normals. An island that is entirely inside out is reversed in any case.
+    Also accept opposite normals. An island that is entirely inside out is reversed in any case."""
 
     def __post_init__(self) -> None:
         for name in ("max_distance", "max_angle", "near_distance", "near_angle"):
@@ -74,41 +67,24 @@ class MatchSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matches:
-    """Matches of a target's vertices on the template.
-
-    Attributes
-    ----------
-    points : SurfacePoints
-        W points of the template: for each matched vertex, the closest point with an agreeing
-        normal; for other vertices, the closest point.
-    matched : (W,) bool
-        Whether each vertex lies on the template.
-    angles : (W,)
-        Angles between the normals, radians; 0 if the target has no normal.
-    inside_out : (I,) int32
-        Islands of the target that were reversed.
-    """
+    """Matches of a target's vertices on the template."""
 
     points: SurfacePoints
+    """W points of the template: for each matched vertex, the closest point with an agreeing normal;
+    for other vertices, the closest point."""
     matched: Bools
+    """(W,) bool. Whether each vertex lies on the template."""
     angles: Floats
+    """(W,). Angles between the normals, radians; 0 if the target has no normal."""
     inside_out: Ints
+    """(I,) int32. Islands of the target that were reversed."""
 
 
 class Template:
     """The template's surface, to which targets are matched, aligned with the target.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Positions in the target's space.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Raises
-    ------
-    RigError
-        If there is no triangle, or SciPy is missing.
+    ``positions``: (V, 3), positions in the target's space. ``triangles``: (T, 3), vertex indices.
+    Raises ``RigError`` if there is no triangle, or SciPy is missing.
     """
 
     def __init__(self, positions: Floats, triangles: Ints) -> None:
@@ -126,15 +102,7 @@ class Template:
 def sheet_normals(mesh: Welded) -> Floats:
     """Return the unit normal of each vertex, 0 if there is none.
 
-    Parameters
-    ----------
-    mesh : Welded
-        W vertices.
-
-    Returns
-    -------
-    (W, 3)
-        0 for vertices without triangles, and if the two sides of a sheet cancel out.
+    Returns (W, 3), 0 for vertices without triangles, and if the two sides of a sheet cancel out.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
     vectors = np.cross(b - a, c - a)
@@ -151,21 +119,8 @@ def sheet_normals(mesh: Welded) -> Floats:
 def match(template: Template, target: Welded, size: float, settings: MatchSettings) -> Matches:
     """Match the vertices of a target that lie on the template.
 
-    Parameters
-    ----------
-    template : Template
-        Positions in the target's space.
-    target : Welded
-        W vertices.
-    size : float
-        The target's box diagonal, the reference of relative distances.
-    settings : MatchSettings
-        Limits of distance and angle.
-
-    Returns
-    -------
-    Matches
-        Vertices without a normal are judged by distance alone.
+    ``template``: positions in the target's space. Returns vertices without a normal are judged by
+    distance alone.
     """
     points = _closest(template, target)
     normals = sheet_normals(target)
@@ -273,17 +228,9 @@ _FEW = 10_000  # number of points below which starting threads costs more time t
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
     """Return the template's vertex that corresponds to each vertex of the target, -1 for none.
 
-    Parameters
-    ----------
-    template, target : Welded
-        Meshes in the same space, with U and W vertices.
-    distances : (W,)
-        Distances of the target's vertices from the template's surface.
-
-    Returns
-    -------
-    (W,) int64
-        Indices; no vertex of the template occurs twice.
+    ``template``, ``target``: meshes in the same space, with U and W vertices. ``distances``: (W,),
+    distances of the target's vertices from the template's surface. Returns (W,) int64, indices; no
+    vertex of the template occurs twice.
     """
     there, far = _nearest(template.positions, target.positions)
     back, _ = _nearest(target.positions, template.positions)
@@ -306,18 +253,9 @@ def at_vertices(
 ) -> SurfacePoints:
     """Return points of a surface, some of them snapped to vertices.
 
-    Parameters
-    ----------
-    points : SurfacePoints
-        W closest points.
-    positions : (W, 3)
-        The query points.
-    corners : (T, 3)
-        The surface's triangles, as indices of its U vertices.
-    places : (U, 3)
-        Positions of the U vertices.
-    same : (W,)
-        The vertex to which a point is snapped, or -1.
+    ``positions``: (W, 3), the query points. ``corners``: (T, 3), the surface's triangles, as
+    indices of its U vertices. ``places``: (U, 3), positions of the U vertices. ``same``: (W,), the
+    vertex to which a point is snapped, or -1.
     """
     rows = np.flatnonzero(same >= 0)
     used, first = np.unique(corners, return_index=True)
@@ -350,18 +288,9 @@ def _keys(pairs: Ints, template: Welded) -> Ints:
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     """Return the vertices of parts whose triangles should be reversed.
 
-    Parameters
-    ----------
-    target : Welded
-        W welded vertices that represent V.
-    facing_away : (I,)
-        Islands that face away from the template's surface.
-
-    Returns
-    -------
-    (V,) bool
-        Vertices of islands with a negative volume, sum a . (b x c) / 6 about their middle, that
-        are closed except for small holes, or have more than half of the area.
+    ``facing_away``: (I,), islands that face away from the template's surface. Returns (V,) bool,
+    vertices of islands with a negative volume, sum a . (b x c) / 6 about their middle, that are
+    closed except for small holes, or have more than half of the area.
     """
     count = target.n_islands
     of = target.islands[target.triangles[:, 0]]
@@ -382,12 +311,7 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
 def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
     """Return a mesh with the triangles at some vertices reversed, and with matching normals.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        V vertices.
-    vertices : (V,) bool
-        Vertices of whole parts.
+    ``vertices``: (V,) bool, vertices of whole parts.
     """
     rows = np.logical_or.reduce(vertices[mesh.triangles], axis=1)
     if not rows.any():

@@ -54,31 +54,10 @@ def transfer(
 ) -> Rigged:
     """Rig a mesh with the rig of another figure.
 
-    Parameters
-    ----------
-    template : Figure
-        Figure with mesh, skeleton and skin.
-    pose : Pose
-        Pose and shape of the template, approximately those of the target.
-    target : Mesh
-        Mesh to rig, not modified; the new figure, posed by ``Rigged.pose``, reproduces it.
-    settings : TransferSettings, optional
-        Settings; the robust method with its default limits if omitted.
-    report : callable, optional
-        Called with progress; may raise to cancel.
-    name : str
-        Name of the new figure.
-
-    Returns
-    -------
-    Rigged
-        Figure, pose, and facts about the transfer.
-
-    Raises
-    ------
-    RigError
-        If the template lacks a part, the target has no surface, no part of it meets the
-        template, or SciPy is missing.
+    ``target``: mesh to rig, not modified; the new figure, posed by ``Rigged.pose``, reproduces it.
+    ``settings``: settings; the robust method with its default limits if omitted. Raises
+    ``RigError`` if the template lacks a part, the target has no surface, no part of it meets the
+    template, or SciPy is missing.
     """
     how = settings or TransferSettings()
     tell = report or _silent
@@ -106,20 +85,7 @@ def robust(
 ) -> Rigged:
     """Transfer a rig; see ``transfer``, which checks the arguments.
 
-    Parameters
-    ----------
-    template : Figure
-        Template with bindings, and with its shape applied.
-    pose : Pose
-        Pose without shape weights.
-    target : Mesh
-        Mesh with triangles.
-    how : TransferSettings
-        All settings except the method.
-    report : callable
-        Called with progress.
-    name : str
-        Name of the new figure.
+    ``pose``: pose without shape weights. ``how``: all settings except the method.
     """
     met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
     alignment, pose, posed = met.alignment, met.pose, met.positions

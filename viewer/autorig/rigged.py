@@ -25,45 +25,31 @@ or the rigid attachment of its island."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rigged:
-    """A target mesh that was rigged.
-
-    Attributes
-    ----------
-    figure : Figure
-        The target at rest, with its texture coordinates and materials.
-    pose : Pose
-        The pose that reproduces the target.
-    placement : (4, 4)
-        Maps the posed figure to the target's frame; the identity unless the method changed the
-        target.
-    alignment : Alignment or None
-        Placement of the template; None for a method that only aligns boxes.
-    weights : WeightTransfer
-        Matches, distances and rigidly attached parts.
-    guarded : (V,) bool
-        Vertices whose blended matrix was nearly singular.
-    residual : float
-        Largest distance between the posed figure and the target, over the target's size.
-    outside : tuple of int
-        Joints that lie outside the target but inside the template.
-    length_scale, figure_scale, path_scale : float
-        Factors by which ``clip_for`` scales lengths.
-    lines : tuple of Diagnostic
-        Messages for the user.
-    """
+    """A target mesh that was rigged."""
 
     figure: Figure
+    """The target at rest, with its texture coordinates and materials."""
     pose: Pose
+    """The pose that reproduces the target."""
     placement: Floats
+    """(4, 4). Maps the posed figure to the target's frame; the identity unless the method changed
+    the target."""
     alignment: Alignment | None
+    """Placement of the template; None for a method that only aligns boxes."""
     weights: WeightTransfer
+    """Matches, distances and rigidly attached parts."""
     guarded: Bools
+    """(V,) bool. Vertices whose blended matrix was nearly singular."""
     residual: float
+    """Largest distance between the posed figure and the target, over the target's size."""
     outside: tuple[int, ...]
+    """Joints that lie outside the target but inside the template."""
     length_scale: float
     figure_scale: float
     path_scale: float
+    """Factors by which ``clip_for`` scales lengths."""
     lines: tuple[Diagnostic, ...]
+    """Messages for the user."""
 
     @property
     def confidence(self) -> Ints:
@@ -92,10 +78,7 @@ def with_fields(rigged: Rigged) -> Rigged:
 def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
     """Return a clip of the template for the rigged figure; see ``transfer_clip``.
 
-    Raises
-    ------
-    RigError
-        If the clip is for a different skeleton.
+    Raises ``RigError`` if the clip is for a different skeleton.
     """
     skeleton = rigged.figure.require_skeleton()
     return transfer_clip(

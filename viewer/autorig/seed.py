@@ -31,18 +31,7 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     As in the original, pose correctives are neither removed nor added back. Only nearly singular
     blended matrices are replaced by the nearest rotation, which is reported.
 
-    Parameters
-    ----------
-    template : Figure
-        Template with bindings, and with its shape applied.
-    pose : Pose
-        Pose without shape weights.
-    target : Mesh
-        Mesh with triangles.
-    report : callable
-        Called with progress.
-    name : str
-        Name of the new figure.
+    ``pose``: pose without shape weights.
     """
     _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]
@@ -109,22 +98,9 @@ def align_boxes(positions: Floats, onto: Floats) -> Floats:
     p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is the rule of
     Tex-An Mesh; an axis along which both boxes are flat keeps its scale.
 
-    Parameters
-    ----------
-    positions : (N, 3)
-        Points to move: the target mesh.
-    onto : (M, 3)
-        Points whose box is the target: the posed template.
-
-    Returns
-    -------
-    (4, 4)
-        Diagonal scale and shift.
-
-    Raises
-    ------
-    RigError
-        If only one of the boxes is flat along an axis.
+    ``positions``: (N, 3), points to move: the target mesh. ``onto``: (M, 3), points whose box is
+    the target: the posed template. Returns (4, 4), diagonal scale and shift. Raises ``RigError`` if
+    only one of the boxes is flat along an axis.
 
     >>> align_boxes(np.array([[0.0, 0, 0], [2, 1, 1]]), np.array([[1.0, 1, 1], [2, 2, 2]])).tolist()
     [[0.5, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]]

@@ -26,34 +26,23 @@ JOINTS = ("surface", "alignment")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferSettings:
-    """Options of a rig transfer.
-
-    Attributes
-    ----------
-    method : str
-        A key of ``METHODS``; all other options are for ``"robust"``.
-    alignment : AlignmentSettings
-        Known facts about the alignment.
-    weights : WeightSettings
-        Criteria for matching vertices, smoothing, and number of influences.
-    joints : str
-        One of ``JOINTS``.
-    fits : bool
-        Whether the template's joints are rotated and its limbs scaled, if its pose or its
-        proportions differ from the target's.
-    correctives : bool
-        Whether pose correctives of the template are transferred.
-    repairs : bool
-        Whether the neighbourhoods of singular vertices are smoothed.
-    """
+    """Options of a rig transfer."""
 
     method: str = "robust"
+    """A key of ``METHODS``; all other options are for ``"robust"``."""
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
+    """Known facts about the alignment."""
     weights: WeightSettings = field(default_factory=WeightSettings)
+    """Criteria for matching vertices, smoothing, and number of influences."""
     joints: str = "surface"
+    """One of ``JOINTS``."""
     fits: bool = True
+    """Whether the template's joints are rotated and its limbs scaled, if its pose or its
+    proportions differ from the target's."""
     correctives: bool = True
+    """Whether pose correctives of the template are transferred."""
     repairs: bool = True
+    """Whether the neighbourhoods of singular vertices are smoothed."""
 
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("joints", JOINTS)):

@@ -26,18 +26,12 @@ _LONGEST = 2000  # maximum length of a message in characters
 
 @dataclass(frozen=True)
 class FunctionJob:
-    """A plain function as a job.
-
-    Attributes
-    ----------
-    function : callable
-        Called with an ``Item``; must be importable by its name if items run in other processes. A
-        dict that it returns is the ``values`` of the result, anything else ``values["value"]``.
-        The folder of the item's output exists; if it writes the output, that is listed in the
-        result.
-    """
+    """A plain function as a job."""
 
     function: Callable[[Item], Any]
+    """Called with an ``Item``; must be importable by its name if items run in other processes. A
+    dict that it returns is the ``values`` of the result, anything else ``values["value"]``. The
+    folder of the item's output exists; if it writes the output, that is listed in the result."""
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
@@ -60,23 +54,10 @@ class FunctionJob:
 def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
     """Run one item; a failure becomes a result, and only a signal is raised.
 
-    Parameters
-    ----------
-    item : Item
-        The item.
-    call : callable
-        Called with the item. An int that it returns is the exit code, where 0 and 1 stand for
-        success; a dict is the values of the result; anything else is ignored.
-
-    Returns
-    -------
-    Result
-        With captured text, recorded diagnostics, values and outputs.
-
-    Raises
-    ------
-    Interrupted
-        If a signal arrives whose handling is not deferred.
+    ``call``: called with the item. An int that it returns is the exit code, where 0 and 1 stand for
+    success; a dict is the values of the result; anything else is ignored. Returns with captured
+    text, recorded diagnostics, values and outputs. Raises ``Interrupted`` if a signal arrives whose
+    handling is not deferred.
     """
     out, err = io.StringIO(), io.StringIO()
     start = time.perf_counter()

@@ -24,25 +24,17 @@ _DIGITS = re.compile(r"[0-9]+")
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs that the arguments of a batch select.
-
-    Attributes
-    ----------
-    paths : tuple of str
-        Files, and folders that are one input each, sorted; spelled as given.
-    base : str
-        Absolute path of the folder that contains all arguments. It depends only on the arguments,
-        not on the files that a pattern happens to match.
-    folders : frozenset of str
-        The paths that are folders.
-    notes : tuple of str
-        Messages about duplicates and skipped files.
-    """
+    """The inputs that the arguments of a batch select."""
 
     paths: tuple[str, ...]
+    """Files, and folders that are one input each, sorted; spelled as given."""
     base: str
+    """Absolute path of the folder that contains all arguments. It depends only on the arguments,
+    not on the files that a pattern happens to match."""
     folders: frozenset[str] = frozenset()
+    """The paths that are folders."""
     notes: tuple[str, ...] = ()
+    """Messages about duplicates and skipped files."""
 
 
 def find_inputs(
@@ -54,27 +46,15 @@ def find_inputs(
 ) -> Inputs:
     """Find the inputs of a batch.
 
-    Parameters
-    ----------
-    words : iterable of str
-        Files, folders, patterns such as ``data/**/*.npz`` (a name that exists is not a pattern),
-        ``@list.txt`` for a list, and ``-`` for a list on standard input.
-    lists : iterable of str
-        Files with one path per line, or separated by null bytes, as by ``find -print0``; ``-``
-        for standard input.
-    suffixes : collection of str
-        Suffixes of the files taken from a folder; by default, those that identify a format.
-    keeps_folders : bool
-        Whether each folder is one input. Otherwise its files are the inputs, except for recordings
-        and models that consist of a folder.
-    output : str
-        Folder of the outputs. If it is in a searched folder, its files are not used as inputs,
-        which matters when a batch is resumed.
-
-    Raises
-    ------
-    ViewerError
-        If there is no input, a file or list is missing, or a pattern or folder yields nothing.
+    ``words``: files, folders, patterns such as ``data/**/*.npz`` (a name that exists is not a
+    pattern), ``@list.txt`` for a list, and ``-`` for a list on standard input. ``lists``: files
+    with one path per line, or separated by null bytes, as by ``find -print0``; ``-`` for standard
+    input. ``suffixes``: suffixes of the files taken from a folder; by default, those that identify
+    a format. ``keeps_folders``: whether each folder is one input. Otherwise its files are the
+    inputs, except for recordings and models that consist of a folder. ``output``: folder of the
+    outputs. If it is in a searched folder, its files are not used as inputs, which matters when a
+    batch is resumed. Raises ``ViewerError`` if there is no input, a file or list is missing, or a
+    pattern or folder yields nothing.
     """
     wanted = {suffix.lower() for suffix in suffixes} or {*SUFFIXES} - {*_AMBIGUOUS}
     search = _Search(wanted, keeps_folders, os.path.abspath(output) if output else "")

@@ -35,18 +35,9 @@ _LONGEST = 300  # maximum length of a name in a message, characters
 def template_of(output: str, suffix: str) -> str:
     """Return the template for output names.
 
-    Parameters
-    ----------
-    output : str
-        A template, or a folder, which mirrors the folders of the inputs.
-    suffix : str
-        Suffix of the files in such a folder, such as ``bvh``; ``folder`` for outputs that are
-        folders; empty if ``output`` must be a template.
-
-    Raises
-    ------
-    ViewerError
-        If a field is unknown, or neither a field nor a suffix is given.
+    ``suffix``: suffix of the files in such a folder, such as ``bvh``; ``folder`` for outputs that
+    are folders; empty if ``output`` must be a template. Raises ``ViewerError`` if a field is
+    unknown, or neither a field nor a suffix is given.
     """
     if _fields(output):
         if suffix:
@@ -101,12 +92,7 @@ def _fields(template: str, option: str = "-o") -> list[str]:
 def items_of(inputs: Inputs, template: str = "") -> list[Item]:
     """Return the items of a batch, in the order of the inputs.
 
-    Parameters
-    ----------
-    inputs : Inputs
-        The inputs.
-    template : str
-        Template for output names; empty if nothing is written.
+    ``template``: template for output names; empty if nothing is written.
     """
     pieces = list(Formatter().parse(template))
     here = os.getcwd()
@@ -168,26 +154,8 @@ def check_further_outputs(
 ) -> list[Item]:
     """Check the names of a second output of each item.
 
-    Parameters
-    ----------
-    option : str
-        The option that names it, for messages.
-    template : str
-        Template for its name.
-    items : sequence of Item
-        All items, including those of other shards.
-    more_inputs : iterable of str
-        Files that all items read.
-
-    Returns
-    -------
-    list of Item
-        The items, each with this file as its output.
-
-    Raises
-    ------
-    ViewerError
-        If a field is unknown, or a file would be written twice or replace an input.
+    Raises ``ViewerError`` if a field is unknown, or a file would be written twice or replace an
+    input.
     """
     _fields(template, option)
     further = [replace(item, output=filled(template, item)) for item in items]
@@ -204,17 +172,7 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     Names that differ only in case refer to the same file on some systems, and results are likely to
     be copied to one of these.
 
-    Parameters
-    ----------
-    items : sequence of Item
-        All items, including those of other shards.
-    more_inputs : iterable of str
-        Files that all items read.
-
-    Raises
-    ------
-    ViewerError
-        The message lists the outputs and their inputs.
+    Raises ``ViewerError``: the message lists the outputs and their inputs.
     """
     _check_clashes(items)
     files = [file for item in items for file in item.files] + list(more_inputs)
@@ -255,19 +213,8 @@ def check_summaries(
 ) -> None:
     """Check that files about the whole batch differ from inputs, outputs and each other.
 
-    Parameters
-    ----------
-    files : dict of str
-        The file of each option, such as ``--table``; empty for none.
-    items : sequence of Item
-        All items, including those of other shards.
-    more_inputs : iterable of str
-        Files that all items read.
-
-    Raises
-    ------
-    ViewerError
-        The message names the option.
+    ``files``: the file of each option, such as ``--table``; empty for none. Raises ``ViewerError``:
+    the message names the option.
     """
     real, here = _RealPaths(), os.getcwd()
     given = {option: path for option, path in files.items() if path}

@@ -55,10 +55,7 @@ _CELL = (240, 320)  # maximum size of a picture, pixels
 def check_overview(path: str | Path) -> None:
     """Check, before the batch starts, that a file is a page or a picture.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If the suffix belongs to another kind of file.
+    Raises ``UnsupportedFormatError`` if the suffix belongs to another kind of file.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (*PAGES, *_PICTURES):
@@ -69,15 +66,7 @@ def check_overview(path: str | Path) -> None:
 
 
 def overview_files(path: str, count: int) -> list[str]:
-    """Return the files of an overview: a page, or as many sheets as the items need.
-
-    Parameters
-    ----------
-    path : str
-        The first file.
-    count : int
-        Number of items.
-    """
+    """Return the files of an overview: a page, or as many sheets as the items need."""
     if Path(path).suffix.lower() in PAGES:
         return [path]
 
@@ -88,21 +77,9 @@ def overview_files(path: str, count: int) -> list[str]:
 def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list[str]:
     """Write an overview of a batch; return a line about each written file.
 
-    Parameters
-    ----------
-    path : str or Path
-        A page (``PAGES``), or a picture; several pictures are written if one cannot hold all.
-    job : str
-        Name of the job, which determines the title and the data shown for each item.
-    results : sequence of Result
-        Results in any order.
-
-    Raises
-    ------
-    ViewerError
-        If a sheet is requested, but no item has written a picture.
-    OutputError
-        If a file cannot be written.
+    ``path``: a page (``PAGES``), or a picture; several pictures are written if one cannot hold all.
+    Raises ``ViewerError`` if a sheet is requested, but no item has written a picture. Raises
+    ``OutputError`` if a file cannot be written.
     """
     path = Path(path)
     check_overview(path)
@@ -396,14 +373,7 @@ def _tag(name: str, content: str, kind: str = "") -> str:
 def row(cells: Iterable[str], kinds: Sequence[str], head: bool = False) -> str:
     """Return a row of a table.
 
-    Parameters
-    ----------
-    cells : iterable of str
-        HTML.
-    kinds : sequence of str
-        Class of each cell; may be empty.
-    head : bool
-        Whether it is the header row.
+    ``kinds``: class of each cell; may be empty.
     """
     name = "th" if head else "td"
     pairs = zip(cells, kinds, strict=True)

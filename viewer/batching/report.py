@@ -36,30 +36,20 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
 
 @dataclass
 class Report:
-    """The results of a batch.
-
-    Attributes
-    ----------
-    results : list of Result
-        In the order in which the items finished.
-    seconds : float
-        Wall time of the batch.
-    n_items : int
-        Number of items, including those not yet started when the batch was interrupted.
-    signal : int
-        Number of the signal that interrupted it; 0 if none did.
-    path : Path or None
-        The report's file.
-    notes : list of str
-        Messages about inputs and workers, such as paths that were skipped.
-    """
+    """The results of a batch."""
 
     results: list[Result] = field(default_factory=list)
+    """In the order in which the items finished."""
     seconds: float = 0.0
+    """Wall time of the batch."""
     n_items: int = 0
+    """Number of items, including those not yet started when the batch was interrupted."""
     signal: int = 0
+    """Number of the signal that interrupted it; 0 if none did."""
     path: Path | None = None
+    """The report's file."""
     notes: list[str] = field(default_factory=list)
+    """Messages about inputs and workers, such as paths that were skipped."""
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {status}" for status, count in sorted(self.counts.items()))
@@ -89,17 +79,8 @@ class Report:
 class ReportFile:
     """A report that is being written.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its folder is created if necessary.
-    replaces : bool
-        Whether an old report is discarded. Otherwise, lines are appended to it.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
+    ``path``: the file; its folder is created if necessary. Raises ``OutputError`` if it cannot be
+    written.
     """
 
     def __init__(self, path: Path, replaces: bool = False) -> None:
@@ -191,15 +172,7 @@ def _data(value: object) -> object:
 def read_results(path: Path) -> list[Result]:
     """Read a report; if an item has several results, the last one is used.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    ViewerError
-        If it cannot be read, or is not a report.
+    Raises ``ViewerError`` if it cannot be read, or is not a report.
     """
     results: dict[tuple[str, str], Result] = {}
     n_lines = 0

@@ -37,51 +37,34 @@ _remembered: dict[tuple[object, ...], bytes] = {}
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a run.
-
-    Attributes
-    ----------
-    engine : str
-        A key of ``ENGINES``.
-    limits : Limits
-        Processes, time and memory.
-    report : Path or None
-        The report to write; None for none.
-    existing : str
-        Treatment of an existing report: ``refuse`` it, ``replace`` it, ``append`` to it, or
-        ``resume``: append, and skip the items that it or the report of another shard lists as done.
-    identity : str
-        Job, options and version of the program, which are part of the items' keys.
-    shared : tuple of str
-        Files that all items read.
-    """
+    """Settings of a run."""
 
     engine: str = "sequential"
+    """A key of ``ENGINES``."""
     limits: Limits = field(default_factory=Limits)
+    """Processes, time and memory."""
     report: Path | None = None
+    """The report to write; None for none."""
     existing: Literal["refuse", "replace", "append", "resume"] = "refuse"
+    """Treatment of an existing report: ``refuse`` it, ``replace`` it, ``append`` to it, or
+    ``resume``: append, and skip the items that it or the report of another shard lists as done."""
     identity: str = ""
+    """Job, options and version of the program, which are part of the items' keys."""
     shared: tuple[str, ...] = ()
+    """Files that all items read."""
 
 
 @dataclass(frozen=True)
 class _KeyedJob:
-    """A job that skips finished items.
-
-    Attributes
-    ----------
-    job : Job
-        The job of the other items.
-    identity, shared
-        As in ``Settings``.
-    finished : frozenset of str
-        Keys of finished items.
-    """
+    """A job that skips finished items."""
 
     job: Job
+    """The job of the other items."""
     identity: str
     shared: tuple[str, ...]
+    """As in ``Settings``."""
     finished: frozenset[str]
+    """Keys of finished items."""
 
     @property
     def uses_gpu(self) -> bool:
@@ -102,17 +85,8 @@ class _KeyedJob:
 def shard_of(items: Sequence[Item], text: str) -> list[Item]:
     """Return the items of one of several shards: every N-th item, beginning with the I-th.
 
-    Parameters
-    ----------
-    items : sequence of Item
-        All items, in the same order for all shards.
-    text : str
-        ``I/N``, with I from 0 to N - 1.
-
-    Raises
-    ------
-    ViewerError
-        If the text is not of this form.
+    ``text``: ``I/N``, with I from 0 to N - 1. Raises ``ViewerError`` if the text is not of this
+    form.
     """
     first, _, count = text.partition("/")
     if not (first.isdecimal() and count.isdecimal() and 0 < int(count) <= 10**9):
@@ -136,27 +110,9 @@ def run_batch(
 
     The first signal ends the batch after the running items are finished; a second one cancels them.
 
-    Parameters
-    ----------
-    items : sequence of Item
-        The items.
-    job : Job
-        Called once per item, and again if its worker failed.
-    settings : Settings
-        Engine, limits and report.
-    on_result : callable, optional
-        Called with each result as soon as its item has finished.
-    on_note : callable, optional
-        Called with messages about workers.
-
-    Raises
-    ------
-    Interrupted
-        If a second signal cancels the batch; the report contains the finished items.
-    ViewerError
-        If the batch cannot start.
-    OutputError
-        If the report cannot be written.
+    ``job``: called once per item, and again if its worker failed. Raises ``Interrupted`` if a
+    second signal cancels the batch; the report contains the finished items. Raises ``ViewerError``
+    if the batch cannot start. Raises ``OutputError`` if the report cannot be written.
     """
     start = time.perf_counter()
     earlier = _earlier(settings)
@@ -245,20 +201,7 @@ def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
 
     Files that an input refers to, such as textures, are not included.
 
-    Parameters
-    ----------
-    item : Item
-        The item; the key includes the content of its files, not their location, and the output's
-        name.
-    settings : str
-        Everything else that affects the result: job, options, version of the program.
-    shared : iterable of str
-        Files that all items read; each is read once per process.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be read, or is a pipe or device.
+    Raises ``OSError`` if a file cannot be read, or is a pipe or device.
     """
     total = blake2b(digest_size=_SIZE)
     where = item.output or item.name

@@ -63,18 +63,12 @@ _REASONS = {
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """The files of a submission to compare.
-
-    Attributes
-    ----------
-    files : tuple of Path
-        Files to open together, or one folder.
-    base : Path or None
-        Temporary folder with the unpacked archive, removed at the end; None for a folder.
-    """
+    """The files of a submission to compare."""
 
     files: tuple[Path, ...]
+    """Files to open together, or one folder."""
     base: Path | None = None
+    """Temporary folder with the unpacked archive, removed at the end; None for a folder."""
 
 
 @contextmanager
@@ -89,19 +83,9 @@ def opened(
     Links that lead out of the folder count as missing files: a submission can't use the files of
     others.
 
-    Parameters
-    ----------
-    path : str or Path
-        The submission.
-    expected, alike : sequence of str
-        Patterns of its files; see ``choose``.
-    temporary : Path, optional
-        Folder for unpacked files; the system's temporary folder if omitted or missing.
-
-    Raises
-    ------
-    FormatError
-        If it is not a readable folder or archive, or the files to compare can't be chosen.
+    ``expected``, ``alike``: patterns of its files; see ``choose``. ``temporary``: folder for
+    unpacked files; the system's temporary folder if omitted or missing. Raises ``FormatError`` if
+    it is not a readable folder or archive, or the files to compare can't be chosen.
     """
     path = Path(path)
     if path.is_dir():
@@ -195,18 +179,12 @@ def _needed(archive: _Archive, chosen: _Chosen) -> Iterable[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Submissions, and other files.
-
-    Attributes
-    ----------
-    submissions : tuple of Path
-        Folders and archives.
-    ignored : tuple of Path
-        Other files next to them.
-    """
+    """Submissions, and other files."""
 
     submissions: tuple[Path, ...]
+    """Folders and archives."""
     ignored: tuple[Path, ...] = ()
+    """Other files next to them."""
 
 
 def is_archive(path: str) -> bool:
@@ -217,11 +195,8 @@ def is_archive(path: str) -> bool:
 def find_submissions(paths: Sequence[str | Path]) -> _Found:
     """Return the submissions that paths refer to, in the order of the paths, then by name.
 
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        If there are several, each is a submission. A single folder is a submission if it directly
-        contains readable files; otherwise, each of its folders and archives is one.
+    ``paths``: if there are several, each is a submission. A single folder is a submission if it
+    directly contains readable files; otherwise, each of its folders and archives is one.
     """
     given = [Path(path) for path in paths]
     entries = _entries(given[0]) if len(given) == 1 else []
@@ -283,23 +258,12 @@ def choose(
     The files nearest to the top of the folder are preferred, since submissions often contain
     build folders, backups and the course's own data.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Paths of all files, relative to the submission, with slashes; without junk.
-    expected : sequence of str
-        Patterns of the required files: each matches one file. A pattern with a slash is compared
-        with the whole path, otherwise with the name of the file.
-    alike : sequence of str
-        Patterns from the reference (``patterns_of``), used without ``expected`` unless none
-        matches: then the folder nearest to the top that has readable files is compared.
-    path : Path
-        The submission, for messages.
-
-    Raises
-    ------
-    FormatError
-        If a file is missing, or there are several to choose from.
+    ``names``: paths of all files, relative to the submission, with slashes; without junk.
+    ``expected``: patterns of the required files: each matches one file. A pattern with a slash is
+    compared with the whole path, otherwise with the name of the file. ``alike``: patterns from the
+    reference (``patterns_of``), used without ``expected`` unless none matches: then the folder
+    nearest to the top that has readable files is compared. Raises ``FormatError`` if a file is
+    missing, or there are several to choose from.
     """
     if not expected and not any(_matches(name, one) for one in alike for name in names):
         return (_readable_folder(names, path),)
@@ -361,33 +325,18 @@ def _folders(names: Sequence[str], is_wanted: Callable[[str], bool]) -> list[str
 
 @dataclass(frozen=True, slots=True)
 class _Archive:
-    """An open zip archive.
-
-    Attributes
-    ----------
-    shown : Path
-        Path for messages; that of a nested archive begins with that of the outer one.
-    size : int
-        Size of its file in bytes.
-    archive : ZipFile
-        The archive.
-    members : dict of str to ZipInfo
-        Files by path with slashes, without folders.
-    """
+    """An open zip archive."""
 
     shown: Path
+    """Path for messages; that of a nested archive begins with that of the outer one."""
     size: int
+    """Size of its file in bytes."""
     archive: zipfile.ZipFile
     members: dict[str, zipfile.ZipInfo]
+    """Files by path with slashes, without folders."""
 
     def unpack(self, names: Iterable[str], folder: Path) -> int:
-        """Write members to an empty folder; return their total size in bytes.
-
-        Raises
-        ------
-        FormatError
-            If one of them is a link, encrypted or damaged, or they are too large.
-        """
+        """Write members to an empty folder; return their total size in bytes."""
         members = {name: self.members[name] for name in names}
         self._check(members)
         try:
@@ -429,17 +378,7 @@ class _Archive:
 def _open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> Iterator[_Archive]:
     """Open a zip archive whose paths all stay inside it.
 
-    Parameters
-    ----------
-    path, shown : Path
-        The file, and its path in messages.
-    is_junk : function
-        Whether a path is ignored.
-
-    Raises
-    ------
-    FormatError
-        If it is damaged, a path leads outside, or two files have the same path.
+    ``is_junk``: whether a path is ignored.
     """
     try:
         storage = StoredFile(Source(path))

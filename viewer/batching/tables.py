@@ -43,21 +43,9 @@ def ordered(results: Iterable[Result]) -> list[Result]:
 def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     """Write the table as CSV (RFC 4180, UTF-8); return the number of items.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file, which is replaced atomically.
-    job : str
-        Name of the command, which determines the columns; ``function`` for a function, whose values
-        are columns.
-    results : iterable of Result
-        Results in any order; rows are in the order of the inputs. Each has one row; of ``info``,
-        one row per figure.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
+    ``job``: name of the command, which determines the columns; ``function`` for a function, whose
+    values are columns. ``results``: results in any order; rows are in the order of the inputs. Each
+    has one row; of ``info``, one row per figure. Raises ``OutputError`` if it cannot be written.
     """
     results = ordered(results)
     values = [dict(_cells_in(result.values)) if job == "function" else {} for result in results]
@@ -129,12 +117,7 @@ def comparisons(result: Result) -> list[Mapping[str, Any]]:
 def worst_measure(result: Result, group: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
     """Return the largest measure of a group, relative to each figure's size, and its actor.
 
-    Parameters
-    ----------
-    result : Result
-        Result of an item of ``diff``.
-    group : str
-        A key of ``MEASURES``.
+    ``result``: result of an item of ``diff``. ``group``: a key of ``MEASURES``.
     """
     pairs = [
         (measure, actor)

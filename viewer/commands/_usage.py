@@ -92,17 +92,9 @@ class Parser(argparse.ArgumentParser):
 def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
     """Return the parser of a command with all its options.
 
-    Parameters
-    ----------
-    name : str
-        A key of ``COMMANDS``.
-    words : sequence of str
-        The arguments, for commands with ``parser_of``, whose options depend on the first one.
-
-    Raises
-    ------
-    ViewerError
-        If the first argument selects no options.
+    ``name``: a key of ``COMMANDS``. ``words``: the arguments, for commands with ``parser_of``,
+    whose options depend on the first one. Raises ``ViewerError`` if the first argument selects no
+    options.
     """
     module = import_module(f"viewer.commands.{name}")
     own: Parser | None = module.parser_of(words) if words and hasattr(module, "parser_of") else None

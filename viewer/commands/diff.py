@@ -263,19 +263,13 @@ def _print(arguments: argparse.Namespace, rows: Sequence[_Compared], stream: Tex
 
 @dataclass(frozen=True, slots=True)
 class _Pairing:
-    """Paired actors of two scenes.
-
-    Attributes
-    ----------
-    pairs : tuple of (Actor, Actor)
-        In the first scene's order; each with the motion to compare.
-    first, second : tuple of Phrase
-        Labels of everything unpaired: actors, and motions that belong only to unpaired actors.
-    """
+    """Paired actors of two scenes."""
 
     pairs: tuple[tuple[Actor, Actor], ...]
+    """tuple of (Actor, Actor). In the first scene's order; each with the motion to compare."""
     first: tuple[Phrase, ...] = ()
     second: tuple[Phrase, ...] = ()
+    """Labels of everything unpaired: actors, and motions that belong only to unpaired actors."""
 
 
 # Each rule is tried for all actors before the next rule.
@@ -394,27 +388,18 @@ def _moved_by(actor: Actor, clip: Clip | None) -> Actor:
 
 @dataclass(frozen=True, slots=True)
 class _Compared:
-    """Comparison of one input with the reference.
-
-    Attributes
-    ----------
-    name : str
-        The argument as given.
-    differences : tuple of (str, Difference)
-        One per actor, with the actor's name in the reference.
-    mismatches : tuple of Diagnostic
-        Actors without a counterpart, and the scene that contains them.
-    error : str
-        Reason why the input could not be opened; empty if it was.
-    diagnostics : tuple of Diagnostic
-        Warnings of the file readers.
-    """
+    """Comparison of one input with the reference."""
 
     name: str
+    """The argument as given."""
     differences: tuple[tuple[str, Difference], ...] = ()
+    """One per actor, with the actor's name in the reference."""
     mismatches: tuple[Diagnostic, ...] = ()
+    """Actors without a counterpart, and the scene that contains them."""
     error: str = ""
+    """Reason why the input could not be opened; empty if it was."""
     diagnostics: tuple[Diagnostic, ...] = field(default=())
+    """Warnings of the file readers."""
 
     def exceeds(self, tolerance: float) -> bool:
         """Return whether anything differs by more than the tolerance or was not compared."""
@@ -543,18 +528,12 @@ def _actor(name: str, difference: Difference) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Heat:
-    """Heat map of the reference, coloured by its distance to another figure.
-
-    Attributes
-    ----------
-    actors : tuple of Actor
-        Actors in the pose with the largest distance, with the field ``difference``.
-    most : float
-        The largest distance, in the unit of the legend.
-    """
+    """Heat map of the reference, coloured by its distance to another figure."""
 
     actors: tuple[Actor, ...]
+    """Actors in the pose with the largest distance, with the field ``difference``."""
     most: float
+    """The largest distance, in the unit of the legend."""
 
 
 def _heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> _Heat | None:

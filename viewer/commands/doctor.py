@@ -264,10 +264,8 @@ class Measured:
 def measured() -> Iterator[Measured]:
     """Yield durations as they are measured, medians of several repetitions.
 
-    Raises
-    ------
-    RenderError
-        If drawing is impossible; raised after the measurements that need no drawing.
+    Raises ``RenderError`` if drawing is impossible; raised after the measurements that need no
+    drawing.
     """
     yield from _starts()
     yield from _frames()

@@ -76,15 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
-    """Return the contents of a scene as JSON data; lengths in figure units, angles in radians.
-
-    Parameters
-    ----------
-    scene : Scene
-        The figures and their poses.
-    skinning : Skinning, optional
-        The skinning method and its options.
-    """
+    """Return the contents of a scene as JSON data; lengths in figure units, angles in radians."""
     how = skinning or Skinning()
     return {
         "actors": [

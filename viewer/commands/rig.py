@@ -430,18 +430,12 @@ def _floats(words: list[str]) -> list[float] | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _TransferredClip:
-    """A motion of the template, and the file its transferred copy is written to.
-
-    Attributes
-    ----------
-    clip : Clip or SampledClip
-        The template's motion.
-    path : Path
-        ``.anim`` for .skel-style rigs, ``.bvh`` for other figures.
-    """
+    """A motion of the template, and the file its transferred copy is written to."""
 
     clip: Clip | SampledClip
+    """The template's motion."""
     path: Path
+    """``.anim`` for .skel-style rigs, ``.bvh`` for other figures."""
 
 
 def _read_clips(

@@ -126,12 +126,7 @@ class Diagnostic:
 class Phrase:
     """A message value that is itself a template with values.
 
-    Parameters
-    ----------
-    key : str
-        A key of ``PHRASES``.
-    **values : object
-        Values for the template.
+    ``key``: a key of ``PHRASES``.
     """
 
     __slots__ = ("key", "values")
@@ -175,11 +170,8 @@ class Collector:
 
     Repeated warnings are dropped, as are warnings after the first hundred; all errors are kept.
 
-    Parameters
-    ----------
-    keeps_errors : bool
-        Whether a reader continues after an error in order to find all errors. Otherwise the
-        first one is raised where it is recorded.
+    ``keeps_errors``: whether a reader continues after an error in order to find all errors.
+    Otherwise the first one is raised where it is recorded.
     """
 
     def __init__(self, keeps_errors: bool = False) -> None:
@@ -251,16 +243,8 @@ def _joined(alike: list[Diagnostic]) -> Diagnostic:
 def described(found: Diagnostic) -> dict[str, Any]:
     """Return all data of a diagnostic, worded as for the command line.
 
-    Parameters
-    ----------
-    found : Diagnostic
-        The diagnostic to describe.
-
-    Returns
-    -------
-    dict
-        Code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
-        returned by ``plain``, the first 100 indices, and the number of indices.
+    Returns code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
+    returned by ``plain``, the first 100 indices, and the number of indices.
     """
     from viewer.diagnostics.template import as_data  # most runs have no message
 

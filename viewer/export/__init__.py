@@ -162,10 +162,7 @@ EXPORTERS = {
 def exporter_for(path: str | Path) -> str:
     """Return the key in ``EXPORTERS`` that writes files of this suffix.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If there is none; the message lists the known suffixes.
+    Raises ``UnsupportedFormatError`` if there is none; the message lists the known suffixes.
     """
     suffix = Path(path).suffix.lower()
     kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_pose}
@@ -235,28 +232,10 @@ def export_clips(
 ) -> list[Diagnostic]:
     """Write a figure at rest, with animations that keep their own keys.
 
-    Parameters
-    ----------
-    actor : Actor
-        See ``viewer.rig.motion.animation_choice.has_own_animations``.
-    path : str or Path
-        As for ``export``; a format that ``writes_keys``.
-    skinning : Skinning, optional
-        Skinning method and options.
-    clips : sequence of TransformClip, optional
-        All of the actor's animations if omitted.
-    optimizes : bool
-        Quantise vertices.
-
-    Returns
-    -------
-    list of Diagnostic
-        As for ``export``.
-
-    Raises
-    ------
-    UnsupportedFormatError, RigError, OutputError
-        As for ``export``, and if the keys are invalid.
+    ``actor``: see ``viewer.rig.motion.animation_choice.has_own_animations``. ``path``: as for
+    ``export``; a format that ``writes_keys``. ``clips``: all of the actor's animations if omitted.
+    Returns as for ``export``. Raises ``UnsupportedFormatError, RigError, OutputError``: as for
+    ``export``, and if the keys are invalid.
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     chosen = own_animations(actor) if clips is None else clips
@@ -276,25 +255,9 @@ def export_figures(
 ) -> list[Diagnostic]:
     """Write figures to one file, placed as in their scene; raises as ``export`` does.
 
-    Parameters
-    ----------
-    actors : sequence of Actor
-        Figures and poses.
-    path : str or Path
-        As for ``export``; a format that ``writes_several``.
-    skinning : Skinning, optional
-        Skinning method and options.
-    clips : sequence of sequences of TransformClip, optional
-        Animations of each figure; None for a figure, or for all, to write the current pose.
-    scene : Scene, optional
-        Provides the up axis of the placements, by default that of the first figure, and cameras.
-    optimizes : bool
-        Quantise vertices.
-
-    Returns
-    -------
-    list of Diagnostic
-        As for ``export``.
+    ``path``: as for ``export``; a format that ``writes_several``. ``clips``: animations of each
+    figure; None for a figure, or for all, to write the current pose. ``scene``: provides the up
+    axis of the placements, by default that of the first figure, and cameras.
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     own = [None] * len(actors) if clips is None else clips
@@ -314,10 +277,7 @@ def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
 def motion_exporters(path: str | Path) -> list[str]:
     """Return the keys in ``EXPORTERS`` that write motions to files of this suffix.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If there is none; the message lists the known suffixes.
+    Raises ``UnsupportedFormatError`` if there is none; the message lists the known suffixes.
     """
     suffix = Path(path).suffix.lower() or "/"
     kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_motion}
@@ -333,10 +293,7 @@ def suited_exporter(path: str | Path, figure: Figure) -> str:
 
     Arrays of bodies of the SMPL family are written in AMASS's layout.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If no exporter writes motions with this suffix.
+    Raises ``UnsupportedFormatError`` if no exporter writes motions with this suffix.
     """
     found = motion_exporters(path)
     if "amass" not in found or len(found) == 1:
@@ -351,16 +308,7 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write a motion without its placement; returns notes and raises as ``export`` does.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        A figure in many poses.
-    path : str or Path
-        Either all files of an export are written, or none.
-    key : str
-        A key of ``EXPORTERS``, see ``motion_exporters``.
-    options : MotionOptions
-        Options of the export.
+    ``key``: a key of ``EXPORTERS``, see ``motion_exporters``.
     """
     module = import_module(f"{__name__}.{key}")
     from viewer.export._losses.between import rate_note
@@ -377,12 +325,7 @@ def export_animation(
 def check_figure(key: str, figure: Figure) -> None:
     """Raise RigError if an exporter cannot write a figure, before any work is done for it.
 
-    Parameters
-    ----------
-    key : str
-        A key of ``EXPORTERS``.
-    figure : Figure
-        Only its joints, their names and its unit matter.
+    ``key``: a key of ``EXPORTERS``. ``figure``: only its joints, their names and its unit matter.
     """
     if EXPORTERS[key].is_particular:
         import_module(f"{__name__}.{key}").require(figure)
@@ -402,14 +345,8 @@ def animation_for(
     Captures are written back in their own world, unless another up axis is requested; other
     formats expect upright people.
 
-    Parameters
-    ----------
-    key : str
-        A key of ``EXPORTERS``.
-    options : MotionOptions
-        Whether an up axis is requested.
-    scene, actor, rate, frames, interpolate
-        As for ``viewer.rig.motion.sampled_animation.upright_animation``.
+    ``key``: a key of ``EXPORTERS``. ``scene``, ``actor``, ``rate``, ``frames``, ``interpolate``: as
+    for ``viewer.rig.motion.sampled_animation.upright_animation``.
     """
     keeps_world = EXPORTERS[key].keeps_world and not options.up
     return upright_animation(scene, actor, rate, frames, interpolate, keeps_world)
@@ -418,10 +355,7 @@ def animation_for(
 def files_written(path: str | Path) -> list[Path]:
     """Return all files that an export to ``path`` writes, such as two for a rig or a ``.gltf``.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If no exporter writes this suffix.
+    Raises ``UnsupportedFormatError`` if no exporter writes this suffix.
     """
     suffixes = EXPORTERS[exporter_for(path)].suffixes
     if exporter_for(path) == "rig":

@@ -55,27 +55,11 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write a motion in its own world unless another up axis is requested.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        Animation of a body with the joints of SMPL, SMPL+H or SMPL-X.
-    path : Path
-        The file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
-    options : MotionOptions
-        Up axis (the scene's if empty) and handling of gaps.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the data that the format cannot store.
-
-    Raises
-    ------
-    RigError
-        If the figure has other joints or an unknown unit, a unit other than metres is requested,
-        or no frame is present.
-    OutputError
-        If a file cannot be written.
+    ``path``: the file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
+    ``options``: up axis (the scene's if empty) and handling of gaps. Returns notes: the written
+    files, then the data that the format cannot store. Raises ``RigError`` if the figure has other
+    joints or an unknown unit, a unit other than metres is requested, or no frame is present. Raises
+    ``OutputError`` if a file cannot be written.
     """
     notes = write_layout(animation, path, options, "AMASS", _arrays)
     if len(animation.frames.shape_weights) > 1:

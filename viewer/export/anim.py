@@ -41,26 +41,11 @@ def export_animation(
     motion gets a key per frame, with linear or smooth tangents, whichever give the smaller joint
     error.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        Animation of a figure with the DOFs of a ``.skel`` file.
-    path : Path
-        The file; ``gaps="split"`` writes ``name-1.anim``, ``name-2.anim`` … if there are gaps.
-    options : MotionOptions
-        Options; only ``gaps`` is used.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, joint errors, and the data that the format cannot store.
-
-    Raises
-    ------
-    RigError
-        If the figure has other DOFs, or no frame is present.
-    OutputError
-        If a file cannot be written.
+    ``animation``: animation of a figure with the DOFs of a ``.skel`` file. ``path``: the file;
+    ``gaps="split"`` writes ``name-1.anim``, ``name-2.anim`` … if there are gaps. ``options``:
+    options; only ``gaps`` is used. Returns notes: the written files, joint errors, and the data
+    that the format cannot store. Raises ``RigError`` if the figure has other DOFs, or no frame is
+    present. Raises ``OutputError`` if a file cannot be written.
     """
     figure, frames = animation.figure, animation.frames
     require(figure)

@@ -78,30 +78,14 @@ def export_animations(
 
     Frames keep the numbers of the animations. Frames without people contain an empty list.
 
-    Parameters
-    ----------
-    animations : sequence of SampledAnimation
-        At least one animation of an SMPL-family body, all with the same frame rate.
-    path : Path
-        The folder; its subfolder ``smpl`` is replaced if it contains only numbered frames.
-    options : MotionOptions
-        Up axis (that of the scene if empty), and handling of gaps, which are kept unless the
-        options request holding or interpolation.
-    persons : sequence of int, optional
-        Number of each person; 0, 1, 2 … if omitted, negative for untracked people.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written folder, then the data that the format cannot store.
-
-    Raises
-    ------
-    RigError
-        If a figure has other joints or an unknown unit, a unit other than metres is requested,
-        frame rates differ, two people have the same number, or no frame is present.
-    OutputError
-        If the folder cannot be written, or contains other files.
+    ``path``: the folder; its subfolder ``smpl`` is replaced if it contains only numbered frames.
+    ``options``: up axis (that of the scene if empty), and handling of gaps, which are kept unless
+    the options request holding or interpolation. ``persons``: number of each person; 0, 1, 2 … if
+    omitted, negative for untracked people. Returns notes: the written folder, then the data that
+    the format cannot store. Raises ``RigError`` if a figure has other joints or an unknown unit, a
+    unit other than metres is requested, frame rates differ, two people have the same number, or no
+    frame is present. Raises ``OutputError`` if the folder cannot be written, or contains other
+    files.
     """
     persons = range(len(animations)) if persons is None else persons
     check_unit(options, "EasyMocap")

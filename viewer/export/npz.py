@@ -161,26 +161,9 @@ def _read(archive: Archive, key: str) -> Floats | None:
 def export_points(animation: SampledPoints, path: Path, options: MotionOptions) -> list[Diagnostic]:
     """Write captured points of all frames as float64 arrays.
 
-    Parameters
-    ----------
-    animation : SampledPoints
-        Points of one person.
-    path : Path
-        The file to write, replaced if it exists.
-    options : MotionOptions
-        Options; ``world_up`` is written to the file.
-
-    Returns
-    -------
-    list of Diagnostic
-        A note about the written file.
-
-    Raises
-    ------
-    RigError
-        If another unit or up axis is requested, or no frame is present.
-    OutputError
-        If the file cannot be written.
+    ``path``: the file to write, replaced if it exists. ``options``: options; ``world_up`` is
+    written to the file. Raises ``RigError`` if another unit or up axis is requested, or no frame is
+    present. Raises ``OutputError`` if the file cannot be written.
     """
     _check(animation.name, animation.present, "", options)
     up, points = options.up or options.world_up, animation.points

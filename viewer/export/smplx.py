@@ -45,25 +45,9 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write a motion of a body of the family, z up unless another up axis is requested.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        Animation of a body with the joints of SMPL, SMPL+H or SMPL-X. Joints that it lacks have
-        rotations of 0.
-    path : Path
-        The file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
-    options : MotionOptions
-        Up axis and gaps.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the data that the format cannot store.
-
-    Raises
-    ------
-    RigError, OutputError
-        As for ``viewer.export.amass.export_animation``.
+    ``path``: the file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
+    Returns notes: the written files, then the data that the format cannot store. Raises ``RigError,
+    OutputError``: as for ``viewer.export.amass.export_animation``.
     """
     wanted = replace(options, up=options.up or "z")
     notes = write_layout(animation, path, wanted, "SMPL-X", _arrays)

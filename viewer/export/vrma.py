@@ -44,21 +44,8 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write the motion of a humanoid; see ``viewer.export.export_animation``.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        A figure in many poses.
-    path : Path
-        The file.
-    options : MotionOptions
-        Handling of gaps, and up axis of the world.
-
-    Raises
-    ------
-    RigError
-        If the figure lacks a required bone, no frame is present, or gaps are to be split.
-    OutputError
-        If the file cannot be written.
+    Raises ``RigError`` if the figure lacks a required bone, no frame is present, or gaps are to be
+    split. Raises ``OutputError`` if the file cannot be written.
     """
     if options.closing == "split":
         raise RigError("gaps of .vrma: expected hold or interpolate, found split")

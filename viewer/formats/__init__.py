@@ -233,15 +233,7 @@ def __getattr__(name: str) -> Any:
 def detect(source: Source) -> str:
     """Return a file's key in ``FORMATS``, determined by its content, then by its suffix.
 
-    Parameters
-    ----------
-    source : Source
-        The file; a suffix that belongs to another format is added to its warnings.
-
-    Raises
-    ------
-    FormatError
-        If no format matches; the message states the apparent type of the file.
+    Raises ``FormatError`` if no format matches; the message states the apparent type of the file.
     """
     if source.is_folder:
         return _detect_folder(source)

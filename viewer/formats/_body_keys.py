@@ -43,10 +43,7 @@ def model_in(values: Iterable[Value]) -> str:
 def scale_in(archive: Archive, key: str) -> float:
     """Return the scale of a body, by which AIST++ multiplies positions in metres.
 
-    Raises
-    ------
-    FormatError
-        If it is not a single positive number of a plausible size.
+    Raises ``FormatError`` if it is not a single positive number of a plausible size.
     """
     values = archive.array(key).values().ravel()
     if len(values) != 1:

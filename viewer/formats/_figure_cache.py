@@ -35,11 +35,6 @@ def keeping_figures(paths: Collection[Path]) -> Iterator[None]:
     """Cache the figures of some files for later runs, until a run caches others.
 
     A file that has changed is read again. Only files are cached, not folders.
-
-    Parameters
-    ----------
-    paths : collection of Path
-        Files that many runs read.
     """
     global _wanted
     before = _wanted
@@ -53,15 +48,7 @@ def keeping_figures(paths: Collection[Path]) -> Iterator[None]:
 
 
 def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Content:
-    """Return the content of a file from an earlier run, or read it.
-
-    Parameters
-    ----------
-    source : Source
-        The file; diagnostics and other records are the same in both cases.
-    reader : callable
-        Reads it.
-    """
+    """Return the content of a file from an earlier run, or read it."""
     path = source.path.resolve() if _wanted else source.path
     if path not in _wanted or source.is_folder:
         return reader(source)

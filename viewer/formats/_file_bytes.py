@@ -35,17 +35,8 @@ _KINDS = {
 def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
     """Read a whole regular file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    max_size : int
-        Larger files, in bytes, are refused before they are read.
-
-    Raises
-    ------
-    FormatError
-        If the file is missing, unreadable, not a regular file, or too large.
+    ``max_size``: larger files, in bytes, are refused before they are read. Raises ``FormatError``
+    if the file is missing, unreadable, not a regular file, or too large.
     """
     kind = kind_of(path, max_size)
     if kind is not None:
@@ -74,10 +65,7 @@ def read_pipe(path: Path, max_size: int) -> bytes | None:
     can be read only once, so its bytes are kept for all readers. Other pipes in the file system are
     not read: without a writer, opening one waits forever.
 
-    Raises
-    ------
-    FormatError
-        If more than ``max_size`` bytes arrive, or the pipe cannot be read.
+    Raises ``FormatError`` if more than ``max_size`` bytes arrive, or the pipe cannot be read.
     """
     number = _descriptor(path)
     try:

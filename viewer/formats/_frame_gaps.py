@@ -37,12 +37,8 @@ def invalid_rows(*tables: Floats | None) -> Bools:
 def gap_notes(source: Source, lost: Mapping[int | None, NDArray[np.integer]]) -> list[Diagnostic]:
     """Return a note about frames that became gaps, if there are any.
 
-    Parameters
-    ----------
-    source : Source
-        The file, whose ``frame_faults`` has the first error.
-    lost : mapping of person to (N,)
-        Numbers of the lost frames, ascending; the person is None if there is only one.
+    ``source``: the file, whose ``frame_faults`` has the first error. ``lost``: mapping of person to
+    (N,), numbers of the lost frames, ascending; the person is None if there is only one.
     """
     frames = [
         Phrase("frames-of", person="" if person is None else person_label(person), frames=span)

@@ -34,15 +34,7 @@ _LONGEST = 4096  # maximum characters of a line; matching takes quadratic time
 def read_joint_map(source: Source) -> JointMap:
     """Read a joint map.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-
-    Raises
-    ------
-    FormatError
-        At a line that is not a pair of joints, or at the end if there is none.
+    Raises ``FormatError``: at a line that is not a pair of joints, or at the end if there is none.
     """
     pairs: list[tuple[str, str]] = []
     lines: list[int] = []
@@ -66,19 +58,7 @@ def read_joint_map(source: Source) -> JointMap:
 def write_joint_map(joint_map: JointMap, path: str | Path, titles: tuple[str, str]) -> None:
     """Write a joint map.
 
-    Parameters
-    ----------
-    joint_map : JointMap
-        The map.
-    path : str or Path
-        File to create or replace.
-    titles : (str, str)
-        Names of the motion and the figure, for a comment.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
+    Raises ``OutputError`` if it cannot be written.
     """
     save_text(path, joint_map_text(joint_map, titles))
 

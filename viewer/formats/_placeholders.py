@@ -11,13 +11,9 @@ from viewer.rig.arrays import Bools, Floats, Ints
 def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
     """Return positions with each NaN vertex moved to the mean of its valid neighbours.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Positions; NaN if invalid.
-    triangles : (T, 3)
-        Triangles, whose edges connect neighbours. A vertex without valid neighbours is moved to
-        the mean of all valid vertices.
+    ``positions``: (V, 3), positions; NaN if invalid. ``triangles``: (T, 3), triangles, whose edges
+    connect neighbours. A vertex without valid neighbours is moved to the mean of all valid
+    vertices.
     """
     if not np.isnan(positions.sum()):
         # Most files have no invalid positions, so this test must be cheap.
@@ -41,13 +37,8 @@ def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
 def held_rows(rows: Floats, bad: Bools) -> Floats:
     """Return rows with each invalid row replaced by the last valid row before it.
 
-    Parameters
-    ----------
-    rows : (N, ...)
-        Rows of a motion, in time order.
-    bad : (N,)
-        True for invalid rows. Invalid rows before the first valid row become copies of it; if all
-        are invalid, all become 0.
+    ``rows``: (N, ...), rows of a motion, in time order. ``bad``: (N,), true for invalid rows.
+    Invalid rows before the first valid row become copies of it; if all are invalid, all become 0.
     """
     if not bad.any():
         return rows
@@ -60,13 +51,8 @@ def held_rows(rows: Floats, bad: Bools) -> Floats:
 def neutral_corners(corners: NDArray[np.integer], fits: Bools) -> Ints:
     """Return triangles with invalid corners replaced by valid ones, which gives them zero area.
 
-    Parameters
-    ----------
-    corners : (T, 3)
-        Vertex indices.
-    fits : (T, 3)
-        True for indices of existing vertices. If a triangle has no valid corner, its corners become
-        vertex 0.
+    ``corners``: (T, 3), vertex indices. ``fits``: (T, 3), true for indices of existing vertices. If
+    a triangle has no valid corner, its corners become vertex 0.
     """
     first = corners[np.arange(len(corners)), fits.argmax(axis=1)]
     usable = np.where(fits.any(axis=1), first, 0)

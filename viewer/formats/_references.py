@@ -22,15 +22,7 @@ _DRIVE = re.compile(r"[A-Za-z]:")
 
 
 def referenced_path(folder: Path, name: str) -> Path | None:
-    """Return the path of a referenced file; None if it leads out of the folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the referencing file.
-    name : str
-        Name as written; backslashes are treated as slashes. The file need not exist.
-    """
+    """Return the path of a referenced file; None if it leads out of the folder."""
     written = name.replace("\\", "/")
     if _is_absolute(written):
         return None

@@ -56,25 +56,10 @@ _ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\
 class Source:
     """One file, or folder of files, with the diagnostics that its reader records.
 
-    Attributes
-    ----------
-    path : Path
-        Path of the file; texture file names are relative to its folder.
-    is_folder : bool
-        Whether it is a folder, which has no bytes.
-    max_size : int
-        Largest size of a file in bytes, including those inside a folder or archive.
-    diagnostics : Collector
-        Diagnostics that its reader records, shared with the files that it references.
-    also_read : list of Path
-        Other files that its reader opened: images, material libraries.
-    options : dict of str to str
-        Options that select among the contents of a file: ``"rig"`` for Anny, ``"lod"`` (level of
-        detail) for MHR.
-    used_options : set of str
-        Options that its reader has used.
-    frame_faults : list of Diagnostic
-        The first error in frames of a motion that become gaps, see ``_frame_gaps.py``.
+    ``is_folder``: whether it is a folder, which has no bytes. ``max_size``: largest size of a file
+    in bytes, including those inside a folder or archive. ``options``: options that select among the
+    contents of a file: ``"rig"`` for Anny, ``"lod"`` (level of detail) for MHR. ``frame_faults``:
+    the first error in frames of a motion that become gaps, see ``_frame_gaps.py``.
     """
 
     def __init__(
@@ -129,10 +114,7 @@ class Source:
 
         A long file is read part by part, unless it is in memory already.
 
-        Parameters
-        ----------
-        length : int
-            Size of a part in bytes, unless one of its lines is longer.
+        ``length``: size of a part in bytes, unless one of its lines is longer.
         """
         text = self._text()
         total, done = len(text), 0
@@ -231,14 +213,7 @@ class Source:
     def fault(self, key: str, offset: int | str | None = None, **values: Any) -> FormatError:
         """Return the exception for an error after which the reader cannot continue.
 
-        Parameters
-        ----------
-        key : str
-            Key of the message.
-        offset : int, optional
-            Position in the file, or a JSON pointer, if known.
-        **values : object
-            Values in the message, passed as keywords so that calls read like the templates.
+        ``offset``: position in the file, or a JSON pointer, if known.
         """
         return FormatError(self._diagnostic(key, offset, values))
 
@@ -253,24 +228,10 @@ class Source:
     ) -> None:
         """Record an error that makes the file invalid but after which the reader can continue.
 
-        Parameters
-        ----------
-        key : str
-            Key of the message.
-        offset : int, optional
-            Position in the file, or a JSON pointer, if known; of several errors, the first
-            position.
-        count : int
-            Number of errors.
-        part, places : str, (N,)
-            The data that the reader replaces with neutral values, see ``Diagnostic``.
-        **values : object
-            Values in the message.
-
-        Raises
-        ------
-        FormatError
-            Immediately, if the collector does not collect errors.
+        ``offset``: position in the file, or a JSON pointer, if known; of several errors, the first
+        position. ``part``, ``places``: str, (N,), the data that the reader replaces with neutral
+        values, see ``Diagnostic``. Raises ``FormatError``: immediately, if the collector does not
+        collect errors.
         """
         found = self._diagnostic(key, offset, values, count, part, places)
         found = replace(found, is_refusal=True)
@@ -289,16 +250,8 @@ class Source:
     ) -> None:
         """Record a warning or note that leaves the file valid.
 
-        Parameters
-        ----------
-        key : str
-            Key of the message.
-        offset : int, optional
-            Position in the file, or a JSON pointer, if known.
-        count, part, places : int, str, (N,)
-            Number of errors, and their indices; see ``Diagnostic``.
-        **values : object
-            Values in the message.
+        ``offset``: position in the file, or a JSON pointer, if known. ``count``, ``part``,
+        ``places``: int, str, (N,), number of errors, and their indices; see ``Diagnostic``.
         """
         self.diagnostics.add(self._diagnostic(key, offset, values, count, part, places))
 
@@ -326,26 +279,16 @@ class Source:
 
         Readers of JSON register pointers instead, with ``remember_pointers``.
 
-        Parameters
-        ----------
-        kind : str
-            ``"positions"``, ``"normals"``, ``"weights"``, ``"triangles"``, ``"bindings"``,
-            ``"joints"``, ``"channels"`` or ``"frames"``.
-        offset_of : callable
-            Called on demand; may be slow.
+        ``kind``: ``"positions"``, ``"normals"``, ``"weights"``, ``"triangles"``, ``"bindings"``,
+        ``"joints"``, ``"channels"`` or ``"frames"``.
         """
         self._offsets[kind] = self, offset_of
 
     def remember_pointers(self, skeleton: object, pointer_of: Callable[[str, int], str]) -> None:
         """Register a function that returns JSON pointers to the elements of one figure.
 
-        Parameters
-        ----------
-        skeleton : Skeleton
-            Identifies the figure, as a file may have several.
-        pointer_of : callable
-            Takes a kind, as for ``remember``, and an index; returns an empty string if there is no
-            such element.
+        ``pointer_of``: takes a kind, as for ``remember``, and an index; returns an empty string if
+        there is no such element.
         """
         self._pointers[id(skeleton)] = skeleton, pointer_of
 
@@ -401,10 +344,7 @@ def _indices(places: ArrayLike) -> Ints:
 class InvalidValueError(Exception):
     """An invalid value; the caller adds the file and the line.
 
-    Attributes
-    ----------
-    problem : Phrase
-        ``expected …, found …``.
+    ``problem``: ``expected …, found …``.
     """
 
     def __init__(self, problem: Phrase) -> None:
@@ -428,12 +368,7 @@ def without_marks(data: bytes) -> bytes:
 class LongText:
     """A text file that stays on disk; offsets are those of ``without_marks``.
 
-    Parameters
-    ----------
-    path : Path
-        A regular file; errors as in ``read_part``.
-    size : int
-        Its size in bytes.
+    ``path``: a regular file; errors as in ``read_part``. ``size``: its size in bytes.
     """
 
     __slots__ = ("_end", "_first", "_path")
@@ -467,12 +402,7 @@ def line_parts(text: bytes | LongText, length: int) -> Iterator[bytes]:
 
     A line ending is never divided.
 
-    Parameters
-    ----------
-    text : bytes or LongText
-        The text.
-    length : int
-        Size of a part in bytes, unless one of its lines is longer.
+    ``length``: size of a part in bytes, unless one of its lines is longer.
     """
     offset, rest = 0, b""
     # Reading as much as is left over keeps the cost of a long line proportional to its length.

@@ -139,15 +139,8 @@ def read_bytes(outer: Machine, data: Span) -> object:
 def read_stream(machine: Machine) -> object:
     """Return the value of a legacy stream, with its storages in place.
 
-    Parameters
-    ----------
-    machine : Machine
-        At the start of the stream; at its end afterwards.
-
-    Raises
-    ------
-    FormatError
-        If the stream is damaged, or a storage is missing or does not have the declared size.
+    Raises ``FormatError`` if the stream is damaged, or a storage is missing or does not have the
+    declared size.
     """
     if run(machine) != _NUMBER:
         raise machine.fail(Phrase("torch-magic"))

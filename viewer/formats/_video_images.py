@@ -13,28 +13,9 @@ from viewer.rig.captures.cameras import CameraImage
 class VideoImages:
     """Frames of a video as the images of one camera; the last one shown is cached.
 
-    Parameters
-    ----------
-    path : Path
-        The video.
-    first, end : float
-        Seconds of the video at which the capture begins and ends.
-    cameras : tuple of str
-        Name of the camera that has these images; may be set later.
-
-    Attributes
-    ----------
-    rate : float
-        Frames per second of the video.
-    size : (int, int)
-        Width and height of its pictures, pixels.
-
-    Raises
-    ------
-    ViewerError
-        If PyAV is not installed.
-    FormatError
-        If the file is not a readable video.
+    ``rate``: frames per second of the video. ``size``: width and height of its pictures, pixels.
+    Raises ``ViewerError`` if PyAV is not installed. Raises ``FormatError`` if the file is not a
+    readable video.
     """
 
     def __init__(self, path: Path, first: float, end: float, cameras: tuple[str, ...] = ()) -> None:

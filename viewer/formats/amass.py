@@ -89,21 +89,8 @@ def has_frames(archive: Archive) -> bool:
 def read(source: Source) -> BodyMotion:
     """Read a motion of one person.
 
-    Parameters
-    ----------
-    source : Source
-        The file; unused values are added to its warnings.
-
-    Returns
-    -------
-    BodyMotion
-        Motion that can be applied to a figure.
-
-    Raises
-    ------
-    FormatError
-        If there are no poses, arrays differ in their number of frames, or a translation
-        exceeds the limit.
+    Raises ``FormatError`` if there are no poses, arrays differ in their number of frames, or a
+    translation exceeds the limit.
     """
     archive = archive_of(source)
     found = _first_key(source, archive, _POSES)

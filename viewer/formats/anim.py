@@ -50,20 +50,7 @@ _Key = tuple[float, float, Tangent, Tangent, int]  # the last item is the key's 
 def read(source: Source) -> Clip:
     """Read a clip.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors are added to its warnings.
-
-    Returns
-    -------
-    Clip
-        Clip whose channel i moves DOF i.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar; the error has the file and line.
+    Raises ``FormatError`` if the text violates the grammar; the error has the file and line.
     """
     return _Parser(source).clip()
 
@@ -302,24 +289,9 @@ class _Parser:
 def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     """Write a clip.
 
-    Parameters
-    ----------
-    clip : Clip
-        Clip with one channel per DOF, in the order of the DOF table.
-    path : str or Path
-        Replaced only when the whole text has been written.
-
-    Returns
-    -------
-    list of Diagnostic
-        Empty: the format stores every property of a clip.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If the content is a figure, or channels are missing or in a different order.
-    OutputError
-        If the file cannot be written.
+    ``path``: replaced only when the whole text has been written. Raises ``UnsupportedFormatError``
+    if the content is a figure, or channels are missing or in a different order. Raises
+    ``OutputError`` if the file cannot be written.
     """
     if not isinstance(clip, Clip):
         raise UnsupportedFormatError(Diagnostic("F002.anim-figure"))

@@ -117,24 +117,16 @@ _KEYPOINTS = (
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One array and its origin.
-
-    Attributes
-    ----------
-    name : str
-        File name or key, for messages.
-    values : (N, columns)
-        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
-    source : Source
-        The file, which records errors.
-    offset_of : callable or None
-        Returns the offset of a row in a text file; None for archives, which have no lines.
-    """
+    """One array and its origin."""
 
     name: str
+    """File name or key, for messages."""
     values: NDArray[Any]
+    """(N, columns). Numbers; for a sparse matrix, rows of (joint, vertex, weight)."""
     source: Source
+    """The file, which records errors."""
     offset_of: Callable[[int], int] | None = None
+    """Returns the offset of a row in a text file; None for archives, which have no lines."""
 
     def offset(self, row: int) -> int | None:
         """Return the offset of a row in the file; None for archives."""
@@ -170,21 +162,9 @@ class _PigFiles:
 def read(source: Source) -> Figure:
     """Read the model.
 
-    Parameters
-    ----------
-    source : Source
-        The folder, pickle or ``.npz``; recoverable errors are added to its warnings.
-
-    Returns
-    -------
-    Figure
-        Figure with z up, in metres.
-
-    Raises
-    ------
-    FormatError
-        If the model is invalid or a required array is missing; the error has the file, and the line
-        in text files.
+    ``source``: the folder, pickle or ``.npz``; recoverable errors are added to its warnings.
+    Returns figure with z up, in metres. Raises ``FormatError`` if the model is invalid or a
+    required array is missing; the error has the file, and the line in text files.
     """
     files = _from_folder(source) if source.is_folder else _from_archive(source)
     parts = files.parts

@@ -110,20 +110,7 @@ _MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are 
 def read(source: Source) -> PoseRecord:
     """Read one pose.
 
-    Parameters
-    ----------
-    source : Source
-        The file; unknown keys are added to its warnings.
-
-    Returns
-    -------
-    PoseRecord
-        Pose that can be applied to a figure.
-
-    Raises
-    ------
-    FormatError
-        If a value is not a number, or the file has several poses.
+    Raises ``FormatError`` if a value is not a number, or the file has several poses.
     """
     head = source.peek(4096)
     if head.startswith((b"PK", b"\x80")) or is_archive(head):
@@ -383,21 +370,14 @@ def _word(named: _NamedValues, key: str, default: str) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _NamedValues:
-    """Named values of a file.
-
-    Attributes
-    ----------
-    source : Source
-        The file.
-    values : mapping of str to object
-        Numbers, strings, lists and dicts, or arrays.
-    text : str or None
-        The JSON text; None for archives, which have no lines.
-    """
+    """Named values of a file."""
 
     source: Source
+    """The file."""
     values: Mapping[str, Any]
+    """Numbers, strings, lists and dicts, or arrays."""
     text: str | None = None
+    """The JSON text; None for archives, which have no lines."""
 
     def offset(self, *path: str | int) -> int | None:
         """Return the offset of a value by the keys and indices that lead to it.
@@ -421,19 +401,7 @@ class _NamedValues:
     def array(self, key: str, kinds: str, expected: Phrase) -> NDArray[Any]:
         """Return an array of the given kinds of values, stored as an array or as lists.
 
-        Parameters
-        ----------
-        key : str
-            Key of the value.
-        kinds : str
-            Numpy's letters of the kinds: ``"iuf"``, ``"bi"`` or ``"U"``.
-        expected : Phrase
-            Description of the expected value, for the message.
-
-        Raises
-        ------
-        FormatError
-            If a value is of a different kind; the error has the line of the first such value.
+        ``kinds``: numpy's letters of the kinds: ``"iuf"``, ``"bi"`` or ``"U"``.
         """
         value = self.values.get(key)
         try:
@@ -492,14 +460,7 @@ def _is_of(one: Any, kinds: str) -> bool:
 
 
 def _parse_json(source: Source) -> _NamedValues:
-    """Return the object in a JSON file.
-
-    Raises
-    ------
-    FormatError
-        If the JSON is invalid or contains NaN, an infinity or a repeated key; the error has the
-        line.
-    """
+    """Return the object in a JSON file."""
     text = source.data.decode("utf-8", "surrogateescape")
     odd: set[str] = set()  # Python accepts these words, but JSON does not
 
@@ -564,24 +525,9 @@ def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
     """Write one pose in the format of the suffix.
 
-    Parameters
-    ----------
-    content : PoseRecord
-        Pose to write; other content is refused.
-    path : str or Path
-        ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector.
-
-    Returns
-    -------
-    list of Diagnostic
-        Empty: the formats store everything that is written to them.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If the content is not a pose.
-    OutputError
-        If the file cannot be written.
+    ``path``: ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector. Raises
+    ``UnsupportedFormatError`` if the content is not a pose. Raises ``OutputError`` if the file
+    cannot be written.
     """
     suffix = Path(path).suffix.lower()
     if not isinstance(content, PoseRecord):

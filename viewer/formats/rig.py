@@ -26,33 +26,19 @@ Words = list[re.Match[bytes]]
 
 @dataclass(frozen=True, slots=True)
 class NamedFiles:
-    """Files to open together.
-
-    Attributes
-    ----------
-    name : str
-        Name of the rig.
-    paths : tuple of Path
-        Skeleton, skin and morphs in the order of the file; not checked for existence.
-    """
+    """Files to open together."""
 
     name: str
+    """Name of the rig."""
     paths: tuple[Path, ...]
+    """Skeleton, skin and morphs in the order of the file; not checked for existence."""
 
 
 def read(source: Source) -> NamedFiles:
     """Read the names of files that belong together, without opening them.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors are added to its warnings.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar or does not specify a file; the error has the file and
-        line.
+    Raises ``FormatError`` if the text violates the grammar or does not specify a file; the error
+    has the file and line.
     """
     words = list(_WORD.finditer(source.data))
     words.reverse()

@@ -81,20 +81,9 @@ _RECORDS = "material_records"
 def read(source: Source) -> Figure:
     """Read a rigged mesh.
 
-    Parameters
-    ----------
-    source : Source
-        The archive.
-
-    Returns
-    -------
-    Figure
-        Figure with mesh, skeleton and skin; correctives are read on first use.
-
-    Raises
-    ------
-    FormatError
-        If an array is missing or has the wrong shape, or the parts do not match each other.
+    Returns figure with mesh, skeleton and skin; correctives are read on first use. Raises
+    ``FormatError`` if an array is missing or has the wrong shape, or the parts do not match each
+    other.
     """
     archive = archive_of(source)
     version = int(finite_array(archive, "viewer_rig", ()))
@@ -125,15 +114,7 @@ def read(source: Source) -> Figure:
 
 
 def _mesh(archive: Archive) -> Mesh:
-    """Return the mesh of an archive.
-
-    Raises
-    ------
-    FormatError
-        If an array is missing or invalid.
-    RigError
-        If arrays do not match each other.
-    """
+    """Return the mesh of an archive."""
     positions = finite_array(archive, "positions", (None, 3), "positions")
     listed = archive.array("triangles", (None, 3)).values()
     triangles = corners_of(archive, "triangles", listed, len(positions))
@@ -167,13 +148,7 @@ def _more_uvs(number: int) -> list[str]:
 
 
 def _materials(archive: Archive) -> tuple[Material, ...]:
-    """Return the materials of an archive.
-
-    Raises
-    ------
-    FormatError
-        If arrays do not match each other, or a record does not describe a material.
-    """
+    """Return the materials of an archive."""
     if not archive.has("material_names"):
         return ()
     names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
@@ -418,21 +393,7 @@ def _texts(archive: Archive, key: str) -> tuple[str, ...]:
 def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | None = None) -> None:
     """Write a figure with its rig.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with mesh, skeleton and skin.
-    path : str or Path
-        Target file, replaced atomically.
-    more : mapping of str to array, optional
-        Additional arrays, for other programs.
-
-    Raises
-    ------
-    RigError
-        If a part is missing.
-    OutputError
-        If the file cannot be written.
+    Raises ``RigError`` if a part is missing. Raises ``OutputError`` if the file cannot be written.
     """
     save_arrays(path, {**figure_arrays(figure), **(more or {})})
 
@@ -440,10 +401,7 @@ def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | No
 def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
     """Return the arrays of a figure by key, as stored in the file; correctives as float32.
 
-    Raises
-    ------
-    RigError
-        If the figure has no mesh, skeleton or skin.
+    Raises ``RigError`` if the figure has no mesh, skeleton or skin.
     """
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     if mesh is None or skeleton is None or skin is None:

@@ -61,20 +61,8 @@ class _Joint:
 def read(source: Source) -> Figure:
     """Read a skeleton.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors are added to its warnings.
-
-    Returns
-    -------
-    Figure
-        Figure without mesh; DOFs are clamped to their limits.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar; the error has the file and line.
+    Returns figure without mesh; DOFs are clamped to their limits. Raises ``FormatError`` if the
+    text violates the grammar; the error has the file and line.
     """
     joints = _Parser(source).joints()
     if not joints:
@@ -335,24 +323,11 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ..
 def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     """Write a figure's skeleton.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
-    path : str or Path
-        File, replaced only when the whole text has been written.
-
-    Returns
-    -------
-    list of Diagnostic
-        Empty: the format stores every property of a skeleton that it accepts.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If the format cannot store the skeleton.
-    OutputError
-        If the file cannot be written.
+    ``figure``: figure with a skeleton in depth-first order, with rotation DOFs and without rest
+    rotations. ``path``: file, replaced only when the whole text has been written. Returns empty:
+    the format stores every property of a skeleton that it accepts. Raises
+    ``UnsupportedFormatError`` if the format cannot store the skeleton. Raises ``OutputError`` if
+    the file cannot be written.
     """
     # Imported here, so that reading a skeleton does not import what only writers need.
     from viewer.media.saving import save_text

@@ -68,25 +68,10 @@ def lint_files(
     All errors for which the viewer would reject a file are recorded, and everything else in the
     file is checked if possible.
 
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        As for ``viewer.loading.load``.
-    options : LintOptions, optional
-        Thresholds of the checks.
-    settings : MotionSettings, optional
-        Settings that determine how motions are interpreted.
-    max_size : int, optional
-        Larger files, in bytes, are not read.
-    progress : callable, optional
-        As for ``lint_scene``; also called while files are read.
-
-    Returns
-    -------
-    scene : Scene
-        Contents of all files that could be opened; findings refer to its actors.
-    findings : list of Finding
-        Messages of readers, then results of checks, each with its file if known.
+    ``paths``: as for ``viewer.loading.load``. ``max_size``: larger files, in bytes, are not read.
+    ``progress``: as for ``lint_scene``; also called while files are read. Returns ``scene``:
+    contents of all files that could be opened; findings refer to its actors; ``findings``: messages
+    of readers, then results of checks, each with its file if known.
     """
     size = MAX_SIZE if max_size is None else max_size
     opened = open_files(paths, settings, size, progress)
@@ -116,16 +101,8 @@ def open_files(
 ) -> Opened:
     """Read files and assemble those that match; never fails because of their contents.
 
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        As for ``viewer.loading.load``.
-    settings : MotionSettings, optional
-        How motions are interpreted.
-    max_size : int
-        Size in bytes above which files are not read.
-    progress : callable, optional
-        Called before each file, and before each part of captures; may raise to cancel.
+    ``paths``: as for ``viewer.loading.load``. ``max_size``: size in bytes above which files are not
+    read.
     """
     opened = Opened()
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
@@ -327,15 +304,9 @@ def with_files(
 ) -> list[Finding]:
     """Return all findings without duplicate messages, and with files for those about the scene.
 
-    Parameters
-    ----------
-    opened : Opened
-        Provides the messages of readers, and the origin of the data.
-    findings : list of Finding
-        Findings about its scene, or about the scene that was checked instead.
-    checked : (Scene, sequence of Owners), optional
-        The scene that was checked instead, and for each of its actors the parts equal to opened
-        parts.
+    ``findings``: findings about its scene, or about the scene that was checked instead.
+    ``checked``: (Scene, sequence of Owners), the scene that was checked instead, and for each of
+    its actors the parts equal to opened parts.
     """
     if checked is None:
         actors = opened.scene.actors
@@ -425,14 +396,7 @@ def _with_actors(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list
 def located_in(remark: Finding, actor: Actor, part: str) -> Finding | None:
     """Return a reader's finding with its locations in an actor, or None if there are none.
 
-    Parameters
-    ----------
-    remark : Finding
-        Finding about the file from which the part was read.
-    actor : Actor
-        The actor with this part.
-    part : "mesh", "skeleton" or "clip"
-        Part of the actor.
+    ``part``: one of "mesh", "skeleton" or "clip", part of the actor.
     """
     if part == "mesh":
         return _in_mesh(remark, actor)

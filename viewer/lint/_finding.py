@@ -135,12 +135,7 @@ class Finding:
     def place(self, longest: int = 300, is_short: bool = False) -> str:
         """Return ``file:line`` or ``file#pointer``, or the known part of it.
 
-        Parameters
-        ----------
-        longest : int
-            Maximum length of the file's path.
-        is_short : bool
-            Whether the folder is omitted.
+        ``is_short``: whether the folder is omitted.
         """
         if self.file is None or self.file == Path():
             return ""

@@ -37,17 +37,6 @@ def places_of(
     """Return the positions that a finding refers to, in the current pose of the scene.
 
     Findings about frames are best viewed with the scene at ``finding.times[0]``.
-
-    Parameters
-    ----------
-    finding : Finding
-        A finding about this scene.
-    scene : Scene
-        The scene that was checked; poses may differ.
-    skinning : Skinning, optional
-        Skinning method of the displayed mesh.
-    binding : bool
-        Whether the mesh is displayed in its bind pose.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return Places()
@@ -114,20 +103,9 @@ def _middle(actor: Actor) -> Floats:
 def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> Floats:
     """Return the points of a scene that a finding refers to, in the current pose.
 
-    Parameters
-    ----------
-    finding : Finding
-        A finding about this scene.
-    scene : Scene
-        The scene that was checked.
-    places : Places, optional
-        Result of ``places_of``, if already computed.
-
-    Returns
-    -------
-    (N, 3)
-        Scene space: vertices, or else corners of triangles, or else joints; the actor's position if
-        the finding refers to none of these, or none is present; empty without an actor.
+    ``places``: result of ``places_of``, if already computed. Returns (N, 3), scene space: vertices,
+    or else corners of triangles, or else joints; the actor's position if the finding refers to none
+    of these, or none is present; empty without an actor.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return np.zeros((0, 3))

@@ -56,23 +56,10 @@ def recheck(
 
     Parts unchanged since opening are reported with file and line, edited parts without them.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene to check; not modified.
-    paths : sequence of Path
-        Files that the scene was opened from.
-    options : LintOptions, optional
-        Thresholds of the checks.
-    settings : MotionSettings, optional
-        Settings with which its motions were interpreted.
-    since : float, optional
-        Time at which it was opened, seconds since the epoch: files changed later are reported.
-    progress : callable, optional
-        As for ``lint_scene``; reading files is included.
-    is_likely : bool
-        Whether the scene may come from other files: these files are then used only if they have a
-        part in common with the scene.
+    ``scene``: scene to check; not modified. ``since``: time at which it was opened, seconds since
+    the epoch: files changed later are reported. ``progress``: as for ``lint_scene``; reading files
+    is included. ``is_likely``: whether the scene may come from other files: these files are then
+    used only if they have a part in common with the scene.
     """
     opened = open_files(paths, settings, progress=progress)
     findings = lint_scene(scene, options, progress)

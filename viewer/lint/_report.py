@@ -47,12 +47,7 @@ def finding_text(finding: Finding) -> str:
 def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
     """Return the number of findings of each severity: ``1 error, 0 warnings, 3 notes in 2 files``.
 
-    Parameters
-    ----------
-    findings : sequence of Finding
-        All findings.
-    n_files : int
-        Number of files checked; 0 if none.
+    ``n_files``: number of files checked; 0 if none.
     """
     counts = Counter(finding.severity for finding in findings)
     parts = [counted(counts[kind], kind) for kind in reversed(SEVERITIES)]
@@ -61,15 +56,7 @@ def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
 
 @as_data()
 def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
-    """Return findings as data for JSON, worded as for the command line.
-
-    Parameters
-    ----------
-    findings : sequence of Finding
-        Findings about this scene or its files.
-    scene : Scene
-        Provides joint names.
-    """
+    """Return findings as data for JSON, worded as for the command line."""
     counts = Counter(finding.severity for finding in findings)
     return {
         "findings": [_describe(finding, scene) for finding in findings],

@@ -56,23 +56,10 @@ def lint_scene(
 ) -> list[Finding]:
     """Run all checks on an open scene.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene to check; not modified.
-    options : LintOptions, optional
-        Thresholds of the checks.
-    progress : callable, optional
-        Called before every step with the number of completed steps, the total, and the next step;
-        may raise to cancel.
-    invalid : sequence of mappings, optional
-        Data of each actor that must not be checked; see ``Subject``.
-
-    Returns
-    -------
-    list of Finding
-        Findings by actor, in the order of ``CHECKS``, then findings about its figure's other
-        animations; each has its actor and locations.
+    ``scene``: scene to check; not modified. ``progress``: called before every step with the number
+    of completed steps, the total, and the next step; may raise to cancel. ``invalid``: data of each
+    actor that must not be checked; see ``Subject``. Returns findings by actor, in the order of
+    ``CHECKS``, then findings about its figure's other animations; each has its actor and locations.
     """
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
@@ -100,15 +87,7 @@ def lint_scene(
 def _checked(
     subjects: Sequence[Subject], options: LintOptions
 ) -> Iterator[tuple[Subject, list[str]]]:
-    """Yield each actor, and copies of it that play the figure's other animations, with checks.
-
-    Parameters
-    ----------
-    subjects : sequence of Subject
-        The actors of the scene.
-    options : LintOptions
-        Options for the other animations.
-    """
+    """Yield each actor, and copies of it that play the figure's other animations, with checks."""
     again = [name for name, kind in CHECKS.items() if kind.of_animations]
     known: set[int] = set()
     for subject in subjects:

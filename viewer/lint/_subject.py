@@ -84,17 +84,7 @@ class Subject:
     def valid(self, part: str, count: int) -> Bools:
         """Return which items are valid data of the file.
 
-        Parameters
-        ----------
-        part : str
-            A key of ``invalid``.
-        count : int
-            Number of items.
-
-        Returns
-        -------
-        (count,)
-            False for items whose data was replaced.
+        ``part``: a key of ``invalid``. Returns (count,), false for items whose data was replaced.
         """
         result = np.ones(count, dtype=np.bool_)
         lost = self.invalid.get(part, NO_INDICES)
@@ -346,12 +336,8 @@ class Counting:
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
     """Return a scene's frame numbering: its longest capture's, or from the earliest start.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene with or without motions.
-    keyed_rate : float
-        Frames per second if no motion consists of frames.
+    ``scene``: scene with or without motions. ``keyed_rate``: frames per second if no motion
+    consists of frames.
     """
     moving = [actor for actor in scene.actors if actor.clip is not None]
     captured = [actor for actor in moving if isinstance(actor.clip, SampledClip | PointClip)]

@@ -24,15 +24,8 @@ _ELSEWHERE = 0.01
 def are_singular(matrices: Floats) -> Bools:
     """Return which matrices are singular.
 
-    Parameters
-    ----------
-    matrices : (J, 4, 4)
-        Affine; only their linear parts are used.
-
-    Returns
-    -------
-    (J,)
-        True if the determinant is 0 relative to the product of the column lengths.
+    ``matrices``: (J, 4, 4), affine; only their linear parts are used. Returns (J,), true if the
+    determinant is 0 relative to the product of the column lengths.
     """
     linear = matrices[:, :3, :3]
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)

@@ -213,16 +213,9 @@ def _sliding(speeds: Floats, low: Bools, shortest: int, longest: int) -> Bools:
     other foot stands still. Starting and landing feet slide only for short times. A foot that stays
     low and moves for longer than any swing is dragged.
 
-    Parameters
-    ----------
-    speeds : (W, N)
-        Horizontal speeds relative to the size of the skeleton.
-    low : (W, N)
-        Windows in which feet touch the ground.
-    shortest : int
-        Number of windows that sliding lasts at least.
-    longest : int
-        Number of windows that a swing lasts at most.
+    ``speeds``: (W, N), horizontal speeds relative to the size of the skeleton. ``low``: (W, N),
+    Windows in which feet touch the ground. ``shortest``: number of windows that sliding lasts at
+    least. ``longest``: number of windows that a swing lasts at most.
     """
     rests = low & (speeds < _SLIDES)
     drifts = low & (speeds < _DRIFTS)

@@ -107,19 +107,9 @@ def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
     It is estimated from the smaller fourth differences in a window, which slow motion and jumps
     hardly change.
 
-    Parameters
-    ----------
-    positions : (F, J, 3)
-        Positions of joints.
-    present : (F,)
-        Frames that have positions; windows do not span gaps.
-    width : int
-        Length of the window, frames.
-
-    Returns
-    -------
-    (F, J)
-        In the unit of the positions; 0 where a run of frames is shorter than the window.
+    ``positions``: (F, J, 3), positions of joints. ``present``: (F,), frames that have positions;
+    windows do not span gaps. Returns (F, J), in the unit of the positions; 0 where a run of frames
+    is shorter than the window.
     """
     noise = np.zeros(positions.shape[:2])
     for first, stop in runs_of(present):

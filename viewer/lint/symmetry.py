@@ -92,19 +92,8 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
     The sum over joints of |w(v, j) - w(counterpart of v, counterpart of j)|, for weights normalised
     to a sum of 1.
 
-    Parameters
-    ----------
-    skin : Skin
-        V vertices, J joints.
-    symmetry : (V,)
-        Mirror counterpart of each vertex.
-    partners : (J,)
-        Mirror counterpart of each joint.
-
-    Returns
-    -------
-    (V,)
-        0 to 2.
+    ``symmetry``: (V,), mirror counterpart of each vertex. ``partners``: (J,), mirror counterpart of
+    each joint. Returns (V,).
     """
     whole = normalized(skin)
     vertices, joints = owners(whole), whole.joints

@@ -252,13 +252,7 @@ def _distinct(values: np.ndarray) -> np.ndarray:
 
 
 def _some_poses(actor: Actor) -> list[Pose]:
-    """Return the rest pose, the current pose, and some poses of the clip, or else random ones.
-
-    Parameters
-    ----------
-    actor : Actor
-        Actor with a skeleton.
-    """
+    """Return the rest pose, the current pose, and some poses of the clip, or else random ones."""
     figure, clip = actor.figure, actor.clip
     assert figure.skeleton is not None and actor.pose is not None  # checked by the callers
     rest = figure_pose(figure)

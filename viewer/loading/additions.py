@@ -18,26 +18,11 @@ from viewer.rig.scene import Actor
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:
     """Apply poses and images to an actor that is already open.
 
-    Parameters
-    ----------
-    contents : Contents
-        Figures and clips in it are ignored.
-    actor : Actor
-        Its pose is changed; the actor itself is replaced only if its texture changes.
-
-    Returns
-    -------
-    actor : Actor
-        A new one with the same pose, if its texture changes.
-    notes : list of Diagnostic
-        Messages about data that could not be applied exactly.
-
-    Raises
-    ------
-    FormatError
-        If a pose does not match; the actor is then unchanged.
-    RigError
-        If a texture image cannot be applied, or there is nothing to pose.
+    ``contents``: figures and clips in it are ignored. ``actor``: its pose is changed; the actor
+    itself is replaced only if its texture changes. Returns ``actor``: a new one with the same pose,
+    if its texture changes; ``notes``: messages about data that could not be applied exactly. Raises
+    ``FormatError`` if a pose does not match; the actor is then unchanged. Raises ``RigError`` if a
+    texture image cannot be applied, or there is nothing to pose.
     """
     notes: list[Diagnostic] = []
     trial = actor.copy()
@@ -63,10 +48,7 @@ def apply_pose(
 
     ``drop_excess``: see ``apply_record``.
 
-    Raises
-    ------
-    FormatError
-        If it does not match; the actor is then unchanged.
+    Raises ``FormatError`` if it does not match; the actor is then unchanged.
     """
     assert actor.pose is not None  # checked by the callers
     try:

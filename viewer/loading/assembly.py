@@ -67,25 +67,9 @@ def begin(
 ) -> tuple[Scene, list[Builder]]:
     """Create a scene that can be shown, and return the captures that are still to be read.
 
-    Parameters
-    ----------
-    contents : Contents
-        Contents of the files.
-    settings : MotionSettings, optional
-        How motions are interpreted.
-
-    Returns
-    -------
-    scene : Scene
-        Posed at the start of its motions.
-    builders : list of Builder
-        Captures whose first frames are in the scene; people who appear later are added during
-        reading.
-
-    Raises
-    ------
-    FormatError, RigError
-        See ``load``.
+    Returns ``scene``: posed at the start of its motions; ``builders``: captures whose first frames
+    are in the scene; people who appear later are added during reading. Raises ``FormatError,
+    RigError``: see ``load``.
     """
     contents = _lone_poses_as_motions(contents)
     figures = contents.figures
@@ -272,19 +256,7 @@ def _has_bare_motion(draft: SceneDraft) -> bool:
 def _animate(draft: SceneDraft, wanted: str) -> None:
     """Let actors without a motion play an animation of their file.
 
-    Parameters
-    ----------
-    draft : SceneDraft
-        The actors; their poses are computed later.
-    wanted : str
-        See ``chosen_animation``; figures of files without it keep their rest pose.
-
-    Raises
-    ------
-    RigError
-        If no file has the requested animation; every file can be shown without one.
-    FormatError
-        If the keys of a requested animation are invalid; for others, this is only a warning.
+    ``wanted``: see ``chosen_animation``; figures of files without it keep their rest pose.
     """
     from viewer.rig.motion.animation_choice import NONE, chosen_animation
 

@@ -18,15 +18,7 @@ _ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
 
 
 def has_joints(figure: Figure, names: Sequence[str]) -> bool:
-    """Return whether a figure is a body model for a motion: it has its root and most of its joints.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    names : sequence of str
-        Joints of the motion, the root first.
-    """
+    """Return whether a figure has the root and most of the joints of a body model."""
     own = set(figure.require_skeleton().names)
     return names[0] in own and sum(name in own for name in names) >= _ENOUGH * len(names)
 
@@ -38,12 +30,7 @@ def with_joints(body: Figure, names: Sequence[str]) -> Figure:
     parents. Bones without a length have no direction: the joints that they drive keep the shape
     of their own hand, and get the rotations relative to a flat one.
 
-    Parameters
-    ----------
-    body : Figure
-        Body model of the SMPL family.
-    names : sequence of str
-        Joints of the motion; those of no member of the family are ignored.
+    ``names``: joints of the motion; those of no member of the family are ignored.
     """
     skeleton = body.require_skeleton()
     own, parents = [*skeleton.names], [*skeleton.parents.tolist()]
@@ -76,18 +63,8 @@ def body_drive(
 ) -> Drive:
     """Return the motion of a body as one that drives other figures, in the world of the body.
 
-    Parameters
-    ----------
-    body : Figure
-        Body model that ``clip`` moves.
-    clip : SampledClip
-        Its motion.
-    up : "y", "z", "-y" or "-z"
-        Up axis of the motion's world, which driven figures keep.
-    joint_map : JointMap, optional
-        The requested match of joints.
-    plants_feet : bool
-        Whether feet stay planted while the feet of the body are in contact with the ground.
+    ``body``: body model that ``clip`` moves. ``up``: one of "y", "z", "-y" or "-z", up axis of the
+    motion's world, which driven figures keep.
     """
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
     return Drive(

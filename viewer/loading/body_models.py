@@ -84,19 +84,8 @@ class BodyModels:
     def choose(self, path: Path, space: ShapeSpace, joint_names: Sequence[str] = ()) -> Choice:
         """Return the figure for a body.
 
-        Parameters
-        ----------
-        path : Path
-            File of its motion, for messages.
-        space : ShapeSpace
-            Its model and gender.
-        joint_names : sequence of str
-            Joints of its motion, the root first, if they are known.
-
-        Raises
-        ------
-        FormatError
-            If the file of ``--model`` cannot be read, or is no figure.
+        ``joint_names``: joints of its motion, the root first, if they are known. Raises
+        ``FormatError`` if the file of ``--model`` cannot be read, or is no figure.
         """
         space, has_parameters = self.wanted(space), space.model == "MHR"
         named = self.named(space.gender)

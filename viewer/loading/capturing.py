@@ -130,17 +130,8 @@ class Builder:
     def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
         """Add one part to the actors.
 
-        Returns
-        -------
-        new : list of Actor
-            People who appear for the first time; posed at the start.
-        notes : list of Diagnostic
-            Messages, each reported once.
-
-        Raises
-        ------
-        RigError
-            If the bodies do not match the model.
+        Returns ``new``: people who appear for the first time; posed at the start; ``notes``:
+        messages, each reported once. Raises ``RigError`` if the bodies do not match the model.
         """
         new: list[Actor] = []
         notes = [*part.warnings]
@@ -316,10 +307,7 @@ class Builder:
     def place(self, up: str) -> None:
         """Rotate all people upright, including later ones, if the up axis is negative.
 
-        Parameters
-        ----------
-        up : "y", "z", "-y" or "-z"
-            The axis that points up in the capture.
+        ``up``: one of "y", "z", "-y" or "-z", the axis that points up in the capture.
         """
         self.up = "z" if up.endswith("z") else "y"
         for actor in self._points.values():

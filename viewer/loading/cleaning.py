@@ -40,23 +40,8 @@ _SAME = 0.25  # maximum distance between two tracks of one person, relative to t
 def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
     """Clean up the captured motions of a scene, in place, and pose it again.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene whose captures have been read completely. Clips of keys are not changed.
-    wanted : CleanUp
-        Requested changes.
-
-    Returns
-    -------
-    list of Diagnostic
-        Messages about the changes and the displacement of joints.
-
-    Raises
-    ------
-    RigError
-        If there is no captured motion, a person to be merged is missing or is a different person,
-        or no frame is in the range.
+    Raises ``RigError`` if there is no captured motion, a person to be merged is missing or is a
+    different person, or no frame is in the range.
     """
     if wanted.is_empty:
         return []
@@ -262,25 +247,7 @@ def _note(
 
 
 def _merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
-    """Join the tracks of some people, in place; the first one keeps the number.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with captured people; bodies and keypoints are joined separately.
-    people : sequence of int
-        At least two numbers of people.
-
-    Returns
-    -------
-    list of Diagnostic
-        Joined frames, and frames in which both were present.
-
-    Raises
-    ------
-    RigError
-        If there is no such person, or they are too far apart in a frame.
-    """
+    """Join the tracks of some people, in place; the first one keeps the number."""
     notes: list[Diagnostic] = []
     known = sorted({actor.person for actor in scene.actors if actor.person is not None})
     if not known:

@@ -124,22 +124,7 @@ def read_files(
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read one file and add its contents, except its warnings; see the formats for errors.
-
-    Parameters
-    ----------
-    source : Source
-        The file.
-    contents : Contents
-        Extended by the file's contents.
-    settings : MotionSettings
-        How motions are interpreted.
-
-    Returns
-    -------
-    tuple of Path
-        Other files that it refers to.
-    """
+    """Read one file and add its contents, except its warnings; see the formats for errors."""
     if _is_picture(source):
         from viewer.formats import read_picture
 
@@ -268,10 +253,7 @@ def _reader_options(settings: MotionSettings) -> dict[str, str]:
 def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
     """Return a figure textured with one image.
 
-    Raises
-    ------
-    RigError
-        If it has no texture coordinates.
+    Raises ``RigError`` if it has no texture coordinates.
     """
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None:

@@ -54,12 +54,8 @@ _SAME_RATE = 0.005  # maximum relative difference of equal frame rates, such as 
 def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> None:
     """Assign every motion to an actor, or to a new one if none matches.
 
-    Raises
-    ------
-    FormatError
-        If the model cannot be read.
-    RigError
-        If a clip matches no skeleton, or bodies or a BVH do not match the model.
+    Raises ``FormatError`` if the model cannot be read. Raises ``RigError`` if a clip matches no
+    skeleton, or bodies or a BVH do not match the model.
     """
     for path, clip in contents.clips:
         _give_clip(path, clip, draft, contents)
@@ -347,30 +343,11 @@ def filmed(
 ) -> tuple[list[CameraView], CameraImages | None, list[Diagnostic]]:
     """Return the cameras of a capture and their images, from the requested video or folder.
 
-    Parameters
-    ----------
-    capture : Capture
-        The capture. Without a camera, people in camera space get one with the size of the images.
-    views : sequence of CameraView
-        Its cameras. A camera without a size gets that of its images.
-    settings : MotionSettings
-        Provides the video or the folder of images.
-    rate : float
-        Frames per second of the capture.
-
-    Returns
-    -------
-    views : list of CameraView
-        The cameras.
-    images : CameraImages or None
-        Images of one of them.
-    notes : list of Diagnostic
-        Messages about assumptions.
-
-    Raises
-    ------
-    RigError
-        If the capture has no camera, or several of which none has the video's name.
+    ``capture``: the capture. Without a camera, people in camera space get one with the size of the
+    images. ``views``: its cameras. A camera without a size gets that of its images. ``rate``:
+    frames per second of the capture. Returns ``images``: images of one of them; ``notes``: messages
+    about assumptions. Raises ``RigError`` if the capture has no camera, or several of which none
+    has the video's name.
     """
     found = [*views]
     if settings.video is not None:

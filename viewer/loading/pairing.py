@@ -15,15 +15,8 @@ def joined_figures(
 ) -> list[tuple[tuple[int, ...], Figure]]:
     """Attach skins to their skeletons; return each figure with the indices of its parts.
 
-    Parameters
-    ----------
-    figures : sequence of (Path, Figure)
-        Figures and parts of figures, with their files.
-
-    Raises
-    ------
-    FormatError, RigError
-        If a skin does not fit its skeleton.
+    ``figures``: sequence of (Path, Figure), figures and parts of figures, with their files. Raises
+    ``FormatError, RigError`` if a skin does not fit its skeleton.
     """
     pairs = _pairs([figure for _, figure in figures])
     return [(pair, _join([figures[index] for index in pair])) for pair in pairs]

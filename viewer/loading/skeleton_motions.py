@@ -58,28 +58,8 @@ def give_skeleton_motion(
 ) -> Lone | None:
     """Apply a motion to the model, or else to the first figure that has its joint names, if any.
 
-    Parameters
-    ----------
-    path : Path
-        File of the motion, for messages.
-    motion : SkeletonMotion
-        Motion as read from the file.
-    draft : SceneDraft
-        Receives a clip, or an actor.
-    settings : MotionSettings
-        Unit, up axis, frame rate, and whether it drives a figure.
-    model : Figure or None
-        The figure to drive, a separate copy for each motion.
-
-    Returns
-    -------
-    Lone or None
-        The separate skeleton, if the motion drives no figure.
-
-    Raises
-    ------
-    RigError
-        If it does not match the model.
+    Returns the separate skeleton, if the motion drives no figure. Raises ``RigError`` if it does
+    not match the model.
     """
     motion = as_asked(motion, settings)
     for note in motion.up_notes:
@@ -148,31 +128,11 @@ def drive_somebody(
 ) -> tuple[bool, str | Diagnostic]:
     """Assign a motion to the first matching figure with a mesh and no clip, if any.
 
-    Parameters
-    ----------
-    path : Path
-        File of the motion, for messages.
-    drive : Drive
-        Motion of another skeleton.
-    draft : SceneDraft
-        The figure's actor gets the clip. If none matches, the first one keeps the drive without a
-        clip.
-    placement : (4, 4)
-        Applied to that actor.
-    among : sequence of Actor, optional
-        Actors of the draft that may be moved; all if omitted.
-
-    Returns
-    -------
-    is_driving : bool
-        Whether there is such a figure.
-    refusal : str or Diagnostic
-        Reason why the first figure does not match; empty if there is no figure.
-
-    Raises
-    ------
-    RigError
-        If no figure matches, although a joint map is given.
+    ``draft``: the figure's actor gets the clip. If none matches, the first one keeps the drive
+    without a clip. ``placement``: (4, 4), applied to that actor. ``among``: actors of the draft
+    that may be moved; all if omitted. Returns ``is_driving``: whether there is such a figure;
+    ``refusal``: reason why the first figure does not match; empty if there is no figure. Raises
+    ``RigError`` if no figure matches, although a joint map is given.
     """
     refusal: RigError | None = None
     refused: Actor | None = None
@@ -198,13 +158,8 @@ def drive_somebody(
 def model_refusal(problem: RigError, path: Path | None) -> RigError:
     """Return the error for a requested model that does not match.
 
-    Parameters
-    ----------
-    problem : RigError
-        Reason why it does not match; returned unchanged if it refers to a file, such as a joint
-        map.
-    path : Path or None
-        File of the motion.
+    ``problem``: reason why it does not match; returned unchanged if it refers to a file, such as a
+    joint map.
     """
     cause = problem.cause
     if isinstance(cause, Diagnostic) and cause.path is not None:
@@ -225,12 +180,7 @@ def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
 
     A lone skeleton, or one among others in the same unit, keeps the values of its file.
 
-    Parameters
-    ----------
-    draft : SceneDraft
-        The scene, without people who appear later; actors of scaled skeletons are replaced.
-    lone : list of Lone
-        The separate skeletons in the scene.
+    ``draft``: the scene, without people who appear later; actors of scaled skeletons are replaced.
     """
     chosen = [one for one in lone if _is_odd(one, draft.actors)]
     for one in lone:
@@ -266,21 +216,8 @@ def _is_otherwise(actor: Actor, unit: str) -> bool:
 def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
     """Return the motion of a file that was passed as a motion.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-    content : Content
-        Its contents.
-    wanted : str
-        The animation, see ``chosen_animation``.
-
-    Raises
-    ------
-    FormatError
-        If it has no motion of a skeleton.
-    RigError
-        If there is no such animation.
+    ``wanted``: the animation, see ``chosen_animation``. Raises ``FormatError`` if it has no motion
+    of a skeleton. Raises ``RigError`` if there is no such animation.
     """
     if isinstance(content, SkeletonMotion):
         return content
@@ -305,19 +242,8 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
     A skeleton that moves another figure is not shown itself. It does not move figures of its own
     file, which is a scene and not a motion. Returns whether any skeleton moves a figure.
 
-    Parameters
-    ----------
-    draft : SceneDraft
-        The actors before they play animations.
-    wanted : str
-        The animation, see ``chosen_animation``.
-    settings : MotionSettings
-        The requested match of joints, and whether feet are planted.
-
-    Raises
-    ------
-    RigError
-        If no figure matches, although a joint map is given.
+    ``wanted``: the animation, see ``chosen_animation``. Raises ``RigError`` if no figure matches,
+    although a joint map is given.
     """
     found = False
     for actor in [*draft.actors]:

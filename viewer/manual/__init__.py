@@ -41,15 +41,8 @@ _LINK = re.compile(r"\[([^\]]+)\]\((\w+)\.md\)")
 def page_text(topic: str) -> str:
     """Return a page as Markdown, without pictures, and with topics in place of links.
 
-    Parameters
-    ----------
-    topic : str
-        A key of ``PAGES``.
-
-    Raises
-    ------
-    ViewerError
-        If there is no such page; the message offers the nearest topic and lists all.
+    ``topic``: a key of ``PAGES``. Raises ``ViewerError`` if there is no such page; the message
+    offers the nearest topic and lists all.
     """
     if topic not in PAGES:
         near = did_you_mean(topic, PAGES)

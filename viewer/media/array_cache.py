@@ -86,14 +86,7 @@ def cache_use() -> tuple[int, int]:
 def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
     """Return the location of an array in the cache; None if caching is not worthwhile or disabled.
 
-    Parameters
-    ----------
-    kind : str
-        Kind of result, part of the file name; must change whenever the conversion changes.
-    data : bytes
-        A file.
-    start, end : int
-        The part of the file that the array is computed from.
+    ``kind``: kind of result, part of the file name; must change whenever the conversion changes.
     """
     if not _LEAST <= end - start <= _LARGEST // 2:
         return None
@@ -106,14 +99,7 @@ def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
 class Slot:
     """Location of one array in the cache.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the cache, which need not exist.
-    kind : str
-        Kind of result.
-    content : bytes
-        The bytes that the array is computed from.
+    ``content``: the bytes that the array is computed from.
     """
 
     __slots__ = ("_content", "path")
@@ -125,12 +111,7 @@ class Slot:
     def load(self, kind: str, n_axes: int) -> NDArray[Any] | None:
         """Return the array, which is writable; None if there is no valid entry.
 
-        Parameters
-        ----------
-        kind : "<f8" or "|u1"
-            Type of its items.
-        n_axes : int
-            Number of its axes.
+        ``kind``: either "<f8" or "|u1", type of its items.
         """
         try:
             number = os.open(self.path, _READING)
@@ -170,10 +151,7 @@ class Slot:
     def store(self, values: NDArray[Any]) -> None:
         """Store an array; failures are ignored, because the cache is optional.
 
-        Parameters
-        ----------
-        values : (...) float64 or uint8
-            At most three axes.
+        ``values``: (...) float64 or uint8, at most three axes.
         """
         values = np.ascontiguousarray(values)
         total = _HEADER.size + len(self._content) + values.nbytes

@@ -34,38 +34,23 @@ _ELLIPSIS = "…"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaptionedCell:
-    """A cell of a sheet.
-
-    Attributes
-    ----------
-    caption : str
-        Name, below the picture; shortened in the middle if it is too long.
-    pixels : (H, W, 4) uint8 or None
-        Picture; None for a cell with text.
-    text : str
-        Text in a cell without a picture; its first line is a title.
-    is_failed : bool
-        Whether the cell is marked in red.
-    """
+    """A cell of a sheet."""
 
     caption: str
+    """Name, below the picture; shortened in the middle if it is too long."""
     pixels: Bytes | None = None
+    """(H, W, 4) uint8 or None. Picture; None for a cell with text."""
     text: str = ""
+    """Text in a cell without a picture; its first line is a title."""
     is_failed: bool = False
+    """Whether the cell is marked in red."""
 
 
 def captioned_sheet(cells: Sequence[CaptionedCell]) -> Bytes:
     """Return an image of a grid of cells with an aspect ratio of about 4:3.
 
-    Parameters
-    ----------
-    cells : sequence of CaptionedCell
-        At least one. Pictures are centred; they must be at most 240 pixels wide.
-
-    Returns
-    -------
-    (H, W, 4) uint8
-        First row at the top, opaque.
+    ``cells``: at least one. Pictures are centred; they must be at most 240 pixels wide. Returns (H,
+    W, 4) uint8, first row at the top, opaque.
     """
     from PIL import Image, ImageDraw, ImageFont
 
@@ -111,15 +96,6 @@ def _draw_text(
 
 def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
     """Return text that fits, with its middle elided if it is too long.
-
-    Parameters
-    ----------
-    text : str
-        One line.
-    width : float
-        Maximum length.
-    length_of : callable
-        Returns the length of a text.
 
     >>> elided("walks/subject_07.npz", 12, len)
     'walks/…7.npz'

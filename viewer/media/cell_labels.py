@@ -15,12 +15,8 @@ _PAPER_OPACITY = 0.62
 def write_label(pixels: Bytes, text: str) -> None:
     """Write a short text on a dark translucent tag into the lower left corner of an image.
 
-    Parameters
-    ----------
-    pixels : (H, W, 4) uint8
-        Straight alpha; modified in place, unchanged if the text does not fit.
-    text : str
-        One line.
+    ``pixels``: (H, W, 4) uint8, straight alpha; modified in place, unchanged if the text does not
+    fit.
     """
     from PIL import Image, ImageDraw, ImageFont
 

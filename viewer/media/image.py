@@ -44,17 +44,7 @@ def is_picture(head: bytes) -> bool:
 def decode_picture(path: Path, data: bytes) -> Bytes:
     """Return the pixels of an image: (H, W, 4) uint8, first row at the top.
 
-    Parameters
-    ----------
-    path : Path
-        File name for errors.
-    data : bytes
-        The file.
-
-    Raises
-    ------
-    FormatError
-        If it is not a readable image.
+    Raises ``FormatError`` if it is not a readable image.
     """
     from viewer.media.array_cache import slot_of
 
@@ -86,17 +76,10 @@ def decoding_pictures(
     Small images are decoded immediately, in the calling thread, because starting threads takes
     longer.
 
-    Parameters
-    ----------
-    files : sequence of (Path, bytes)
-        File names for errors, and the files.
-
-    Yields
-    ------
-    callable
-        Waits and returns a list. Its items are the pixels, (H, W, 4) uint8, first row at the top,
-        read-only; or the FormatError of an image that is not readable, or that exceeds the number
-        of pixels allowed for all images together.
+    ``files``: sequence of (Path, bytes), file names for errors, and the files. Yields waits and
+    returns a list. Its items are the pixels, (H, W, 4) uint8, first row at the top, read-only; or
+    the FormatError of an image that is not readable, or that exceeds the number of pixels allowed
+    for all images together.
     """
     from PIL import Image
 
@@ -208,22 +191,8 @@ def _open(data: bytes) -> Image.Image:
 def save_image(path: Path, pixels: Bytes) -> int:
     """Write an image in the format of its suffix, PNG if there is no suffix.
 
-    Parameters
-    ----------
-    path : Path
-        Replaced in one step.
-    pixels : (H, W, 4) uint8
-        First row at the top.
-
-    Returns
-    -------
-    int
-        Number of bytes.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
+    ``pixels``: (H, W, 4) uint8, first row at the top. Returns number of bytes. Raises
+    ``OutputError`` if it cannot be written.
     """
     from viewer.media.saving import save_bytes
 

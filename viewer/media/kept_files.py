@@ -35,16 +35,8 @@ def load_kept(
 
     A damaged file is renamed, so that it is neither read again nor replaced.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    parse : callable
-        Converts its bytes, or raises ``ValueError`` if they are damaged.
-    usual : object
-        The default.
-    say : callable
-        Receives a message if the file cannot be used.
+    ``parse``: converts its bytes, or raises ``ValueError`` if they are damaged. ``usual``: the
+    default. ``say``: receives a message if the file cannot be used.
     """
     shown = printable(path, 300)
     try:

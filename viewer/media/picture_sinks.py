@@ -25,20 +25,6 @@ class PictureSink:
     """Writes an image for every frame, each atomically.
 
     Finished images are kept if the run is aborted.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        One path for each frame; the suffix selects the format.
-
-    Attributes
-    ----------
-    workers : int
-        Number of images that may be written at the same time.
-    n_bytes : int
-        Total size of the files written so far.
-    n_written : int
-        Number of images written so far, by several threads.
     """
 
     n_samples = 0
@@ -63,10 +49,7 @@ class PictureSink:
     def write(self, frame: int, pixels: Bytes) -> None:
         """Write one image; see ``viewer.rendering.recorder.Sink``.
 
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
+        Raises ``OutputError`` if it cannot be written.
         """
         save_image(self.paths[frame], pixels)
         self._written.append(frame)
@@ -83,34 +66,8 @@ class SheetSink:
 
     Gutters and unused cells are white, or transparent if the frames are transparent.
 
-    Parameters
-    ----------
-    path : Path
-        The suffix selects the format.
-    size : (int, int)
-        Largest width and height of the image, in pixels.
-    numbers : sequence of int
-        Number of each frame, written into its cell.
-    aspect : float
-        Preferred width / height of a cell: that of the frames' content.
-
-    Attributes
-    ----------
-    columns, rows : int
-        Number of cells across and down.
-    gutter : int
-        Pixels between cells; there is no border.
-    cell : (int, int)
-        Width and height of a cell: the size of the frames.
-    size : (int, int)
-        Width and height of the whole image.
-    n_bytes : int
-        Size of the written file.
-
-    Raises
-    ------
-    ViewerError
-        If there are too many frames for the size of the image.
+    ``size``: largest width and height of the image, in pixels. Raises ``ViewerError`` if there are
+    too many frames for the size of the image.
     """
 
     n_samples = 0
@@ -152,10 +109,7 @@ class SheetSink:
     def close(self) -> None:
         """Write the image.
 
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
+        Raises ``OutputError`` if it cannot be written.
         """
         assert self._sheet is not None  # there is at least one frame
         self.n_bytes = save_image(self.path, self._sheet)

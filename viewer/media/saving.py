@@ -36,17 +36,7 @@ def as_words(name: str) -> list[bytes] | None:
 
 
 def free_path(folder: Path, stem: str, suffix: str, data: bytes | None = None) -> Path:
-    """Return an unused path: ``fox.png``, then ``fox-2.png``, and so on.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the file.
-    stem, suffix : str
-        Stem and suffix of the name; characters special to shells become underscores.
-    data : bytes, optional
-        Content to write; a file that already has exactly this content counts as unused.
-    """
+    """Return an unused path: ``fox.png``, then ``fox-2.png``, and so on."""
     safe = file_stem(stem)
     path, number = folder / f"{safe}{suffix}", 1
     # A dangling link counts as used: writing to it would create a file elsewhere.
@@ -88,17 +78,8 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     A link is followed. A device or pipe is written to directly and never replaced, as is standard
     output, even if redirected to a file. The new file keeps the old permissions.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file to create or replace.
-    data : bytes
-        New content.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written; the message gives the path and the system's reason.
+    Raises ``OutputError`` if it cannot be written; the message gives the path and the system's
+    reason.
     """
     save_parts(path, [data])
 
@@ -108,16 +89,9 @@ def save_parts(
 ) -> None:
     """Write a file in parts, so that its content need not fit into memory; see ``save_bytes``.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    parts : iterable of bytes
-        Its content; errors of the iterable leave the file unchanged.
-    n_lines : int
-        Expected number of lines, to which reported progress refers; 0 if unknown.
-    reports : bool
-        Whether to report progress; False if the iterable does.
+    ``parts``: its content; errors of the iterable leave the file unchanged. ``n_lines``: expected
+    number of lines, to which reported progress refers; 0 if unknown. ``reports``: whether to report
+    progress; False if the iterable does.
     """
     hold()  # a signal that arrives after the rename must not turn success into failure
     poll()
@@ -149,15 +123,7 @@ def save_parts(
 class Replacement:
     """A file that a library writes by name: a temporary file next to the target, then renamed.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file to create or replace; a link is followed.
-
-    Raises
-    ------
-    OutputError
-        If it is a folder or device, or its folder does not exist.
+    Raises ``OutputError`` if it is a folder or device, or its folder does not exist.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -232,15 +198,7 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
 
     An inner block that succeeds passes its copies to the outer one, which may still fail.
 
-    Parameters
-    ----------
-    paths : iterable of Path
-        Files that the block creates or replaces.
-
-    Raises
-    ------
-    OutputError
-        If their old content cannot be copied.
+    Raises ``OutputError`` if their old content cannot be copied.
     """
     hold()  # signals must not leave copies behind
     poll()

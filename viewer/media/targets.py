@@ -26,10 +26,7 @@ def replacing_since(start: float) -> Iterator[None]:
     A run that is repeated, because its process died before it reported success, replaces its own
     outputs, but nothing that is more than a second older.
 
-    Parameters
-    ----------
-    start : float
-        Start of the first run, in seconds since 1970.
+    ``start``: start of the first run, in seconds since 1970.
     """
     token = _since.set(start - _CLOCKS)
     try:
@@ -43,22 +40,9 @@ def check_targets(
 ) -> None:
     """Refuse a run if one of its output files may not be written, before anything is written.
 
-    Parameters
-    ----------
-    files : sequence of Path
-        All files that the run writes under requested names, including companion files.
-    inputs : iterable of Path
-        All files that the run reads; a folder means all files in it.
-    force : bool
-        Whether existing files may be replaced; inputs never are.
-    hint : str
-        Advice for a file that exists.
-
-    Raises
-    ------
-    OutputError
-        For the first file that is a folder or an input, already exists, is written twice, is in a
-        folder that is missing or read-only, or is a closed standard output. Links are resolved.
+    Raises ``OutputError``: for the first file that is a folder or an input, already exists, is
+    written twice, is in a folder that is missing or read-only, or is a closed standard output.
+    Links are resolved.
     """
     opened = _Inputs(inputs)
     written: dict[_Identity, Path] = {}
@@ -77,17 +61,8 @@ def check_targets(
 def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> None:
     """Refuse to write a folder that already exists or from which input was read.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder to replace as a whole; missing parent folders are created.
-    inputs, force
-        As for ``check_targets``.
-
-    Raises
-    ------
-    OutputError
-        If the folder must not be written, or is a file.
+    ``inputs``, ``force``: as for ``check_targets``. Raises ``OutputError`` if the folder must not
+    be written, or is a file.
     """
     try:
         place = folder.resolve()

@@ -24,17 +24,8 @@ _MOST_BYTES = 256 << 20  # maximum size of a file
 def thumbnail(path: str | Path, size: tuple[int, int]) -> Bytes | None:
     """Return an image, or the middle frame of a video, reduced to fit into a box.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    size : (int, int)
-        Largest width and height, pixels. Small images are not enlarged.
-
-    Returns
-    -------
-    (H, W, 4) uint8 or None
-        First row at the top; None if the file is neither, or unreadable.
+    ``size``: largest width and height, pixels. Small images are not enlarged. Returns (H, W, 4)
+    uint8 or None, first row at the top; None if the file is neither, or unreadable.
     """
     pixels = _pixels(Path(path))
     if pixels is None:
@@ -65,10 +56,7 @@ def _pixels(path: Path) -> Bytes | None:
 def data_uri(pixels: Bytes) -> str:
     """Return an image as a data URI: JPEG, or PNG if it is transparent.
 
-    Parameters
-    ----------
-    pixels : (H, W, 4) uint8
-        First row at the top.
+    ``pixels``: (H, W, 4) uint8, first row at the top.
     """
     from PIL import Image
 

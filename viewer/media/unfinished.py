@@ -44,13 +44,7 @@ def temporary_prefix(name: str) -> str:
 
 
 def note_unfinished(path: Path) -> None:
-    """Register a temporary file; it need not be unregistered when it is renamed or removed.
-
-    Parameters
-    ----------
-    path : Path
-        Path that contains a unique part.
-    """
+    """Register a temporary file; it need not be unregistered when it is renamed or removed."""
     _unfinished.append(path)
 
 
@@ -62,15 +56,7 @@ def remove_unfinished() -> None:
 
 
 def new_prefix(folder: str | Path, name: str) -> str:
-    """Return the prefix of a new temporary file or folder, and remove those of dead processes.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Folder in which it is created. It is searched once per process.
-    name : str
-        Name of the file that is written, or of the purpose.
-    """
+    """Return the prefix of a new temporary file or folder, and remove those of dead processes."""
     folder = os.path.abspath(folder)  # noqa: PTH100
     process = os.getpid()
     if (folder, process) not in _searched:
@@ -122,13 +108,7 @@ def _is_alive(process: int) -> bool:
 
 
 def remove_leftovers(targets: Iterable[str]) -> None:
-    """Remove temporary files next to some files, left by processes that were killed.
-
-    Parameters
-    ----------
-    targets : iterable of str
-        Files that no other process is writing.
-    """
+    """Remove temporary files next to some files, left by processes that were killed."""
     folders = defaultdict[str, set[str]](set)
     for target in targets:
         folder, name = os.path.split(target)

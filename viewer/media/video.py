@@ -46,41 +46,12 @@ class VideoSink:
 
     The video is written to a temporary file next to the target, which it replaces when complete.
 
-    Parameters
-    ----------
-    path : Path
-        Output file; its suffix determines the format.
-    size : (int, int)
-        Width and height of the frames. If an odd size is not supported, the last column or row is
-        repeated.
-    rate : float
-        Frames per second. GIF frame delays are multiples of 1/100 s; they are rounded so that their
-        mean is exact.
-    quality : float
-        0 to 100; ignored for GIFs.
-    transparent : bool
-        Whether frames have transparent pixels. If the format has no alpha, frames are composited on
-        black.
-
-    Attributes
-    ----------
-    workers : int
-        1: frames are needed in order.
-    n_samples : int
-        Number of frames that should be passed to ``look`` first.
-    notes : list of str
-        Deviations from the request, one line each.
-    n_bytes : int
-        Size of the file, once it is complete.
-    encoder : str
-        FFmpeg's name of the encoder.
-
-    Raises
-    ------
-    ViewerError
-        If PyAV is not installed or lacks the encoder, or a number is out of range.
-    OutputError
-        If the target cannot be written.
+    ``n_samples``: number of frames that should be passed to ``look`` first. ``rate``: frames per
+    second. GIF frame delays are multiples of 1/100 s; they are rounded so that their mean is exact.
+    ``quality``: 0 to 100; ignored for GIFs. ``transparent``: whether frames have transparent
+    pixels. If the format has no alpha, frames are composited on black. Raises ``ViewerError`` if
+    PyAV is not installed or lacks the encoder, or a number is out of range. Raises ``OutputError``
+    if the target cannot be written.
     """
 
     def __init__(
@@ -138,11 +109,8 @@ class VideoSink:
     def write(self, frame: int, pixels: Bytes) -> None:
         """Encode one frame; frames must be passed in order.
 
-        Raises
-        ------
-        OutputError
-            If the encoder rejects the frame or the file cannot be written, and for every later
-            frame.
+        Raises ``OutputError`` if the encoder rejects the frame or the file cannot be written, and
+        for every later frame.
         """
         with self._errors():
             if self._container is None:
@@ -156,10 +124,7 @@ class VideoSink:
     def close(self) -> None:
         """Finish the video and replace the target.
 
-        Raises
-        ------
-        OutputError
-            If it cannot be finished; an existing file is then unchanged.
+        Raises ``OutputError`` if it cannot be finished; an existing file is then unchanged.
         """
         # Opened for the first frame.
         assert self._container is not None and self._output is not None
@@ -329,24 +294,7 @@ class VideoFile:
     reads freed memory. So writes always succeed for the library, and the owner of the file checks
     for an error after each step.
 
-    Parameters
-    ----------
-    path : Path
-        Existing file.
-
-    Attributes
-    ----------
-    name : str
-        Path of the file, an attribute that PyAV requires.
-    problem : OSError or None
-        First error.
-    closed : bool
-        Whether it is closed; PyAV then writes no trailer.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be opened.
+    Raises ``OSError`` if the file cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -356,6 +304,7 @@ class VideoFile:
         self._place = self._size = 0
 
     problem: OSError | None
+    """First error."""
 
     def write(self, data: bytes) -> int:
         """Write all bytes, or drop them after an error; success is reported either way."""
@@ -392,10 +341,7 @@ class VideoFile:
     def finish(self) -> None:
         """Close the file.
 
-        Raises
-        ------
-        OSError
-            The first error, possibly from closing the file.
+        Raises ``OSError``: the first error, possibly from closing the file.
         """
         self.closed = True
         try:
@@ -413,15 +359,7 @@ class VideoFile:
 
 
 class _PaletteChooser:
-    """Chooses colours by median cut over some frames (FFmpeg's ``palettegen``).
-
-    Parameters
-    ----------
-    library : module
-        PyAV.
-    size : (int, int)
-        Width and height.
-    """
+    """Chooses colours by median cut over some frames (FFmpeg's ``palettegen``)."""
 
     def __init__(self, library: ModuleType, size: tuple[int, int]) -> None:
         self._graph: Graph = library.filter.Graph()
@@ -452,16 +390,7 @@ class _PaletteChooser:
 class _PaletteUser:
     """Assigns a colour of a palette to each pixel (FFmpeg's ``paletteuse``).
 
-    Parameters
-    ----------
-    library : module
-        PyAV.
-    size : (int, int)
-        Width and height.
-    time_base : Fraction
-        Duration of a frame in seconds.
-    palette : VideoFrame
-        Result of a ``_PaletteChooser``.
+    ``time_base``: duration of a frame in seconds. ``palette``: result of a ``_PaletteChooser``.
     """
 
     def __init__(

@@ -23,18 +23,11 @@ _ON_TIME = 1e-6  # tolerance of times, seconds
 
 @dataclass(frozen=True, slots=True)
 class _Decoded:
-    """A decoded frame, which is shown from halfway after the previous one.
-
-    Attributes
-    ----------
-    begins, ends : float
-        Seconds between which it is the nearest frame.
-    frame : av.VideoFrame
-        The frame.
-    """
+    """A decoded frame, which is shown from halfway after the previous one."""
 
     begins: float
     ends: float
+    """Seconds between which it is the nearest frame."""
     frame: Any
 
 
@@ -44,26 +37,10 @@ class VideoFrames:
     Frames are decoded in the order of time. The last ones are cached; an earlier time, or one far
     ahead, is reached by seeking to the key frame before it.
 
-    Parameters
-    ----------
-    path : Path
-        The video.
-
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height of the upright picture, pixels.
-    rate : float
-        Frames per second, on average.
-    n_frames : int
-        Number of frames according to the file; 0 if unknown.
-
-    Raises
-    ------
-    ViewerError
-        If PyAV is not installed.
-    FormatError
-        If the file is not a readable video.
+    ``size``: width and height of the upright picture, pixels. ``rate``: frames per second, on
+    average. ``n_frames``: number of frames according to the file; 0 if unknown. Raises
+    ``ViewerError`` if PyAV is not installed. Raises ``FormatError`` if the file is not a readable
+    video.
     """
 
     def __init__(self, path: Path) -> None:
@@ -101,20 +78,8 @@ class VideoFrames:
     def at(self, seconds: float) -> Bytes | None:
         """Return the pixels of the frame nearest to a time; None outside the video.
 
-        Parameters
-        ----------
-        seconds : float
-            Seconds from the video's first frame.
-
-        Returns
-        -------
-        (H, W, 4) uint8 or None
-            First row at the top, upright.
-
-        Raises
-        ------
-        FormatError
-            If the file is damaged there.
+        Returns (H, W, 4) uint8 or None, first row at the top, upright. Raises ``FormatError`` if
+        the file is damaged there.
         """
         found = self._find(seconds)
         if found is None:

@@ -14,24 +14,16 @@ MOST_GIF_RATE = 50.0
 
 @dataclass(frozen=True, slots=True)
 class VideoKind:
-    """Properties of a video format.
-
-    Attributes
-    ----------
-    title : str
-        Name in menus.
-    encoders : tuple of str
-        FFmpeg's names of its encoders, best first.
-    has_alpha : bool
-        Whether it supports transparency.
-    needs_even : bool
-        Whether width and height must be even, because colours have half the resolution.
-    """
+    """Properties of a video format."""
 
     title: str
+    """Name in menus."""
     encoders: tuple[str, ...]
+    """FFmpeg's names of its encoders, best first."""
     has_alpha: bool
+    """Whether it supports transparency."""
     needs_even: bool
+    """Whether width and height must be even, because colours have half the resolution."""
     muxer: dict[str, str] = field(default_factory=dict)
 
 
@@ -52,10 +44,7 @@ VIDEOS = {
 def video_kind(path: Path) -> VideoKind:
     """Return the video format for a file's suffix.
 
-    Raises
-    ------
-    UnsupportedFormatError
-        If there is no such format; the message lists all formats.
+    Raises ``UnsupportedFormatError`` if there is no such format; the message lists all formats.
     """
     suffix = path.suffix.lower()
     if suffix not in VIDEOS:

@@ -50,12 +50,8 @@ def _folder_in(data: bytes) -> Path | None:
 def save_model_folder(folder: str | Path) -> Path:
     """Remember a folder of body models.
 
-    Raises
-    ------
-    ViewerError
-        If the path is not a folder.
-    OutputError
-        If the setting cannot be saved.
+    Raises ``ViewerError`` if the path is not a folder. Raises ``OutputError`` if the setting cannot
+    be saved.
     """
     import json
 
@@ -79,10 +75,7 @@ def save_model_folder(folder: str | Path) -> Path:
 def use_model_folder(folder: str | Path) -> str:
     """Use a folder of body models, and remember it if possible; return a message if it is not.
 
-    Raises
-    ------
-    ViewerError
-        If the path is not a folder.
+    Raises ``ViewerError`` if the path is not a folder.
     """
     global _in_use
     _in_use = None
@@ -97,15 +90,7 @@ def use_model_folder(folder: str | Path) -> str:
 def known_models(folder: Path) -> dict[str, Path]:
     """Return the models in a folder and its subfolders, by the names that select them.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder to search, a few levels deep.
-
-    Returns
-    -------
-    dict
-        ``"smplx:neutral"`` to its file; an ``.npz`` takes precedence over a ``.pkl``.
+    Returns ``"smplx:neutral"`` to its file; an ``.npz`` takes precedence over a ``.pkl``.
     """
     return _named(_files(folder))
 
@@ -143,15 +128,8 @@ def _is_npz(path: Path) -> bool:
 def find_model(name: str, folder: Path | None, gender: str = "") -> Path | None:
     """Return a model's file by its name: ``smplx:neutral``, ``smplx`` or ``SMPLX_NEUTRAL.npz``.
 
-    Parameters
-    ----------
-    name : str
-        Case-insensitive name; a kind alone refers to its model of the gender, or its neutral or
-        only model.
-    folder : Path or None
-        Model folder.
-    gender : str
-        ``"female"``, ``"male"``, ``"neutral"`` or empty.
+    ``name``: case-insensitive name; a kind alone refers to its model of the gender, or its neutral
+    or only model. ``gender``: ``"female"``, ``"male"``, ``"neutral"`` or empty.
     """
     if folder is None:
         return None
@@ -172,13 +150,9 @@ def find_model(name: str, folder: Path | None, gender: str = "") -> Path | None:
 def named_files(file: str | Path, gender: str = "") -> tuple[Path, ...]:
     """Return the files that a name selects: an existing path, a model, or a bundled figure.
 
-    Parameters
-    ----------
-    file : str or Path
-        A path, a name as for ``find_model``, ``"body"`` or ``"fox"``. Other names are returned as
-        a path that does not exist.
-    gender : str
-        Gender of a model that is selected by its kind alone, see ``find_model``.
+    ``file``: a path, a name as for ``find_model``, ``"body"`` or ``"fox"``. Other names are
+    returned as a path that does not exist. ``gender``: gender of a model that is selected by its
+    kind alone, see ``find_model``.
     """
     path = Path(file)
     # Path.exists() would raise for a name that is too long.
@@ -243,12 +217,9 @@ def models_of_kind(member: str) -> list[str]:
 def family_model(member: str, gender: str = "") -> Path | None:
     """Return MHR, or the model of a member of the SMPL family, in the remembered folder.
 
-    Parameters
-    ----------
-    member : str
-        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; for other names, None is returned.
-    gender : str
-        The preferred gender; if it is missing, the neutral or only model is returned.
+    ``member``: ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; for other names, None is
+    returned. ``gender``: the preferred gender; if it is missing, the neutral or only model is
+    returned.
     """
     kind = _KINDS.get(member)
     return None if kind is None else find_model(kind, load_model_folder(), gender)

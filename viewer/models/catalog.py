@@ -9,24 +9,16 @@ _RESEARCH = "research only"
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """Publication of a kind of body model.
-
-    Attributes
-    ----------
-    title : str
-        Name of the model.
-    about : str
-        Description of its content, in a few words.
-    licence : str
-        Short name of the licence.
-    address : str
-        Web address, or the command that adds it.
-    """
+    """Publication of a kind of body model."""
 
     title: str
+    """Name of the model."""
     about: str
+    """Description of its content, in a few words."""
     licence: str
+    """Short name of the licence."""
     address: str
+    """Web address, or the command that adds it."""
 
 
 CATALOG = {

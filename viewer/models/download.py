@@ -34,14 +34,9 @@ def pip_command(name: str, folder: str | Path) -> list[str]:
 def add_model(name: str) -> Path:
     """Download a model into the data folder and return its file.
 
-    Raises
-    ------
-    ViewerError
-        If it cannot be downloaded; the message contains pip's last line and the command.
-    OutputError
-        If the data folder cannot be written.
-    FormatError
-        If the downloaded file is not the model.
+    Raises ``ViewerError`` if it cannot be downloaded; the message contains pip's last line and the
+    command. Raises ``OutputError`` if the data folder cannot be written. Raises ``FormatError`` if
+    the downloaded file is not the model.
     """
     folder = data_folder()
     try:

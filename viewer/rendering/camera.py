@@ -36,42 +36,29 @@ _SMALLEST = 1e-9  # minimum distance, for framing a single point
 
 @dataclass(slots=True)
 class Camera:
-    """Position, orientation and projection of an orbit camera.
-
-    Attributes
-    ----------
-    target : (3,)
-        Point that the camera orbits, scene space.
-    distance : float
-        Distance from eye to target, scene units.
-    azimuth, inclination : float
-        Degrees about the up axis, and above the horizon. At 0, 0, the camera looks along -z if y is
-        up, along +y if z is up.
-    fov : float
-        Vertical field of view, degrees.
-    orthographic : bool
-        Whether the projection is parallel, with the same height at the target.
-    up : "y" or "z"
-        The scene's up axis.
-    fixed : CameraView or None
-        A calibrated camera to look through. It provides the matrices; the other fields have an
-        effect only while this field is None.
-    front : float
-        Azimuth of the front view; named views are relative to it.
-    seen : CameraView or None
-        ``fixed`` at the time and in the pose of the scene; None if it does not move.
-    """
+    """Position, orientation and projection of an orbit camera."""
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
+    """(3,). Point that the camera orbits, scene space."""
     distance: float = 3.0
+    """Distance from eye to target, scene units."""
     azimuth: float = _USUAL_AZIMUTH
     inclination: float = 15.0
+    """Degrees about the up axis, and above the horizon. At 0, 0, the camera looks along -z if y is
+    up, along +y if z is up."""
     fov: float = 35.0
+    """Vertical field of view, degrees."""
     orthographic: bool = False
+    """Whether the projection is parallel, with the same height at the target."""
     up: Literal["y", "z"] = "y"
+    """Either "y" or "z". The scene's up axis."""
     fixed: CameraView | None = None
+    """A calibrated camera to look through. It provides the matrices; the other fields have an
+    effect only while this field is None."""
     front: float = 0.0
+    """Azimuth of the front view; named views are relative to it."""
     seen: CameraView | None = None
+    """``fixed`` at the time and in the pose of the scene; None if it does not move."""
 
     def copy(self) -> Camera:
         """Return an independent copy."""
@@ -224,23 +211,11 @@ def camera_from_view(
     If ``fixed`` is reset to None, it is an upright orbit camera at the same position, with the same
     viewing direction and about the same field of view; its principal point is the image's centre.
 
-    Parameters
-    ----------
-    view : CameraView
-        Calibrated camera in scene space.
-    size : (int, int)
-        Width and height of the drawn image, pixels.
-    up : "y" or "z"
-        The scene's up axis.
-    box : (2, 3), optional
-        Bounds of the objects to orbit, scene space; the origin if omitted.
-    seen : CameraView, optional
-        The camera at the time and in the pose of the scene, from ``view_in``, if it moves.
-
-    Raises
-    ------
-    RigError
-        If the size of the camera's images is unknown.
+    ``view``: calibrated camera in scene space. ``size``: width and height of the drawn image,
+    pixels. ``up``: either "y" or "z", the scene's up axis. ``box``: (2, 3), bounds of the objects
+    to orbit, scene space; the origin if omitted. ``seen``: the camera at the time and in the pose
+    of the scene, from ``view_in``, if it moves. Raises ``RigError`` if the size of the camera's
+    images is unknown.
     """
     from viewer.rendering.pinhole import picture_size
 
@@ -276,14 +251,8 @@ def follow_view(
 
     If ``fixed`` is later reset to None, the camera continues from the current position.
 
-    Parameters
-    ----------
-    camera : Camera
-        Any camera; unless it looks through a calibrated camera that moves, it does not change.
-    size, box
-        As for ``camera_from_view``.
-    scene : Scene
-        The scene, posed at its time.
+    ``camera``: any camera; unless it looks through a calibrated camera that moves, it does not
+    change. ``size``, ``box``: as for ``camera_from_view``.
     """
     fixed = camera.fixed
     if fixed is None or (fixed.motion is None and fixed.mount is None):
@@ -298,16 +267,9 @@ def follow_view(
 def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:
     """Frame some points: aim at their centre and step back until all are visible.
 
-    Parameters
-    ----------
-    camera : Camera
-        Camera whose target and distance are modified in place.
-    points : (N, 3)
-        Points to frame, scene space.
-    aspect : float
-        Width / height of the image.
-    free_height : float
-        Fraction of the image's height to use, about its centre; 0 to 1.
+    ``camera``: camera whose target and distance are modified in place. ``points``: (N, 3), points
+    to frame, scene space. ``free_height``: fraction of the image's height to use, about its centre;
+    0 to 1.
     """
     camera.target = bounding_box(points).mean(axis=0)
     across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
@@ -335,14 +297,7 @@ def pan(camera: Camera, across: float, upward: float) -> None:
 def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
     """Scale the distance and keep the point under the pointer in place.
 
-    Parameters
-    ----------
-    camera : Camera
-        Camera whose target and distance are modified in place.
-    factor : float
-        New distance over old distance.
-    x, y : float
-        Offset of the pointer from the image's centre, right and up, in image heights.
+    ``camera``: camera whose target and distance are modified in place.
     """
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
     # At the ends of the range, the factor is 1, so the camera does not pan.

@@ -170,10 +170,7 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
 def image_notes(scene: Scene, camera: CameraView) -> list[str]:
     """Return messages about a camera's images, one line each; an empty list if it has no images.
 
-    Raises
-    ------
-    RigError
-        If the size of the camera's images is unknown.
+    Raises ``RigError`` if the size of the camera's images is unknown.
     """
     if scene.images is None:
         return []
@@ -194,10 +191,7 @@ def image_notes(scene: Scene, camera: CameraView) -> list[str]:
 def lens_notes(scene: Scene, camera: CameraView) -> list[str]:
     """Return a message about visible lens distortion, which is removed from images or neglected.
 
-    Raises
-    ------
-    RigError
-        If the size of the camera's images is unknown.
+    Raises ``RigError`` if the size of the camera's images is unknown.
     """
     error = distortion_error(camera)
     if error < _VISIBLE:

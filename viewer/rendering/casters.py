@@ -34,32 +34,22 @@ _sizes: Memo[Figure, float] = Memo()
 
 @dataclass(frozen=True, slots=True)
 class Casters:
-    """Shadow casters and occluders of one image; all their buffers are up to date.
-
-    Attributes
-    ----------
-    programs, mesh_pass, late, buffers : Programs, MeshPass, LatePasses, ActorBuffers
-        Programs and passes for drawing, and the drawn buffers.
-    meshes : Meshes
-        Surfaces.
-    actors : sequence of Actor
-        All actors of the scene.
-    options : DisplayOptions
-        Display options.
-    threshold : float
-        Actors with at most this opacity are omitted, 0 to 1. Averaged over passes with evenly
-        spread thresholds, the strength of an actor's shadow equals its opacity. Blended materials
-        cover a part of each pass's shadow map.
-    """
+    """Shadow casters and occluders of one image; all their buffers are up to date."""
 
     programs: Programs
     mesh_pass: MeshPass
     late: LatePasses
     buffers: ActorBuffers
+    """Programs and passes for drawing, and the drawn buffers."""
     meshes: Meshes
+    """Surfaces."""
     actors: Sequence[Actor]
+    """All actors of the scene."""
     options: DisplayOptions
     threshold: float = 0.5
+    """Actors with at most this opacity are omitted, 0 to 1. Averaged over passes with evenly spread
+    thresholds, the strength of an actor's shadow equals its opacity. Blended materials cover a
+    part of each pass's shadow map."""
 
     def draw(self, view: View, fragment: str) -> None:
         """Draw all shapes with a fragment shader that shows no colours."""
@@ -115,17 +105,7 @@ def _mesh_size(figure: Figure) -> float:
 def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
     """Return spheres around the drawn parts of an actor, computed from its joints alone.
 
-    Parameters
-    ----------
-    actor : Actor
-        An actor that is drawn.
-    options : DisplayOptions
-        Display options.
-
-    Returns
-    -------
-    (N, 4)
-        Centre and radius, scene space.
+    Returns (N, 4), centre and radius, scene space.
     """
     parts = []
     if shows_mesh(actor.figure, options):

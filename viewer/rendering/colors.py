@@ -162,15 +162,8 @@ def joint_palette(parents: Ints) -> Bytes:
     Neighbours of a joint are its parent, its grandparent, its siblings and its parent's siblings.
     Among the least-used colours, the one farthest from all neighbours is chosen.
 
-    Parameters
-    ----------
-    parents : (J,)
-        Index of each joint's parent, smaller than its own; -1 for a root.
-
-    Returns
-    -------
-    (J, 4) uint8
-        sRGB and alpha.
+    ``parents``: (J,), index of each joint's parent, smaller than its own; -1 for a root. Returns
+    (J, 4) uint8, sRGB and alpha.
 
     >>> joint_palette(np.array([-1, 0, 1])).shape
     (3, 4)

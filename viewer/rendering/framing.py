@@ -27,17 +27,8 @@ _N_VIEWS = 24  # number of views of a rotating camera to fit, 15 degrees apart i
 def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     """Return the points that a recording's camera should frame, from up to 32 of its frames.
 
-    Parameters
-    ----------
-    recording : Recording
-        Recording, whose camera and box are not used.
-
-    Returns
-    -------
-    points : (N, 3)
-        The outermost points of these frames, scene space; relative to the camera if it moves.
-    box : (2, 3)
-        Bounds of all points in the scene: the recording's ``box``.
+    Returns ``points``: (N, 3), the outermost points of these frames, scene space; relative to the
+    camera if it moves; ``box``: (2, 3), bounds of all points in the scene: the recording's ``box``.
     """
     follow, show = recording.follow, recording.options.show
     clouds: list[Floats] = []
@@ -71,11 +62,6 @@ def level_shifts(recording: Recording) -> Floats:
     """Return the movement of the actors over the ground up to each frame, scene units: (F, 3).
 
     A camera with these shifts shows all frames at the same scale and with the same ground line.
-
-    Parameters
-    ----------
-    recording : Recording
-        Recording, whose camera, box and shifts are not used.
     """
     scene = copied(recording.scene)
     shifts = np.zeros((recording.n_frames, 3))
@@ -95,12 +81,7 @@ def level_shifts(recording: Recording) -> Floats:
 def seen_aspect(camera: Camera, points: Floats) -> float:
     """Return the width / height of points as seen by a camera from far away.
 
-    Parameters
-    ----------
-    camera : Camera
-        Camera of which only the direction is used.
-    points : (N, 3)
-        Scene space.
+    ``camera``: camera of which only the direction is used. ``points``: (N, 3), scene space.
     """
     right, up, _ = camera_axes(camera)
     wide, high = (float(np.ptp(points @ axis)) for axis in (right, up))
@@ -132,17 +113,9 @@ def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
     Their bounding box is exact. A camera fitted to these points cuts off much less than 1 % of the
     size, because 1000 directions are 7 degrees apart; the margin of ``fit`` is 8 %.
 
-    Parameters
-    ----------
-    points : (N, 3)
-        At least one point.
-    n_directions : int
-        Number of directions; 100 are 20 degrees apart, with an error below 2 %.
-
-    Returns
-    -------
-    (M, 3)
-        A subset of at most ``n_directions + 6`` points; all points if there are no more.
+    ``points``: (N, 3), at least one point. ``n_directions``: number of directions; 100 are 20
+    degrees apart, with an error below 2 %. Returns (M, 3), a subset of at most ``n_directions + 6``
+    points; all points if there are no more.
     """
     if len(points) <= n_directions:
         return points
@@ -169,16 +142,8 @@ def _directions(count: int) -> Floats:
 def fit_turntable(camera: Camera, points: Floats, aspect: float, angle: float) -> None:
     """Fit a rotating camera so that all points stay visible; see ``viewer.rendering.camera``.
 
-    Parameters
-    ----------
-    camera : Camera
-        Changed in place: target and distance.
-    points : (N, 3)
-        Points to frame, scene space.
-    aspect : float
-        Width / height of the image.
-    angle : float
-        Rotation about the target in degrees.
+    ``camera``: changed in place: target and distance. ``points``: (N, 3), points to frame, scene
+    space. ``angle``: rotation about the target in degrees.
     """
     first, widest = camera.azimuth, 0.0
     for fraction in np.linspace(0.0, 1.0, _N_VIEWS + 1) if angle else (0.0,):
@@ -191,17 +156,8 @@ def fit_turntable(camera: Camera, points: Floats, aspect: float, angle: float) -
 def find_follow(scene: Scene, name: str) -> Follow:
     """Return the actor or joint that a camera follows.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene in the pose for which the camera was framed.
-    name : str
-        Name of an actor, joint or point, see ``follow_candidates``; the first match is used.
-
-    Raises
-    ------
-    RigError
-        If nothing has this name.
+    ``name``: name of an actor, joint or point, see ``follow_candidates``; the first match is used.
+    Raises ``RigError`` if nothing has this name.
     """
     for index, joint in follow_candidates(scene, name):
         return _followed(scene, index, joint)
@@ -211,14 +167,9 @@ def find_follow(scene: Scene, name: str) -> Follow:
 def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
     """Return all candidates for a name: indices of actors, and of a joint or point of each.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene with any number of actors.
-    name : str
-        Name of an actor, which stands for its root joint or the centre of its points; name of a
-        joint or captured point; a person's number; or a joint of an actor, such as ``fox/head`` or
-        ``1:pelvis``.
+    ``name``: name of an actor, which stands for its root joint or the centre of its points; name of
+    a joint or captured point; a person's number; or a joint of an actor, such as ``fox/head`` or
+    ``1:pelvis``.
     """
     wanted = name.lower()
     called = _called(scene)

@@ -21,17 +21,8 @@ def skin_spheres(figure: Figure, pose: Pose) -> Floats:
     A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
     it lies in the convex hull of spheres around the joints that reach their farthest vertices.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with mesh, skeleton and skin, already shaped.
-    pose : Pose
-        DOFs in lengths and radians; its placement is not applied.
-
-    Returns
-    -------
-    (N, 4)
-        Centre and radius of each joint with influence, figure space.
+    ``pose``: DOFs in lengths and radians; its placement is not applied. Returns (N, 4), centre and
+    radius of each joint with influence, figure space.
     """
     skin = figure.require_skin()
     centers, radii = _reaches.get(figure, (), lambda: _reaches_of(figure, skin))
@@ -48,15 +39,7 @@ def stretch_bounds(matrices: Floats) -> Floats:
 
     The spectral norm is at most the square root of the largest absolute row sum of M^T M.
 
-    Parameters
-    ----------
-    matrices : (..., 4, 4)
-        Affine matrices.
-
-    Returns
-    -------
-    (...)
-        Factors.
+    ``matrices``: (..., 4, 4), affine matrices. Returns (...), factors.
     """
     linear = matrices[..., :3, :3]
     products = np.abs(np.swapaxes(linear, -1, -2) @ linear)

@@ -34,15 +34,7 @@ _BLUR = 0.011  # filter radius on the ground relative to a figure's size, if pas
 
 
 class Lighting:
-    """Renderer of the maps on which the lighting depends, before each pass of an image.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the programs.
-    """
+    """Renderer of the maps on which the lighting depends, before each pass of an image."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -70,14 +62,7 @@ class Lighting:
     def begin(self, casters: Casters, up: str, box: Floats) -> None:
         """Draw the maps shared by all passes of an image.
 
-        Parameters
-        ----------
-        casters : Casters
-            The shadow casters.
-        up : str
-            The scene's up axis.
-        box : (2, 3)
-            Bounds whose lowest point is at ground level, scene space.
+        ``box``: (2, 3), bounds whose lowest point is at ground level, scene space.
         """
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options
@@ -105,18 +90,8 @@ class Lighting:
     ) -> View:
         """Draw the maps for one pass of an image; return its view with the effects.
 
-        Parameters
-        ----------
-        casters : Casters
-            The shadow casters.
-        view : View
-            The camera's matrices.
-        size : (int, int)
-            Width and height of the image, pixels.
-        sample : Sample
-            Parameters of the pass.
-        strength : float
-            Strength of shadows and occlusion, 0 to 1.
+        ``size``: width and height of the image, pixels. ``strength``: strength of shadows and
+        occlusion, 0 to 1.
         """
         options, shadow, occlusion = casters.options, None, None
         casters = replace(casters, threshold=sample.threshold)

@@ -29,17 +29,9 @@ class Offscreen:
     The context is current only while drawing, so any thread may use it, one at a time. Another
     context that was current before must be made current again (``with context:``).
 
-    Parameters
-    ----------
-    device : int, optional
-        Index of the EGL device; if omitted, each one is tried in turn.
-    graphics : Graphics, optional
-        An existing context to draw in, which ``release`` does not free.
-
-    Raises
-    ------
-    RenderError
-        If there is no usable OpenGL, with the cause and a remedy.
+    ``device``: index of the EGL device; if omitted, each one is tried in turn. ``graphics``: an
+    existing context to draw in, which ``release`` does not free. Raises ``RenderError`` if there is
+    no usable OpenGL, with the cause and a remedy.
     """
 
     def __init__(self, device: int | None = None, graphics: Graphics | None = None) -> None:
@@ -130,14 +122,7 @@ class _OfThread:
 def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> Camera:
     """Return a camera that frames the whole scene from the front, slightly left and above.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene to frame; defines the up axis.
-    size : (int, int)
-        Width and height of the image.
-    show : str
-        Drawn parts of the figures, a key of ``SHOWN``.
+    ``show``: drawn parts of the figures, a key of ``SHOWN``.
     """
     return _framing(scene, size, scene_points(scene, show))
 

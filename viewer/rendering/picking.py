@@ -43,27 +43,18 @@ _PREFERENCE = 2.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pick:
-    """The object at a pixel.
-
-    Attributes
-    ----------
-    actor : int
-        Index in the scene.
-    joint : int
-        Joint whose box was hit, otherwise -1.
-    triangle : int
-        Index in the figure's mesh, or in its reduced mesh if that is drawn; otherwise -1.
-    keypoint : int
-        Captured point or keypoint of the figure, the nearer one on a limb; otherwise -1.
-    point : (3,)
-        Hit point on the surface, scene space.
-    """
+    """The object at a pixel."""
 
     actor: int
+    """Index in the scene."""
     joint: int
+    """Joint whose box was hit, otherwise -1."""
     triangle: int
+    """Index in the figure's mesh, or in its reduced mesh if that is drawn; otherwise -1."""
     keypoint: int
+    """Captured point or keypoint of the figure, the nearer one on a limb; otherwise -1."""
     point: Floats
+    """(3,). Hit point on the surface, scene space."""
 
 
 _Found = Callable[[int, int, Floats], Pick]
@@ -71,17 +62,7 @@ _Found = Callable[[int, int, Floats], Pick]
 
 
 class PickPass:
-    """Pass that draws indices instead of colours into a few pixels, on request.
-
-    Parameters
-    ----------
-    programs : Programs
-        Provides the shader programs.
-    meshes, points : MeshPass, PointPass
-        The passes that draw the scene's surfaces and points.
-    buffers : ActorBuffers
-        The buffers uploaded for drawing.
-    """
+    """Pass that draws indices instead of colours into a few pixels, on request."""
 
     def __init__(
         self,
@@ -104,21 +85,7 @@ class PickPass:
         size: tuple[int, int],
         pixel: tuple[float, float],
     ) -> Pick | None:
-        """Return the item at a pixel, or the nearest one within three pixels.
-
-        Parameters
-        ----------
-        scene : Scene
-            The scene as drawn.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Display options.
-        size : (int, int)
-            Width and height of the image.
-        pixel : (float, float)
-            Pixels from the image's left and upper edge.
-        """
+        """Return the item at a pixel, or the nearest one within three pixels."""
         if has_joint_marks(options):
             # Dots, and bones in X-ray mode, are drawn over everything else.
             marked = joint_at(joint_marks_of(scene.actors), view, size, pixel, options.xray)

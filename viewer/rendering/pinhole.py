@@ -27,10 +27,8 @@ def picture_size(view: CameraView) -> tuple[float, float]:
     If the files do not state the size, the principal point is assumed to be the image centre:
     (W - 1) / 2 and (H - 1) / 2, because pixel coordinates begin at the centre of the first pixel.
 
-    Raises
-    ------
-    RigError
-        If the size is unknown and the principal point does not have positive coordinates.
+    Raises ``RigError`` if the size is unknown and the principal point does not have positive
+    coordinates.
     """
     if view.size is not None:
         return float(view.size[0]), float(view.size[1])
@@ -59,24 +57,9 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
     for u from K and the image's width W, x = 2 (u + 1/2) / W - 1 in -1..1. An image with a
     different aspect ratio shows all of the camera's image in its centre, with margins on two sides.
 
-    Parameters
-    ----------
-    view : CameraView
-        The camera; its distortion is ignored, see ``distortion_error``.
-    aspect : float
-        Width / height of the drawn image.
-    box : (2, 3)
-        Bounds that must lie between the near and the far plane, scene space.
-
-    Returns
-    -------
-    (4, 4)
-        OpenGL clip space, z in -1..1.
-
-    Raises
-    ------
-    RigError
-        See ``picture_size``.
+    ``view``: the camera; its distortion is ignored, see ``distortion_error``. ``box``: (2, 3),
+    bounds that must lie between the near and the far plane, scene space. Returns (4, 4), OpenGL
+    clip space, z in -1..1. Raises ``RigError``: see ``picture_size``.
     """
     width, height = picture_size(view)
     k = view.intrinsic / view.intrinsic[2, 2]
@@ -109,21 +92,9 @@ def distortion_error(view: CameraView) -> float:
     with r^2 = x^2 + y^2: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + 2
     p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged.
 
-    Parameters
-    ----------
-    view : CameraView
-        Camera with coefficients k1 k2 p1 p2 k3 k4 k5 k6, of which trailing ones may be missing;
-        the thin prism coefficients after them are ignored.
-
-    Returns
-    -------
-    float
-        Pixels; 0 without distortion.
-
-    Raises
-    ------
-    RigError
-        See ``picture_size``.
+    ``view``: camera with coefficients k1 k2 p1 p2 k3 k4 k5 k6, of which trailing ones may be
+    missing; the thin prism coefficients after them are ignored. Returns pixels; 0 without
+    distortion. Raises ``RigError``: see ``picture_size``.
     """
     k1, k2, p1, p2, k3, k4, k5, k6 = np.append(view.distortion, np.zeros(8))[:8]
     width, height = picture_size(view)

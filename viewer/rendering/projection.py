@@ -14,34 +14,21 @@ _SCALES = 0.8, 4.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projected:
-    """Projected points.
-
-    Attributes
-    ----------
-    pixels : (N, 2)
-        Position from the image's left and upper edges; arbitrary if the point is not visible.
-    depths : (N,)
-        Normalised depth, -1 at the near plane to 1 at the far plane.
-    seen : (N,) bool
-        Whether the point is in front of the eye and within the image.
-    """
+    """Projected points."""
 
     pixels: Floats
+    """(N, 2). Position from the image's left and upper edges; arbitrary if the point is not
+    visible."""
     depths: Floats
+    """(N,). Normalised depth, -1 at the near plane to 1 at the far plane."""
     seen: Bools
+    """(N,) bool. Whether the point is in front of the eye and within the image."""
 
 
 def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
     """Project points into the image: x = c_x / c_w with c = P V [p 1].
 
-    Parameters
-    ----------
-    view : View
-        The camera's matrices.
-    size : (int, int)
-        Width and height of the image, pixels.
-    points : (N, 3)
-        Scene space.
+    ``size``: width and height of the image, pixels. ``points``: (N, 3), scene space.
     """
     clip = _clip(view, points)
     in_front = clip[:, 3] > 0.0
@@ -56,21 +43,10 @@ def project_segments(
 ) -> tuple[Floats, Bools]:
     """Project segments into the image, clipped at the near plane: -c_w <= c_z.
 
-    Parameters
-    ----------
-    view : View
-        The camera's matrices.
-    size : (int, int)
-        Width and height of the image, pixels.
-    starts, ends : (N, 3)
-        Scene space.
-
-    Returns
-    -------
-    pixels : (N, 2, 2)
-        Both ends, from the image's left and upper edges; they may lie outside the image.
-    seen : (N,) bool
-        Whether any part of the segment is beyond the near plane.
+    ``size``: width and height of the image, pixels. ``starts``, ``ends``: (N, 3), scene space.
+    Returns ``pixels``: (N, 2, 2), both ends, from the image's left and upper edges; they may lie
+    outside the image; ``seen``: (N,) bool, whether any part of the segment is beyond the near
+    plane.
     """
     clips = np.stack([_clip(view, starts), _clip(view, ends)], axis=1)
     away = clips[..., 2] + clips[..., 3]
@@ -88,21 +64,9 @@ def project_segments(
 def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats) -> Floats:
     """Return the scene points at given pixels with the depths of given points.
 
-    Parameters
-    ----------
-    view : View
-        The camera's matrices.
-    size : (int, int)
-        Width and height of the image, pixels.
-    points : (N, 3)
-        Scene space, in front of the eye.
-    pixels : (N, 2)
-        From the image's left and upper edge.
-
-    Returns
-    -------
-    (N, 3)
-        Scene space: (P V)^-1 c with the points' own c_z and c_w.
+    ``size``: width and height of the image, pixels. ``points``: (N, 3), scene space, in front of
+    the eye. ``pixels``: (N, 2), from the image's left and upper edge. Returns (N, 3), scene space:
+    (P V)^-1 c with the points' own c_z and c_w.
     """
     clip = _clip(view, points)
     clip[:, 0] = (2.0 * pixels[:, 0] / size[0] - 1.0) * clip[:, 3]
@@ -114,10 +78,7 @@ def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats)
 def picture_scale(size: tuple[int, int]) -> float:
     """Return the scale of marks in an image, 1 at a height of 720 pixels.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image, pixels.
+    ``size``: width and height of the image, pixels.
     """
     return float(np.clip(min(size[1], 0.75 * size[0]) / _USUAL_HEIGHT, *_SCALES))
 

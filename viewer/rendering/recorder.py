@@ -46,54 +46,37 @@ _PATIENCE = 0.05  # seconds between steps while the sink finishes
 
 @dataclass(slots=True, eq=False)
 class Recording:
-    """Parameters of a recording.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene; its actors are copied and not modified.
-    times : (F,)
-        Scene time of each frame, seconds.
-    camera : Camera
-        Camera of the first frame.
-    size : (int, int)
-        Width and height in pixels.
-    options : DisplayOptions
-        Display options.
-    box : (2, 3) or None
-        Bounds for the ground grid and the depth range; None for the current scene's bounds.
-    moves : bool
-        Whether clips pose the actors; if False, they keep their poses, for a turntable of a still
-        pose.
-    interpolate : bool
-        Interpolate across gaps of captures.
-    turntable : float
-        Rotation of the camera about its target, degrees, from the first frame to the frame after
-        the last: 360 gives a seamless loop.
-    follow : Follow or None
-        Actor or joint that the camera follows.
-    shifts : (F, 3) or None
-        Displacement of the camera in each frame, scene units; None if it follows an actor or does
-        not move.
-    selected : (int, int)
-        Index of an actor and of its highlighted joint, as in ``Renderer.draw``.
-    annotations : callable or None
-        Returns the annotations of a frame, given the posed scene and the image's size.
-    """
+    """Parameters of a recording."""
 
     scene: Scene
+    """The scene; its actors are copied and not modified."""
     times: Floats
+    """(F,). Scene time of each frame, seconds."""
     camera: Camera
+    """Camera of the first frame."""
     size: tuple[int, int]
+    """Width and height in pixels."""
     options: DisplayOptions = field(default_factory=DisplayOptions)
     box: Floats | None = None
+    """(2, 3) or None. Bounds for the ground grid and the depth range; None for the current scene's
+    bounds."""
     moves: bool = True
+    """Whether clips pose the actors; if False, they keep their poses, for a turntable of a still
+    pose."""
     interpolate: bool = False
+    """Interpolate across gaps of captures."""
     turntable: float = 0.0
+    """Rotation of the camera about its target, degrees, from the first frame to the frame after the
+    last: 360 gives a seamless loop."""
     follow: Follow | None = None
+    """Actor or joint that the camera follows."""
     shifts: Floats | None = None
+    """(F, 3) or None. Displacement of the camera in each frame, scene units; None if it follows an
+    actor or does not move."""
     selected: tuple[int, int] = (0, -1)
+    """Index of an actor and of its highlighted joint, as in ``Renderer.draw``."""
     annotations: Callable[[Scene, tuple[int, int]], Sequence[Annotation]] | None = None
+    """Returns the annotations of a frame, given the posed scene and the image's size."""
 
     @property
     def n_frames(self) -> int:
@@ -103,21 +86,14 @@ class Recording:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Follow:
-    """The actor or joint that the camera follows at a constant distance and angle.
-
-    Attributes
-    ----------
-    actor : int
-        Index in the scene.
-    joint : int
-        Index of a joint or captured point; -1 for their centre.
-    origin : (3,)
-        Position of the joint when the camera was framed, scene space.
-    """
+    """The actor or joint that the camera follows at a constant distance and angle."""
 
     actor: int
+    """Index in the scene."""
     joint: int
+    """Index of a joint or captured point; -1 for their centre."""
     origin: Floats
+    """(3,). Position of the joint when the camera was framed, scene space."""
 
 
 class Sink(Protocol):
@@ -164,21 +140,14 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of a recording.
-
-    Attributes
-    ----------
-    done : int
-        Number of frames that have been drawn and passed to the sink.
-    total : int
-        Number of all frames.
-    seconds : float
-        Time since the first step.
-    """
+    """Progress of a recording."""
 
     done: int
+    """Number of frames that have been drawn and passed to the sink."""
     total: int
+    """Number of all frames."""
     seconds: float
+    """Time since the first step."""
 
     @property
     def left(self) -> float:
@@ -193,27 +162,9 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
     framebuffers may be bound between steps. Closing or discarding the generator before its end
     aborts the sink.
 
-    Parameters
-    ----------
-    recording : Recording
-        The recording.
-    renderer : Renderer
-        Preferably a separate renderer: buffers of other scenes are freed and must be uploaded
-        again.
-    sink : Sink
-        Receives the frames; closed after the last one, aborted on any error.
-
-    Yields
-    ------
-    Progress
-        Progress after each frame, and while the sink finishes.
-
-    Raises
-    ------
-    ViewerError
-        If the driver cannot draw an image of this size.
-    OutputError
-        If the sink cannot write.
+    ``renderer``: preferably a separate renderer: buffers of other scenes are freed and must be
+    uploaded again. Raises ``ViewerError`` if the driver cannot draw an image of this size. Raises
+    ``OutputError`` if the sink cannot write.
     """
     started, total = time.perf_counter(), recording.n_frames
     samples = np.unique(np.rint(np.linspace(0, total - 1, sink.n_samples)).astype(int)).tolist()
@@ -380,16 +331,9 @@ class Waiter:
     an encoder thread that needs the lock five times per frame would be delayed by five frames.
     ``ctypes`` releases the lock during a call, so two OpenGL functions are called through it.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use; it must be current whenever a method is called.
-
-    Attributes
-    ----------
-    is_free : bool
-        Whether other threads can run during the wait. False with versions of moderngl that do not
-        expose the functions' addresses; recording still works then, but more slowly.
+    ``is_free``: whether other threads can run during the wait. False with versions of moderngl that
+    do not expose the functions' addresses; recording still works then, but more slowly.
+    ``context``: the context in use; it must be current whenever a method is called.
     """
 
     def __init__(self, context: moderngl.Context) -> None:

@@ -59,28 +59,9 @@ if TYPE_CHECKING:
 class Renderer:
     """Owner of all programs, passes and buffers needed for drawing.
 
-    Parameters
-    ----------
-    programs : Programs
-        Programs of the context to draw in, which their owner releases.
-
-    Attributes
-    ----------
-    notes : list of str
-        Messages about limitations of the driver, one line each.
-    scalars : ScalarQuantities
-        Range and legend of the last drawn scalar quantity.
-    buffers : ActorBuffers
-        Uploaded buffers of figures and actors.
-    marks : Marks or None
-        Marks, drawn over everything except annotations and legends.
-    annotations : sequence of Annotation
-        Annotations, drawn over everything except legends.
-    ghost : Ghost or None
-        A surface drawn over the scene that is not part of it.
-    names_left_out : (int, int)
-        Number of joint names omitted from the last image for lack of room, and number of joints in
-        the image.
+    ``marks``: marks, drawn over everything except annotations and legends. ``annotations``:
+    annotations, drawn over everything except legends. ``names_left_out``: number of joint names
+    omitted from the last image for lack of room, and number of joints in the image.
     """
 
     def __init__(self, programs: Programs) -> None:
@@ -125,27 +106,13 @@ class Renderer:
     ) -> None:
         """Draw a scene.
 
-        Parameters
-        ----------
-        scene : Scene
-            The scene; actors that are hidden, or absent at this time, are omitted.
-        camera : Camera
-            The camera.
-        options : DisplayOptions
-            Display options.
-        target : Target
-            The target to draw to, which is not resolved.
-        box : (2, 3)
-            Bounds for the ground grid and the depth range, scene space: ``scene_box`` of the pose
-            in which the scene was opened.
-        selected : (int, int)
-            Index of an actor and of its highlighted joint, -1 for none. The joint is also used for
-            a scalar quantity that needs one and does not specify it.
-        passes : range, optional
-            Passes of final quality to draw now, in order from 0; all if omitted. The target shows
-            the average of the passes drawn so far.
-        strength : float
-            Strength of shadows and occlusion, 0 to 1.
+        ``scene``: the scene; actors that are hidden, or absent at this time, are omitted. ``box``:
+        (2, 3), bounds for the ground grid and the depth range, scene space: ``scene_box`` of the
+        pose in which the scene was opened. ``selected``: index of an actor and of its highlighted
+        joint, -1 for none. The joint is also used for a scalar quantity that needs one and does not
+        specify it. ``passes``: passes of final quality to draw now, in order from 0; all if
+        omitted. The target shows the average of the passes drawn so far. ``strength``: strength of
+        shadows and occlusion, 0 to 1.
         """
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
@@ -275,20 +242,7 @@ class Renderer:
     ) -> Pick | None:
         """Return the object at a pixel or within three pixels of it; None if there is none.
 
-        Parameters
-        ----------
-        scene : Scene
-            The scene as drawn.
-        camera : Camera
-            The camera.
-        options : DisplayOptions
-            Display options.
-        size : (int, int)
-            Width and height of the image, pixels.
-        x, y : float
-            Pixels from the image's left and upper edges.
-        box : (2, 3)
-            Bounds, as in ``draw``.
+        ``size``: width and height of the image, pixels. ``box``: (2, 3), bounds, as in ``draw``.
         """
         self.buffers.keep_only(scene.actors)
         return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
@@ -313,10 +267,7 @@ class Renderer:
 
         Whatever was uploaded before a failure is freed.
 
-        Raises
-        ------
-        RenderError
-            If there is not enough graphics memory.
+        Raises ``RenderError`` if there is not enough graphics memory.
         """
         with self.buffers.guard():
             prepare_meshes(self.buffers, scene.actors, DisplayOptions())

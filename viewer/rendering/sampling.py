@@ -34,24 +34,16 @@ _PATIENCE = 5.0  # drawing time in seconds above which a message states it
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One pass of an image.
-
-    Attributes
-    ----------
-    shift : (float, float)
-        Shift of the image, pixels: -0.5 to 0.5.
-    light : (float, float)
-        A point on the key light's disc, which has radius 1.
-    phase : float
-        Phase of the pattern of directions in which occluders are searched for, 0 to 1.
-    threshold : float
-        Opacity above which actors cast shadows, 0 to 1.
-    """
+    """One pass of an image."""
 
     shift: tuple[float, float] = (0.0, 0.0)
+    """Shift of the image, pixels: -0.5 to 0.5."""
     light: tuple[float, float] = (0.0, 0.0)
+    """A point on the key light's disc, which has radius 1."""
     phase: float = 0.0
+    """Phase of the pattern of directions in which occluders are searched for, 0 to 1."""
     threshold: float = 0.5
+    """Opacity above which actors cast shadows, 0 to 1."""
 
 
 def n_passes(options: DisplayOptions) -> int:
@@ -110,21 +102,8 @@ def limit_passes(
 
     The work is counted, not timed, so that an image does not depend on the machine or its load.
 
-    Parameters
-    ----------
-    options : DisplayOptions
-        Display options; modified in place if necessary.
-    scene : Scene
-        The scene to draw.
-    size : (int, int)
-        Width and height in pixels.
-    context : moderngl.Context
-        Context, which determines whether rendering is done in software.
-
-    Returns
-    -------
-    list of str
-        A message if the quality was lowered.
+    ``options``: display options; modified in place if necessary. ``size``: width and height in
+    pixels. Returns a message if the quality was lowered.
     """
     if options.quality != "final":
         return []
@@ -156,15 +135,7 @@ def limit_passes(
 
 
 def time_note(seconds: float, count: int) -> list[str]:
-    """Return a message about the time of an image that takes long.
-
-    Parameters
-    ----------
-    seconds : float
-        Measured time of one pass.
-    count : int
-        Number of passes.
-    """
+    """Return a message about the time of an image that takes long."""
     if seconds * count <= _PATIENCE:
         return []
     return [

@@ -30,30 +30,20 @@ _NOTHING_LINEAR = tuple(float(channel) for channel in decode_srgb(np.array(NOTHI
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScalarLook:
-    """Colours of a scalar quantity and parameters of its shader.
-
-    Attributes
-    ----------
-    colors : (N, 4) uint8
-        sRGB: 256 from the lowest to the highest value shown, or one per integer.
-    ends : (float, float)
-        Values of the first and the last colour.
-    is_whole : bool
-        Whether each colour represents one integer, from 0.
-    dark_zero : bool
-        Whether 0 has a separate colour, ``NOTHING``.
-    isolines : bool
-        Whether lines are drawn at every tenth of the range.
-    is_typical : bool
-        Whether the range excludes outliers, which get the colours of its ends.
-    """
+    """Colours of a scalar quantity and parameters of its shader."""
 
     colors: Bytes
+    """(N, 4) uint8. sRGB: 256 from the lowest to the highest value shown, or one per integer."""
     ends: tuple[float, float]
+    """Values of the first and the last colour."""
     is_whole: bool = False
+    """Whether each colour represents one integer, from 0."""
     dark_zero: bool = False
+    """Whether 0 has a separate colour, ``NOTHING``."""
     isolines: bool = False
+    """Whether lines are drawn at every tenth of the range."""
     is_typical: bool = False
+    """Whether the range excludes outliers, which get the colours of its ends."""
 
     @property
     def uniforms(self) -> dict[str, object]:
@@ -75,16 +65,9 @@ def is_whole(name: str) -> bool:
 def typical_span(numbers: Floats) -> tuple[float, float]:
     """Return a range that contains nearly all nonzero values.
 
-    Parameters
-    ----------
-    numbers : (V,)
-        Values of a scalar quantity.
-
-    Returns
-    -------
-    (float, float)
-        The range of the values, limited to the 99th percentile of their absolute values; with
-        fewer than a hundred nonzero values, the whole range.
+    ``numbers``: (V,), values of a scalar quantity. Returns the range of the values, limited to the
+    99th percentile of their absolute values; with fewer than a hundred nonzero values, the whole
+    range.
     """
     amounts = np.abs(numbers[numbers != 0.0])
     if not len(amounts):
@@ -101,21 +84,8 @@ def shown_ends(
 ) -> tuple[float, float]:
     """Return the common range of the colour map for all figures.
 
-    Parameters
-    ----------
-    name : str
-        Name of the quantity.
-    figure : Figure
-        Defines the unit of a requested range.
-    ranges : sequence of (float, float)
-        Lowest and highest value of each figure, or its typical range.
-    options : DisplayOptions
-        Display options with the requested range, if any.
-
-    Returns
-    -------
-    (float, float)
-        Ends in the unit of the values.
+    ``figure``: defines the unit of a requested range. ``options``: display options with the
+    requested range, if any. Returns ends in the unit of the values.
     """
     requested = options.scalar_range
     if requested is not None and not is_whole(name):
@@ -130,16 +100,7 @@ def look_of(
 ) -> ScalarLook:
     """Return the colours of a quantity on a figure.
 
-    Parameters
-    ----------
-    name : str
-        Name of the quantity.
-    figure : Figure
-        Figure, which defines the colours of its joints or parts.
-    ends : (float, float)
-        Result of ``shown_ends``.
-    options : DisplayOptions
-        Display options, for isolines and range.
+    ``ends``: result of ``shown_ends``.
     """
     quantity = find_quantity(name)
     if quantity.kind == "categorical":

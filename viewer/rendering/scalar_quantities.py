@@ -24,17 +24,7 @@ if TYPE_CHECKING:
 
 
 class ScalarQuantities:
-    """Values, colours and legend of the displayed scalar quantity, updated on demand.
-
-    Attributes
-    ----------
-    range : (float, float)
-        Lowest and highest value of the last drawn quantity, over all figures.
-    ends : (float, float)
-        Values at the ends of the colour range.
-    legend : Legend or None
-        Legend of that quantity.
-    """
+    """Values, colours and legend of the displayed scalar quantity, updated on demand."""
 
     def __init__(self) -> None:
         self.range = self.ends = 0.0, 0.0
@@ -52,17 +42,8 @@ class ScalarQuantities:
 
         Figures without the quantity are drawn with the default shading.
 
-        Parameters
-        ----------
-        values : sequence of (Actor, ScalarBuffer)
-            Drawn actors with meshes and the values on these, at least one.
-        options : DisplayOptions
-            Name of the quantity, its range and isolines.
-        selected : (Actor or None, int)
-            Actor and joint used for a quantity that needs a joint and does not specify one; -1 for
-            none.
-        figures : sequence of Figure
-            All figures of the scene, including those not drawn.
+        ``values``: sequence of (Actor, ScalarBuffer), drawn actors with meshes and the values on
+        these, at least one.
         """
         name = name_for(options.scalar, *selected)
         for actor, buffer in values:
@@ -104,17 +85,7 @@ class ScalarQuantities:
 
 
 def name_for(name: str, actor: Actor | None, joint: int) -> str:
-    """Return a quantity's name; append the selected joint if the name lacks a required joint.
-
-    Parameters
-    ----------
-    name : str
-        Name of the quantity.
-    actor : Actor or None
-        Actor with the selected joint.
-    joint : int
-        Index of the joint, -1 for none.
-    """
+    """Return a quantity's name; append the selected joint if the name lacks a required joint."""
     if actor is None or joint < 0 or ":" in name or not find_quantity(name).takes_joint:
         return name
     if actor.figure.skin is None or joint >= actor.figure.skin.n_joints:
@@ -125,31 +96,11 @@ def name_for(name: str, actor: Actor | None, joint: int) -> str:
 class ScalarBuffer:
     """Values of a scalar quantity on one actor.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    mesh : MeshBuffers
-        Provides the split vertices.
-
-    Attributes
-    ----------
-    values : moderngl.Buffer or None
-        One float32 per split vertex; None before the first computation.
-    numbers : (V,)
-        The same values per vertex of the figure.
-    range : (float, float)
-        Lowest and highest value, in the unit given in ``SCALARS``.
-    span : (float, float)
-        ``range``, or the typical range of a quantity with a robust range.
-    name : str
-        Name of the scalar quantity.
-    version : int
-        Number of computations.
-    look : ScalarLook or None
-        Colours of the values; None for a figure without the quantity.
-    is_shown : bool
-        Whether ``show`` was called.
+    ``values``: one float32 per split vertex; None before the first computation. ``numbers``: (V,),
+    the same values per vertex of the figure. ``range``: lowest and highest value, in the unit given
+    in ``SCALARS``. ``span``: ``range``, or the typical range of a quantity with a robust range.
+    ``look``: colours of the values; None for a figure without the quantity. ``is_shown``: whether
+    ``show`` was called.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers) -> None:
@@ -166,14 +117,8 @@ class ScalarBuffer:
     def update(self, name: str, pose: Pose | None, skinning: Skinning) -> None:
         """Compute a scalar quantity if its inputs changed.
 
-        Parameters
-        ----------
-        name : str
-            A key of ``SCALARS``, with a joint if the quantity needs one. Missing values are 0.
-        pose : Pose or None
-            None for the mesh in its bind pose.
-        skinning : Skinning
-            Skinning of the drawn mesh.
+        ``name``: a key of ``SCALARS``, with a joint if the quantity needs one. Missing values are
+        0. ``pose``: none for the mesh in its bind pose.
         """
         from viewer.rendering.scalar_look import typical_span
 

@@ -27,30 +27,20 @@ FILTER_RADIUS = 3.5
 
 @dataclass(frozen=True, slots=True)
 class Shadow:
-    """The key light's shadow map.
-
-    Attributes
-    ----------
-    texture : moderngl.Texture
-        Depths as seen from the light.
-    matrix : (4, 4)
-        Maps scene space to coordinates in the map, 0 to 1 on all axes.
-    texel : float
-        Side of a texel, scene units.
-    strength : float
-        Fraction of the light that a shadow removes, 0 to 1.
-    angle : float
-        Rotation of the filter's pattern, radians.
-    blur : float
-        Radius of the filter on the ground, scene units; never less than the radius on surfaces.
-    """
+    """The key light's shadow map."""
 
     texture: moderngl.Texture
+    """Depths as seen from the light."""
     matrix: Floats
+    """(4, 4). Maps scene space to coordinates in the map, 0 to 1 on all axes."""
     texel: float
+    """Side of a texel, scene units."""
     strength: float
+    """Fraction of the light that a shadow removes, 0 to 1."""
     angle: float = 0.0
+    """Rotation of the filter's pattern, radians."""
     blur: float = 0.0
+    """Radius of the filter on the ground, scene units; never less than the radius on surfaces."""
 
     def filter(self, is_ground: bool = False) -> tuple[float, float]:
         """Return the filter's radius, relative to the map's width, as a vector at its angle."""
@@ -61,18 +51,12 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class Occlusion:
-    """The ambient light that reaches each pixel.
-
-    Attributes
-    ----------
-    texture : moderngl.Texture
-        Fraction of the light, and depth in camera space, at half of the image's resolution.
-    strength : float
-        Strength of the occlusion, 0 to 1.
-    """
+    """The ambient light that reaches each pixel."""
 
     texture: moderngl.Texture
+    """Fraction of the light, and depth in camera space, at half of the image's resolution."""
     strength: float
+    """Strength of the occlusion, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +144,7 @@ def normal_matrix(linear: Floats) -> Floats:
     A singular matrix, which flattens a mesh or shrinks it to a point, has no inverse. Its
     cofactors, the determinant times the inverse transpose, still transform normals.
 
-    Parameters
-    ----------
-    linear : (3, 3)
-        Transforms positions.
+    ``linear``: (3, 3), transforms positions.
     """
     if np.linalg.det(linear) != 0.0:
         found: Floats = np.linalg.inv(linear).T.astype(np.float64, copy=False)

@@ -47,19 +47,8 @@ def prepare_meshes(
 ) -> Meshes:
     """Upload the buffers of the actors' meshes, without skinning posed buffers.
 
-    Parameters
-    ----------
-    buffers : ActorBuffers
-        Buffers of the scene; missing ones are added.
-    actors : sequence of Actor
-        Actors; those without a mesh are ignored.
-    options : DisplayOptions
-        Display options.
-
-    Raises
-    ------
-    RenderError
-        If there is not enough graphics memory.
+    ``actors``: actors; those without a mesh are ignored. Raises ``RenderError`` if there is not
+    enough graphics memory.
     """
     meshes = Meshes()
     actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
@@ -82,17 +71,7 @@ def prepare_meshes(
 def update_meshes(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
 ) -> Meshes:
-    """Skin changed meshes before drawing; a framebuffer must be bound.
-
-    Parameters
-    ----------
-    buffers : ActorBuffers
-        Buffers of the scene; missing ones are added.
-    actors : sequence of Actor
-        Actors of a scene.
-    options : DisplayOptions
-        Display options.
-    """
+    """Skin changed meshes before drawing; a framebuffer must be bound."""
     meshes = prepare_meshes(buffers, [actor for actor in actors if actor.is_drawn], options)
     for actor, mesh in meshes.singles:
         pose = None if options.show == "binding" else actor.pose
@@ -104,17 +83,7 @@ def update_meshes(
 def update_skeletons(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
 ) -> None:
-    """Upload the joint matrices of all drawn skeletons that moved, computed per figure.
-
-    Parameters
-    ----------
-    buffers : ActorBuffers
-        Buffers of the scene; missing ones are added.
-    actors : sequence of Actor
-        Actors of a scene.
-    options : DisplayOptions
-        Display options.
-    """
+    """Upload the joint matrices of all drawn skeletons that moved, computed per figure."""
     groups: dict[tuple[int, bytes], list[tuple[Actor, Pose]]] = {}
     for actor in actors:
         pose = actor.pose

@@ -11,18 +11,12 @@ from viewer.rig.arrays import Floats, Ints, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyParts:
-    """The body part of every vertex.
-
-    Attributes
-    ----------
-    names : tuple of P str
-        Names of the parts; a part may have no vertices.
-    of_vertex : (V,) int32
-        Index into ``names``.
-    """
+    """The body part of every vertex."""
 
     names: tuple[str, ...]
+    """Names of the parts; a part may have no vertices."""
     of_vertex: Ints
+    """(V,) int32. Index into ``names``."""
 
     def __post_init__(self) -> None:
         values = frozen("of_vertex", self.of_vertex, (None,), np.int32)
@@ -36,24 +30,16 @@ class BodyParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keypoints:
-    """Named points, each attached to a joint or to a point on a triangle.
-
-    Attributes
-    ----------
-    names : tuple of N str
-        Standard names.
-    joints : (N,) int32
-        Joint of each keypoint, -1 for a point on the mesh.
-    vertices : (N, 3) int32
-        Corners of the triangle; ignored for keypoints on a joint.
-    weights : (N, 3)
-        Barycentric coordinates in that triangle.
-    """
+    """Named points, each attached to a joint or to a point on a triangle."""
 
     names: tuple[str, ...]
+    """Standard names."""
     joints: Ints
+    """(N,) int32. Joint of each keypoint, -1 for a point on the mesh."""
     vertices: Ints
+    """(N, 3) int32. Corners of the triangle; ignored for keypoints on a joint."""
     weights: Floats
+    """(N, 3). Barycentric coordinates in that triangle."""
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -65,18 +51,12 @@ class Keypoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedMesh:
-    """A coarser level of detail that uses a subset of the vertices.
-
-    Attributes
-    ----------
-    vertices : (R,) int32
-        Indices into the figure's vertices.
-    triangles : (T, 3) int32
-        Indices into ``vertices``.
-    """
+    """A coarser level of detail that uses a subset of the vertices."""
 
     vertices: Ints
+    """(R,) int32. Indices into the figure's vertices."""
     triangles: Ints
+    """(T, 3) int32. Indices into ``vertices``."""
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -92,27 +72,18 @@ class ReducedMesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexField:
-    """A precomputed value per vertex, such as a distance or a confidence.
-
-    Attributes
-    ----------
-    name : str
-        Identifier without spaces, for the command line.
-    title : str
-        Label in menus and the legend.
-    values : (V,)
-        In ``unit``, or indices into ``names``.
-    unit : str
-        ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
-    names : tuple of str
-        Names of the classes if the values are indices.
-    """
+    """A precomputed value per vertex, such as a distance or a confidence."""
 
     name: str
+    """Identifier without spaces, for the command line."""
     title: str
+    """Label in menus and the legend."""
     values: Floats
+    """(V,). In ``unit``, or indices into ``names``."""
     unit: str = ""
+    """``"length"`` for figure units, otherwise the unit's name; empty if dimensionless."""
     names: tuple[str, ...] = ()
+    """Names of the classes if the values are indices."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", frozen("values", self.values, (None,)))
@@ -128,19 +99,8 @@ class VertexField:
 def keypoint_positions(keypoints: Keypoints, vertices: Floats, joints: Floats) -> Floats:
     """Return the positions of keypoints: their joints, or sum_k b_k v_k of triangle corners.
 
-    Parameters
-    ----------
-    keypoints : Keypoints
-        N keypoints.
-    vertices : (V, 3)
-        Posed vertices.
-    joints : (J, 3)
-        Posed joints, in the same space.
-
-    Returns
-    -------
-    (N, 3)
-        Positions in that space.
+    ``vertices``: (V, 3), posed vertices. ``joints``: (J, 3), posed joints, in the same space.
+    Returns (N, 3), positions in that space.
     """
     placed = np.einsum("nk,nka->na", keypoints.weights, vertices[keypoints.vertices])
     at_joint = keypoints.joints >= 0

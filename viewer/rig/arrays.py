@@ -22,22 +22,9 @@ Bytes = NDArray[np.uint8]
 class Deferred:
     """An array in a file, read on first use and then cached.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Shape declared by the file.
-    dtype : dtype
-        Element type declared by the file.
-    load : callable
-        Reads the array; called once; may raise a ``FormatError``.
-    blocks : callable, optional
-        Yields the array in blocks of a given number of rows, each valid until the next one, without
-        reading it as a whole; may raise a ``FormatError``.
-
-    Attributes
-    ----------
-    is_loaded : bool
-        Whether the values are in memory.
+    ``load``: reads the array; called once; may raise a ``FormatError``. ``blocks``: yields the
+    array in blocks of a given number of rows, each valid until the next one, without reading it as
+    a whole; may raise a ``FormatError``.
     """
 
     __slots__ = ("_by_blocks", "_load", "_values", "dtype", "shape")
@@ -61,10 +48,8 @@ class Deferred:
     def values(self) -> NDArray[Any]:
         """Return the array, read-only.
 
-        Raises
-        ------
-        FormatError
-            If the file can no longer be read, or its contents contradict its declaration.
+        Raises ``FormatError`` if the file can no longer be read, or its contents contradict its
+        declaration.
         """
         if self._values is None:
             values = self._load()
@@ -87,22 +72,9 @@ def frozen(
 ) -> NDArray[Any]:
     """Return a read-only copy of ``values`` of the given shape and type.
 
-    Parameters
-    ----------
-    name : str
-        Name of the array in error messages.
-    values : array-like of ``shape``
-        Copied if its memory can still be modified.
-    shape : tuple
-        Required shape; ``None`` allows any length of an axis.
-    dtype : dtype
-        Required element type.
-
-    Raises
-    ------
-    RigError
-        If the shape differs, a number is not finite, or an integer type is required and a value has
-        a fraction.
+    ``values``: copied if its memory can still be modified. ``shape``: required shape; ``None``
+    allows any length of an axis. Raises ``RigError`` if the shape differs, a number is not finite,
+    or an integer type is required and a value has a fraction.
 
     >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
     False

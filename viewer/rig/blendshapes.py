@@ -40,45 +40,33 @@ class ShapeSpace(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlendShapes:
-    """Per-vertex offsets of the rest mesh, scaled by weights: v = v_rest + sum_s w_s d_s.
-
-    Attributes
-    ----------
-    names : tuple of S str
-        Labels, which may repeat: blend shapes are identified by index.
-    offsets : (S, V, 3), or Deferred
-        Figure units per unit of weight; read from the file when a weight first becomes non-zero.
-    groups : tuple of S str
-        Group of each blend shape: ``"shape"`` (a weight of 1 is one standard deviation),
-        ``"expression"``, or ``"morph"`` (a weight of 1 is the target itself).
-    normal_offsets : (S, V, 3), or Deferred, or None
-        Offsets of the rest normals per unit of weight; None if the normals are recomputed from
-        the changed surface.
-    rest_weights : (S,) or None
-        Weights of the pose stored in the file; None if all are 0.
-    rules : ExpressionRules or None
-        Rules by which expressions modify each other's weights; None if they do not.
-    space : ShapeSpace or None
-        Computes the displacement if it is not the sum of the offsets; the offsets are then the
-        displacements by each weight of 1 alone.
-    origins : (S,) or None
-        Value that a slider shows at weight 0; None if all are 0.
-    ranges : (S, 2) or None
-        Smallest and largest value of each slider; None for the default range of its group.
-    material_binds : MaterialBinds or None
-        Properties of materials that the weights change; None if there are none.
-    """
+    """Per-vertex offsets of the rest mesh, scaled by weights: v = v_rest + sum_s w_s d_s."""
 
     names: tuple[str, ...]
+    """Labels, which may repeat: blend shapes are identified by index."""
     offsets: Floats | Deferred
+    """(S, V, 3), or Deferred. Figure units per unit of weight; read from the file when a weight
+    first becomes non-zero."""
     groups: tuple[str, ...] = ()
+    """Group of each blend shape: ``"shape"`` (a weight of 1 is one standard deviation),
+    ``"expression"``, or ``"morph"`` (a weight of 1 is the target itself)."""
     normal_offsets: Floats | Deferred | None = None
+    """(S, V, 3), or Deferred, or None. Offsets of the rest normals per unit of weight; None if the
+    normals are recomputed from the changed surface."""
     rest_weights: Floats | None = None
+    """(S,) or None. Weights of the pose stored in the file; None if all are 0."""
     rules: ExpressionRules | None = None
+    """Rules by which expressions modify each other's weights; None if they do not."""
     space: ShapeSpace | None = None
+    """Computes the displacement if it is not the sum of the offsets; the offsets are then the
+    displacements by each weight of 1 alone."""
     origins: Floats | None = None
+    """(S,) or None. Value that a slider shows at weight 0; None if all are 0."""
     ranges: Floats | None = None
+    """(S, 2) or None. Smallest and largest value of each slider; None for the default range of its
+    group."""
     material_binds: MaterialBinds | None = None
+    """Properties of materials that the weights change; None if there are none."""
 
     def __post_init__(self) -> None:
         for name, size in (("origins", ()), ("ranges", (2,))):
@@ -203,19 +191,13 @@ class BlendShapes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correctives:
-    """Pose-dependent offsets of body models: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9).
-
-    Attributes
-    ----------
-    offsets : (P, V, 3), or Deferred
-        Figure units per unit of weight.
-    feature : Feature or None
-        Computes the weights of a pose; None for SMPL's weights, ``corrective_weights``, which are
-        nine for each joint except the root.
-    """
+    """Pose-dependent offsets of body models: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9)."""
 
     offsets: Floats | Deferred
+    """(P, V, 3), or Deferred. Figure units per unit of weight."""
     feature: Feature | None = None
+    """Computes the weights of a pose; None for SMPL's weights, ``corrective_weights``, which are
+    nine for each joint except the root."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
@@ -261,15 +243,7 @@ class Correctives:
     def displacement(self, weights: Floats) -> Floats:
         """Return sum_p c_p d_p, skipping joints without rotation.
 
-        Parameters
-        ----------
-        weights : (P,)
-            From ``viewer.rig.shape.pose_weights``.
-
-        Returns
-        -------
-        (V, 3)
-            Figure units.
+        ``weights``: (P,), from ``viewer.rig.shape.pose_weights``. Returns (V, 3), figure units.
         """
         if isinstance(self.offsets, SparseOffsets) and weights.any():
             found = self.offsets.total(weights)
@@ -299,44 +273,27 @@ def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
 def corrective_weights(rotations: Floats) -> Floats:
     """Return the weights of the correctives: the nine entries of R - I of each non-root joint.
 
-    Parameters
-    ----------
-    rotations : (J, 3, 3)
-        Rotation of each joint relative to its parent.
-
-    Returns
-    -------
-    (9 (J - 1),)
-        Nine entries per joint, row by row.
+    ``rotations``: (J, 3, 3), rotation of each joint relative to its parent.
     """
     return (rotations[1:] - np.eye(3)).reshape(-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRegressor:
-    """Rest joints as weighted sums of rest vertices, J_j = b_j + sum_v r_jv v.
-
-    Attributes
-    ----------
-    n_joints : int
-        J.
-    joints, vertices : (N,) int32
-        Row and column of each entry of the sparse (J, V) matrix.
-    weights : (N,)
-        Value of each entry.
-    axes : (N, 2) int32 or None
-        Coordinates (0 to 2) of the joint and of the vertex that an entry connects; None if each
-        entry applies to all three coordinates.
-    bias : (J, 3) or None
-        Constants b; None if all are 0.
-    """
+    """Rest joints as weighted sums of rest vertices, J_j = b_j + sum_v r_jv v."""
 
     n_joints: int
+    """J."""
     joints: Ints
     vertices: Ints
+    """(N,) int32. Row and column of each entry of the sparse (J, V) matrix."""
     weights: Floats
+    """(N,). Value of each entry."""
     axes: Ints | None = None
+    """(N, 2) int32 or None. Coordinates (0 to 2) of the joint and of the vertex that an entry
+    connects; None if each entry applies to all three coordinates."""
     bias: Floats | None = None
+    """(J, 3) or None. Constants b; None if all are 0."""
 
     def __post_init__(self) -> None:
         if self.axes is not None:
@@ -357,17 +314,7 @@ class JointRegressor:
 def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
     """Return the joints of a rest mesh.
 
-    Parameters
-    ----------
-    regressor : JointRegressor
-        Joint regressor with J rows.
-    positions : (V, 3)
-        Rest vertices, figure units.
-
-    Returns
-    -------
-    (J, 3)
-        Figure units.
+    ``positions``: (V, 3), rest vertices, figure units. Returns (J, 3), figure units.
     """
     bias = np.zeros(3) if regressor.bias is None else regressor.bias
     if regressor.axes is not None:

@@ -17,16 +17,8 @@ _MOST_SIGMA = 1e6  # largest plausible coefficient, standard deviations
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
     """Return a message about coefficients that a figure does not have, unless they are all 0.
 
-    Parameters
-    ----------
-    group : str
-        ``"shape"`` or ``"expression"``.
-    values : (..., S)
-        All coefficients of the group in the record.
-    used : int
-        Number of coefficients that the figure has.
-    name : str
-        Name of the figure.
+    ``group``: ``"shape"`` or ``"expression"``. ``values``: (..., S), all coefficients of the group
+    in the record.
     """
     rest, count = values[..., used:], values.shape[-1]
     if not rest.any():
@@ -63,28 +55,11 @@ def apply_coefficients(
 ) -> list[Diagnostic]:
     """Set the weights of one group of blend shapes in place; other weights of the group become 0.
 
-    Parameters
-    ----------
-    group : str
-        ``"shape"`` or ``"expression"``.
-    values : (N,) or None
-        Coefficients of the group's first shapes; None leaves the weights unchanged.
-    figure : Figure
-        Figure with or without blend shapes.
-    pose : Pose
-        Modified in place.
-    cut : bool
-        Ignore coefficients that the figure does not have, instead of raising an error.
-
-    Returns
-    -------
-    list of Diagnostic
-        Messages about ignored coefficients.
-
-    Raises
-    ------
-    RigError
-        If there are too many coefficients, or one is implausibly large.
+    ``group``: ``"shape"`` or ``"expression"``. ``values``: (N,) or None, coefficients of the
+    group's first shapes; None leaves the weights unchanged. ``figure``: figure with or without
+    blend shapes. ``pose``: modified in place. ``cut``: ignore coefficients that the figure does not
+    have, instead of raising an error. Returns messages about ignored coefficients. Raises
+    ``RigError`` if there are too many coefficients, or one is implausibly large.
     """
     if values is None or len(values) == 0:
         return []

@@ -44,27 +44,19 @@ _STRAIGHT = 1e-9  # sine of the largest angle of a transform without rotation
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpressionRules:
-    """Rules that compute the displayed weights of expressions.
-
-    Attributes
-    ----------
-    rows : (E,) int32
-        Blend shape of each expression.
-    is_binary : (E,) bool
-        Whether it is always either fully on or off.
-    kinds : (E,) int32
-        Index into ``PROCEDURAL``, -1 for other expressions.
-    overrides : (E, 3) int32
-        Effect on each kind of ``PROCEDURAL``: index into ``OVERRIDES``.
-    presets : tuple of str, (E,)
-        Name in VRM 1.0 of each expression whose own name may differ; otherwise empty.
-    """
+    """Rules that compute the displayed weights of expressions."""
 
     rows: Ints
+    """(E,) int32. Blend shape of each expression."""
     is_binary: Bools
+    """(E,) bool. Whether it is always either fully on or off."""
     kinds: Ints
+    """(E,) int32. Index into ``PROCEDURAL``, -1 for other expressions."""
     overrides: Ints
+    """(E, 3) int32. Effect on each kind of ``PROCEDURAL``: index into ``OVERRIDES``."""
     presets: tuple[str, ...] = ()
+    """tuple of str, (E,). Name in VRM 1.0 of each expression whose own name may differ; otherwise
+    empty."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type) -> None:
@@ -78,15 +70,8 @@ class ExpressionRules:
     def shown(self, weights: Floats) -> Floats:
         """Return the displayed weights (VRM 1.0, ``expressions.md``).
 
-        Parameters
-        ----------
-        weights : (N,)
-            Weights of all blend shapes; weights of expressions are clamped to 0 … 1.
-
-        Returns
-        -------
-        (N,)
-            Weights; weights of other blend shapes are unchanged.
+        ``weights``: (N,), weights of all blend shapes; weights of expressions are clamped to 0 … 1.
+        Returns (N,), weights; weights of other blend shapes are unchanged.
         """
         known = self.rows < len(weights)
         values = np.zeros(len(self.rows))
@@ -109,25 +94,17 @@ class ExpressionRules:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialBinds:
-    """Targets of properties of materials: x = x_0 + sum_b w_b (t_b - x_0), with the weights w.
-
-    Attributes
-    ----------
-    shapes : (B,) int32
-        Blend shape that has the weight.
-    materials : (B,) int32
-        Material of the mesh.
-    kinds : tuple of B str
-        Entry of ``COLOR_KINDS``, or ``TRANSFORM``.
-    targets : (B, 4)
-        Linear colour and opacity, which only ``"color"`` uses; or scale and offset of texture
-        coordinates whose origin is at the top, as in glTF.
-    """
+    """Targets of properties of materials: x = x_0 + sum_b w_b (t_b - x_0), with the weights w."""
 
     shapes: Ints
+    """(B,) int32. Blend shape that has the weight."""
     materials: Ints
+    """(B,) int32. Material of the mesh."""
     kinds: tuple[str, ...]
+    """Entry of ``COLOR_KINDS``, or ``TRANSFORM``."""
     targets: Floats
+    """(B, 4). Linear colour and opacity, which only ``"color"`` uses; or scale and offset of
+    texture coordinates whose origin is at the top, as in glTF."""
 
     def __post_init__(self) -> None:
         count = len(self.kinds)
@@ -142,12 +119,7 @@ class MaterialBinds:
     def changed(self, materials: Sequence[Material], weights: Floats) -> dict[int, Material]:
         """Return the materials that differ from the given ones, by index.
 
-        Parameters
-        ----------
-        materials : sequence of Material
-            Materials of the mesh.
-        weights : (N,)
-            Displayed weights of the blend shapes; missing weights are treated as 0.
+        ``weights``: (N,), displayed weights of the blend shapes; missing weights are treated as 0.
         """
         whole = np.zeros(max(int(self.shapes.max(initial=-1)) + 1, len(weights)))
         whole[: len(weights)] = weights

@@ -39,75 +39,51 @@ class AttachedFigure(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Figure:
-    """A character as read from its files.
-
-    Attributes
-    ----------
-    name : str
-        Label in menus.
-    mesh : Mesh or None
-        In bind pose.
-    skeleton : Skeleton or None
-        Without a skeleton, the mesh stays in the bind pose.
-    skin : Skin or None
-        Without a skin, the mesh does not follow the skeleton.
-    up : "y" or "z"
-        Up axis of the file, which the camera follows.
-    unit : str
-        Unit of length, a key of ``viewer.rig.units.METRES``, given by the file or estimated; empty
-        if unknown.
-    blend_shapes : BlendShapes or None
-        Weighted offsets of the rest mesh, which the joints follow.
-    correctives : Correctives or None
-        Offsets that depend on the pose.
-    joint_regressor : JointRegressor or None
-        Computes the joints of a changed rest mesh.
-    hands : tuple of Hand
-        Principal components of the hand poses.
-    pose_layout : PoseLayout or None
-        Order of the values in the model's own pose vectors; None if those are the DOFs.
-    parameters : ModelParameters or None
-        Parameters of the model that determine its DOFs and scales.
-    body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
-        Other annotations of the mesh.
-    symmetry : (V,) int32 or None
-        Mirror counterpart of each vertex.
-    points : PointLayout or None
-        Layout of a figure that consists of captured keypoints only.
-    fields : tuple of VertexField
-        Precomputed values per vertex, to be shown as colours.
-    facts : tuple of (str, str or Diagnostic)
-        Findings of the reader for ``viewer info``, as pairs of heading and text.
-    animations : tuple of Animation
-        Motions from the figure's file, in file order.
-    shape_space : ShapeSpace
-        Model and gender whose shape coefficients apply to it, if it is a body model.
-    record : FileRecord or None
-        Other data of its glTF or FBX file, to be written back.
-    """
+    """A character as read from its files."""
 
     name: str
+    """Label in menus."""
     mesh: Mesh | None = None
+    """In bind pose."""
     skeleton: Skeleton | None = None
+    """Without a skeleton, the mesh stays in the bind pose."""
     skin: Skin | None = None
+    """Without a skin, the mesh does not follow the skeleton."""
     up: Literal["y", "z"] = "y"
+    """Either "y" or "z". Up axis of the file, which the camera follows."""
     unit: str = ""
+    """Unit of length, a key of ``viewer.rig.units.METRES``, given by the file or estimated; empty
+    if unknown."""
     blend_shapes: BlendShapes | None = None
+    """Weighted offsets of the rest mesh, which the joints follow."""
     correctives: Correctives | None = None
+    """Offsets that depend on the pose."""
     joint_regressor: JointRegressor | None = None
+    """Computes the joints of a changed rest mesh."""
     hands: tuple[Hand, ...] = ()
+    """Principal components of the hand poses."""
     pose_layout: PoseLayout | None = None
+    """Order of the values in the model's own pose vectors; None if those are the DOFs."""
     parameters: ModelParameters | None = None
+    """Parameters of the model that determine its DOFs and scales."""
     body_parts: BodyParts | None = None
     keypoints: Keypoints | None = None
     reduced: ReducedMesh | None = None
+    """Other annotations of the mesh."""
     symmetry: Ints | None = None
+    """(V,) int32 or None. Mirror counterpart of each vertex."""
     points: PointLayout | None = None
+    """Layout of a figure that consists of captured keypoints only."""
     fields: tuple[VertexField, ...] = ()
+    """Precomputed values per vertex, to be shown as colours."""
     facts: tuple[tuple[str, str | Diagnostic], ...] = ()
+    """Findings of the reader for ``viewer info``, as pairs of heading and text."""
     animations: tuple[Animation, ...] = ()
+    """Motions from the figure's file, in file order."""
     shape_space: ShapeSpace = ShapeSpace()
+    """Model and gender whose shape coefficients apply to it, if it is a body model."""
     record: FileRecord | None = None
+    """Other data of its glTF or FBX file, to be written back."""
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None and self.points is None:
@@ -232,17 +208,8 @@ class Figure:
 def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return points that span the posed skeleton: joint origins and the corners of its boxes.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton with or without boxes.
-    pose : Pose
-        DOFs in lengths and radians.
-
-    Returns
-    -------
-    (N, 3)
-        Figure space.
+    ``skeleton``: skeleton with or without boxes. ``pose``: DOFs in lengths and radians. Returns (N,
+    3), figure space.
     """
     world = posed_skeleton(skeleton, pose).world
     if skeleton.boxes is None:
@@ -255,21 +222,14 @@ def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FigureGroup:
-    """All figures of a file, in one common space, and its cameras.
-
-    Attributes
-    ----------
-    name : str
-        Title of the group.
-    figures : tuple of Figure
-        At least one; all have the same up axis and unit.
-    views : tuple of CameraView
-        Cameras of the file, in the space of the figures.
-    """
+    """All figures of a file, in one common space, and its cameras."""
 
     name: str
+    """Title of the group."""
     figures: tuple[Figure, ...]
+    """At least one; all have the same up axis and unit."""
     views: tuple[CameraView, ...] = ()
+    """Cameras of the file, in the space of the figures."""
 
     def __post_init__(self) -> None:
         if not self.figures:

@@ -11,24 +11,16 @@ from viewer.rig.arrays import Floats, Ints, frozen
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Hand:
-    """The finger joints of one hand and the principal components of their rotations.
-
-    Attributes
-    ----------
-    side : str
-        ``"left"``, ``"right"``, or empty for a model of a single hand.
-    joints : (H,) int32
-        Finger joints, in the order of the components.
-    components : (C, 3 H)
-        Concatenated rotation vectors, radians per unit of a coefficient.
-    mean : (3 H,)
-        Rotation vectors of the mean hand; zeros are the flat hand.
-    """
+    """The finger joints of one hand and the principal components of their rotations."""
 
     side: str
+    """``"left"``, ``"right"``, or empty for a model of a single hand."""
     joints: Ints
+    """(H,) int32. Finger joints, in the order of the components."""
     components: Floats
+    """(C, 3 H). Concatenated rotation vectors, radians per unit of a coefficient."""
     mean: Floats
+    """(3 H,). Rotation vectors of the mean hand; zeros are the flat hand."""
 
     def __post_init__(self) -> None:
         size = 3 * len(self.joints)
@@ -41,24 +33,8 @@ class Hand:
 def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
     """Return the finger joints' rotation vectors: mean + sum_i c_i component_i.
 
-    Parameters
-    ----------
-    hand : Hand
-        Provides the components and mean.
-    coefficients : (N,)
-        N <= C; missing coefficients are treated as 0.
-    flat : bool
-        Whether to omit the mean.
-
-    Returns
-    -------
-    (H, 3)
-        Radians.
-
-    Raises
-    ------
-    RigError
-        If there are more coefficients than components.
+    ``coefficients``: (N,), N <= C; missing coefficients are treated as 0. Returns (H, 3), radians.
+    Raises ``RigError`` if there are more coefficients than components.
     """
     if len(coefficients) > len(hand.components):
         raise RigError(
@@ -71,21 +47,9 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
 def hand_coefficients(hand: Hand, vectors: Floats, flat: bool, count: int) -> Floats:
     """Return the first ``count`` coefficients that best reproduce a hand pose.
 
-    Parameters
-    ----------
-    hand : Hand
-        Provides the components and mean.
-    vectors : (H, 3)
-        Rotation vectors of the hand's joints, radians.
-    flat : bool
-        As for ``hand_vectors``.
-    count : int
-        Number of components to use.
-
-    Returns
-    -------
-    (count,)
-        The least-squares solution; the components need not be orthogonal.
+    ``vectors``: (H, 3), rotation vectors of the hand's joints, radians. ``flat``: as for
+    ``hand_vectors``. Returns (count,), the least-squares solution; the components need not be
+    orthogonal.
     """
     wanted = vectors.ravel() - (0.0 if flat else hand.mean)
     found = np.linalg.lstsq(hand.components[:count].T, wanted, rcond=None)[0]

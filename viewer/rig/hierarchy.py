@@ -14,15 +14,8 @@ def cycle_members(parents: Floats | Ints) -> Bools:
     points. Joints that still point to an ancestor after log2(J) passes are in or below a cycle, and
     that ancestor is in the cycle.
 
-    Parameters
-    ----------
-    parents : (J,)
-        Parents as listed in a file; a value that is not a joint index means no parent.
-
-    Returns
-    -------
-    (J,)
-        True for joints in a cycle, False for joints below one.
+    ``parents``: (J,), parents as listed in a file; a value that is not a joint index means no
+    parent. Returns (J,), true for joints in a cycle, False for joints below one.
 
     >>> cycle_members(np.array([-1, 2, 1, 2])).tolist()
     [False, True, True, False]
@@ -41,15 +34,8 @@ def cycle_members(parents: Floats | Ints) -> Bools:
 def depth_first(parents: Ints) -> Ints:
     """Return the joints in depth-first order: each before its children, siblings by index.
 
-    Parameters
-    ----------
-    parents : (J,)
-        Smaller than the joint's own index; -1 for a root.
-
-    Returns
-    -------
-    (J,) int32
-        Joint indices.
+    ``parents``: (J,), smaller than the joint's own index; -1 for a root. Returns (J,) int32, joint
+    indices.
 
     >>> depth_first(np.array([-1, 0, 0, 1])).tolist()
     [0, 1, 3, 2]

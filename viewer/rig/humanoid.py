@@ -52,12 +52,7 @@ REQUIRED_BONES = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Humanoid:
-    """Joints of a figure by the standard names of human bones.
-
-    Attributes
-    ----------
-    joints : mapping of str to int
-        Bones of VRM 1.0 (``"hips"``, ``"leftUpperArm"`` ...) and the joint of each.
-    """
+    """Joints of a figure by the standard names of human bones."""
 
     joints: Mapping[str, int]
+    """Bones of VRM 1.0 (``"hips"``, ``"leftUpperArm"`` ...) and the joint of each."""

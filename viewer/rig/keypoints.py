@@ -25,24 +25,9 @@ _parts: Memo[Figure, tuple[Figure, Keypoints]] = Memo()
 def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None) -> Floats:
     """Return the keypoints of a posed figure.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with keypoints, mesh and skeleton.
-    pose : Pose
-        DOFs in lengths and radians.
-    skinning : Skinning, optional
-        Skinning method and influences; the defaults if omitted.
-
-    Returns
-    -------
-    (N, 3)
-        Figure space.
-
-    Raises
-    ------
-    RigError
-        If the figure has no keypoints.
+    ``pose``: DOFs in lengths and radians. ``skinning``: skinning method and influences; the
+    defaults if omitted. Returns (N, 3), figure space. Raises ``RigError`` if the figure has no
+    keypoints.
     """
     if figure.keypoints is None or figure.mesh is None:
         raise RigError(f"figure {figure.name} has no keypoints")
@@ -70,17 +55,8 @@ def _part(figure: Figure) -> tuple[Figure, Keypoints]:
 def some_vertices(figure: Figure, vertices: Ints) -> Figure:
     """Return a figure with a few vertices and no triangles that deforms like the whole figure.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh.
-    vertices : (N,)
-        Their indices.
-
-    Returns
-    -------
-    Figure
-        Figure without a joint regressor, so its joints do not follow its shape.
+    ``vertices``: (N,), their indices. Returns figure without a joint regressor, so its joints do
+    not follow its shape.
     """
     mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives

@@ -28,19 +28,10 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     log2(n) passes (Hillis and Steele 1986). The matrices of many poses are multiplied joint by
     joint, which takes a single product for each.
 
-    Parameters
-    ----------
-    parents : (J,)
-        Index of each joint's parent, smaller than its own; -1 for a root.
-    local : (J, 4, 4) or (J, F, n, n)
-        Joint-to-parent matrices; of many poses, these can also be rotations alone.
-    root : (4, 4), optional
-        Placement of the whole figure in the world; identity if omitted.
-
-    Returns
-    -------
-    (J, 4, 4) or (J, F, n, n)
-        Joint-to-world matrices, lengths in the unit of ``local``.
+    ``parents``: (J,), index of each joint's parent, smaller than its own; -1 for a root. ``local``:
+    (J, 4, 4) or (J, F, n, n), joint-to-parent matrices; of many poses, these can also be rotations
+    alone. ``root``: (4, 4), placement of the whole figure in the world; identity if omitted.
+    Returns (J, 4, 4) or (J, F, n, n), joint-to-world matrices, lengths in the unit of ``local``.
 
     >>> local = np.stack([np.eye(4)] * 2)
     >>> local[:, 0, 3] = 2.0, 1.0
@@ -81,17 +72,7 @@ def _kept_passes(parents: bytes) -> tuple[tuple[Indices, Indices], ...]:
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return the world matrices of all joints in a pose.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the hierarchy and DOF table.
-    pose : Pose
-        DOFs in lengths and radians.
-
-    Returns
-    -------
-    (J, 4, 4)
-        Joint-to-figure matrices.
+    ``pose``: DOFs in lengths and radians. Returns (J, 4, 4), joint-to-figure matrices.
     """
     return forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
 
@@ -101,17 +82,7 @@ def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
 
     The pose stores the result, so forward kinematics runs once per frame for all passes and panels.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton of the shaped figure; compared by identity.
-    pose : Pose
-        DOFs in lengths and radians.
-
-    Returns
-    -------
-    PosedSkeleton
-        Read-only matrices.
+    ``pose``: DOFs in lengths and radians. Returns read-only matrices.
     """
     known, key = pose.posed, pose.skinning_key
     if known is None or known.skeleton is not skeleton or known.key is not key:
@@ -128,17 +99,8 @@ def is_posed(skeleton: Skeleton, pose: Pose) -> bool:
 def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
     """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
 
-    Parameters
-    ----------
-    world : (J, 4, 4)
-        Joint-to-world matrices.
-    inverse_bind : (J, 4, 4)
-        World-to-joint matrices at bind time.
-
-    Returns
-    -------
-    (J, 4, 4)
-        Bind-to-posed matrices.
+    ``world``: (J, 4, 4), joint-to-world matrices. ``inverse_bind``: (J, 4, 4), world-to-joint
+    matrices at bind time. Returns (J, 4, 4), bind-to-posed matrices.
     """
     return world @ inverse_bind
 
@@ -146,15 +108,8 @@ def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
 def rigid_sizes(palette: Floats) -> Floats:
     """Return the square s^2 of each joint's scale if it is uniform, and 0 for all other joints.
 
-    Parameters
-    ----------
-    palette : (..., J, 4, 4)
-        Skinning matrices.
-
-    Returns
-    -------
-    (..., J)
-        s^2 if the 3 x 3 part A satisfies A^T A = s^2 I, and det A > 0.
+    ``palette``: (..., J, 4, 4), skinning matrices. Returns (..., J), s^2 if the 3 x 3 part A
+    satisfies A^T A = s^2 I, and det A > 0.
     """
     linear = palette[..., :3, :3]
     gram = np.swapaxes(linear, -1, -2) @ linear
@@ -175,15 +130,8 @@ def are_alike(lowest: Floats, highest: Floats) -> Bools:
 def is_rigid(palette: Floats) -> Bools:
     """Return whether all joints only rotate and translate, up to one common uniform scale.
 
-    Parameters
-    ----------
-    palette : (..., J, 4, 4)
-        Skinning matrices.
-
-    Returns
-    -------
-    (...,) bool
-        True if every 3 x 3 part A satisfies A^T A = s^2 I with one common s, and det A > 0.
+    ``palette``: (..., J, 4, 4), skinning matrices. Returns true if every 3 x 3 part A satisfies A^T
+    A = s^2 I with one common s, and det A > 0.
 
     >>> palette = np.stack([np.eye(4)] * 2)
     >>> bool(is_rigid(palette)), bool(is_rigid(palette * np.array([2.0, 1.0, 1.0, 1.0])))

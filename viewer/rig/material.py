@@ -41,80 +41,55 @@ class Material:
     """The surface appearance of some triangles.
 
     Factors multiply their textures, as in glTF 2.0, section 3.9.
-
-    Attributes
-    ----------
-    name : str
-        Name in the file; triangles refer to materials by index.
-    base_texture : Texture or None
-        Colour and opacity, sRGB.
-    base_color : (r, g, b, a) or None
-        Linear, 0 to 1; None for a material without a colour, which is white under a texture and
-        otherwise has the figure's colour.
-    metallic, roughness : float
-        0 to 1; roughness is perceptual, the square root of the GGX width.
-    metallic_texture, roughness_texture : Texture or None
-        One channel each, often of the same image.
-    normal_texture : Texture or None
-        Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1.
-    normal_scale : float
-        Multiplier for the red and green components of the normals.
-    occlusion_texture : Texture or None
-        Fraction of the ambient light that arrives; one channel.
-    occlusion_strength : float
-        0 to 1.
-    emissive : (r, g, b)
-        Emitted light, linear; may exceed 1.
-    emissive_texture : Texture or None
-        Colour of the emitted light, sRGB.
-    alpha_mode : str
-        Entry of ``ALPHA_MODES``.
-    alpha_cutoff : float
-        Minimum opacity that is drawn in the mode ``"mask"``.
-    double_sided : bool
-        Whether back faces are drawn: the counter-clockwise side is the front.
-    unlit : bool
-        Whether the base colour is shown without lighting.
-    shade_color : (r, g, b) or None
-        Linear colour of the side away from the key light in toon shading; None in other shading.
-    shade_texture : Texture or None
-        Colour that multiplies ``shade_color``, sRGB.
-    shade_range : (float, float)
-        Cosines of the angle of incidence at which the fraction of the base colour is 0 and 1.
-    rim : Rim or None
-        Rim light of toon shading.
-    outline : Outline or None
-        Outline of toon shading.
-    is_physical : bool
-        Whether the file describes the surface by metalness and roughness, or as unlit.
-    extras : Any
-        Application data of a glTF file, as parsed from JSON; None if there is none.
     """
 
     name: str = ""
+    """Name in the file; triangles refer to materials by index."""
     base_texture: Texture | None = None
+    """Colour and opacity, sRGB."""
     base_color: tuple[float, float, float, float] | None = None
+    """(r, g, b, a) or None. Linear, 0 to 1; None for a material without a colour, which is white
+    under a texture and otherwise has the figure's colour."""
     metallic: float = 0.0
     roughness: float = 0.6
+    """0 to 1; roughness is perceptual, the square root of the GGX width."""
     metallic_texture: Texture | None = None
     roughness_texture: Texture | None = None
+    """One channel each, often of the same image."""
     normal_texture: Texture | None = None
+    """Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1."""
     normal_scale: float = 1.0
+    """Multiplier for the red and green components of the normals."""
     occlusion_texture: Texture | None = None
+    """Fraction of the ambient light that arrives; one channel."""
     occlusion_strength: float = 1.0
     emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """(r, g, b). Emitted light, linear; may exceed 1."""
     emissive_texture: Texture | None = None
+    """Colour of the emitted light, sRGB."""
     alpha_mode: str = "opaque"
+    """Entry of ``ALPHA_MODES``."""
     alpha_cutoff: float = 0.5
+    """Minimum opacity that is drawn in the mode ``"mask"``."""
     double_sided: bool = True
+    """Whether back faces are drawn: the counter-clockwise side is the front."""
     unlit: bool = False
+    """Whether the base colour is shown without lighting."""
     shade_color: tuple[float, float, float] | None = None
+    """(r, g, b) or None. Linear colour of the side away from the key light in toon shading; None in
+    other shading."""
     shade_texture: Texture | None = None
+    """Colour that multiplies ``shade_color``, sRGB."""
     shade_range: tuple[float, float] = (-0.1, 0.1)
+    """Cosines of the angle of incidence at which the fraction of the base colour is 0 and 1."""
     rim: Rim | None = None
+    """Rim light of toon shading."""
     outline: Outline | None = None
+    """Outline of toon shading."""
     is_physical: bool = False
+    """Whether the file describes the surface by metalness and roughness, or as unlit."""
     extras: Any = None
+    """Application data of a glTF file, as parsed from JSON; None if there is none."""
 
     def __post_init__(self) -> None:
         _check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)
@@ -163,40 +138,27 @@ class Material:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
-    """An image, and its placement and sampling.
-
-    Attributes
-    ----------
-    name : str
-        File name of the image, relative to the figure's folder.
-    image : (H, W, 4) uint8 or None
-        Pixels with alpha, first row at v = 1; sRGB in colour textures, linear in others;
-        None if it could not be read.
-    channel : int
-        Channel of ``image`` from which single-channel textures are read.
-    uv_set : int
-        0 for ``Mesh.uvs``, n for ``Mesh.other_uvs[n - 1]``.
-    transform : (2, 3)
-        Maps texture coordinates to image coordinates, whose v is 0 at the bottom row.
-    wrap : (str, str)
-        Entries of ``_WRAPS`` along u and v.
-    is_smooth : bool
-        Whether pixels are interpolated.
-    minification : str
-        Entry of ``MINIFICATIONS``; empty for mipmaps, interpolated if ``is_smooth``.
-    encoded : bytes or None
-        The PNG or JPEG file that ``image`` was decoded from, if it was part of another file.
-    """
+    """An image, and its placement and sampling."""
 
     name: str
+    """File name of the image, relative to the figure's folder."""
     image: Bytes | None = None
+    """(H, W, 4) uint8 or None. Pixels with alpha, first row at v = 1; sRGB in colour textures,
+    linear in others; None if it could not be read."""
     channel: int = 0
+    """Channel of ``image`` from which single-channel textures are read."""
     uv_set: int = 0
+    """0 for ``Mesh.uvs``, n for ``Mesh.other_uvs[n - 1]``."""
     transform: Floats | None = None
+    """(2, 3). Maps texture coordinates to image coordinates, whose v is 0 at the bottom row."""
     wrap: tuple[str, str] = ("clamp", "clamp")
+    """Entries of ``_WRAPS`` along u and v."""
     is_smooth: bool = True
+    """Whether pixels are interpolated."""
     minification: str = ""
+    """Entry of ``MINIFICATIONS``; empty for mipmaps, interpolated if ``is_smooth``."""
     encoded: bytes | None = None
+    """The PNG or JPEG file that ``image`` was decoded from, if it was part of another file."""
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -231,30 +193,21 @@ class Rim:
 
     With the normal n and the direction v to the eye, the added light is (f m + c s) t, where m is
     the matcap, s = clamp(1 - n . v + lift)^power, and t the texture.
-
-    Attributes
-    ----------
-    color : (r, g, b)
-        c, linear.
-    power, lift : float
-        Exponent, at least 0, and summand.
-    mix : float
-        0 to 1: degree to which the rim is multiplied by the light on the surface.
-    texture : Texture or None
-        t, sRGB.
-    matcap : Texture or None
-        m, an image of a lit sphere, sRGB.
-    matcap_factor : (r, g, b)
-        f, linear.
     """
 
     color: Color = (0.0, 0.0, 0.0)
+    """(r, g, b). c, linear."""
     power: float = 5.0
     lift: float = 0.0
+    """Exponent, at least 0, and summand."""
     mix: float = 1.0
+    """0 to 1: degree to which the rim is multiplied by the light on the surface."""
     texture: Texture | None = None
+    """t, sRGB."""
     matcap: Texture | None = None
+    """m, an image of a lit sphere, sRGB."""
     matcap_factor: Color = (1.0, 1.0, 1.0)
+    """(r, g, b). f, linear."""
 
     def __post_init__(self) -> None:
         numbers = (*self.color, *self.matcap_factor, self.power, self.lift, self.mix)
@@ -269,27 +222,18 @@ class Rim:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """A line around a surface.
-
-    Attributes
-    ----------
-    width : float
-        At least 0, in the unit of the mode.
-    mode : str
-        Entry of ``_OUTLINE_MODES``.
-    color : (r, g, b)
-        Linear.
-    mix : float
-        0 to 1: how much the colour of the surface multiplies that of the line.
-    texture : Texture or None
-        Factor of the width, in the green channel.
-    """
+    """A line around a surface."""
 
     width: float
+    """At least 0, in the unit of the mode."""
     mode: str = "world"
+    """Entry of ``_OUTLINE_MODES``."""
     color: Color = (0.0, 0.0, 0.0)
+    """(r, g, b). Linear."""
     mix: float = 1.0
+    """0 to 1: how much the colour of the surface multiplies that of the line."""
     texture: Texture | None = None
+    """Factor of the width, in the green channel."""
 
     def __post_init__(self) -> None:
         if self.mode not in _OUTLINE_MODES:

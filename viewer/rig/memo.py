@@ -17,13 +17,7 @@ _Value = TypeVar("_Value")
 
 
 class Memo(Generic[_Owner, _Value]):
-    """A thread-safe cache of a few results per owner, released together with the owner.
-
-    Parameters
-    ----------
-    kept : int
-        Maximum number of results per owner; the oldest is evicted first.
-    """
+    """A thread-safe cache of a few results per owner, released together with the owner."""
 
     def __init__(self, kept: int = 1) -> None:
         self._kept = kept
@@ -33,14 +27,8 @@ class Memo(Generic[_Owner, _Value]):
     def get(self, owner: _Owner, key: Hashable, make: Callable[[], _Value]) -> _Value:
         """Return the cached result of an owner and key, calling ``make`` if there is none.
 
-        Parameters
-        ----------
-        owner : object
-            Immutable, compared by identity; the result must not refer to it.
-        key : hashable
-            Everything else that the result depends on.
-        make : callable
-            Called without arguments.
+        ``owner``: immutable, compared by identity; the result must not refer to it. ``make``:
+        called without arguments.
         """
         known = self._values.setdefault(owner, {})
         if key in known:
@@ -60,10 +48,7 @@ class NumberKey:
 
     Keys of equal contents are equal, and ``array`` returns the contents.
 
-    Parameters
-    ----------
-    *arrays : (...)
-        Arrays of any shapes.
+    ``*arrays``: (...), arrays of any shapes.
 
     >>> angles = np.zeros(3)
     >>> key = NumberKey(angles)

@@ -28,47 +28,35 @@ _ROW = 64  # points per row of a reduction, see bounding_box
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """An indexed triangle mesh, in the bind pose.
-
-    Attributes
-    ----------
-    positions, normals : (V, 3)
-        Figure units; normals as stored, not necessarily of unit length.
-    triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, on which no code relies.
-    uvs : (U, 2) or None
-        Texture coordinates, v = 0 at the bottom row of the image.
-    uv_triangles : (T, 3) int32 or None
-        Indices into ``uvs`` if they differ from ``triangles``: along a seam, one vertex has several
-        texture coordinates. None if every vertex has exactly one; then U = V.
-    materials : tuple of Material
-        In file order.
-    triangle_materials : (T,) int32
-        Index into ``materials``, -1 for none.
-    other_uvs : tuple of (U, 2)
-        Further texture coordinates for each row of ``uvs``, for textures that refer to these sets.
-    colors : (V, 4) or None
-        Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
-    parts : tuple of P str
-        Names of the parts that can be hidden; may repeat or be empty.
-    triangle_parts : (T,) int32
-        Index into ``parts``, -1 for none.
-    part_views : tuple of P PartView
-        The views in which the parts are drawn; empty if all are drawn in both.
-    """
+    """An indexed triangle mesh, in the bind pose."""
 
     positions: Floats
     normals: Floats
+    """(V, 3). Figure units; normals as stored, not necessarily of unit length."""
     triangles: Ints
+    """(T, 3) int32. Vertex indices; counter-clockwise from outside in most files, on which no code
+    relies."""
     uvs: Floats | None = None
+    """(U, 2) or None. Texture coordinates, v = 0 at the bottom row of the image."""
     materials: tuple[Material, ...] = ()
+    """In file order."""
     triangle_materials: Ints | None = None
+    """(T,) int32. Index into ``materials``, -1 for none."""
     uv_triangles: Ints | None = None
+    """(T, 3) int32 or None. Indices into ``uvs`` if they differ from ``triangles``: along a seam,
+    one vertex has several texture coordinates. None if every vertex has exactly one; then U = V."""
     other_uvs: tuple[Floats, ...] = ()
+    """tuple of (U, 2). Further texture coordinates for each row of ``uvs``, for textures that refer
+    to these sets."""
     colors: Floats | None = None
+    """(V, 4) or None. Linear vertex colours and opacity, 0 to 1, which multiply the materials' base
+    colours."""
     parts: tuple[str, ...] = ()
+    """Names of the parts that can be hidden; may repeat or be empty."""
     triangle_parts: Ints | None = None
+    """(T,) int32. Index into ``parts``, -1 for none."""
     part_views: tuple[PartView, ...] = ()
+    """The views in which the parts are drawn; empty if all are drawn in both."""
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -149,15 +137,8 @@ def _check_range(name: str, indices: Ints, end: int) -> None:
 def bounding_box(points: Floats) -> Floats:
     """Return the lowest and highest corner of the points.
 
-    Parameters
-    ----------
-    points : (N, 3)
-        Points; for an empty array, the box has size 0 at the origin.
-
-    Returns
-    -------
-    (2, 3)
-        Corners, in the unit of ``points``.
+    ``points``: (N, 3), points; for an empty array, the box has size 0 at the origin. Returns (2,
+    3), corners, in the unit of ``points``.
 
     >>> bounding_box(np.array([[0.0, 1.0, 2.0], [3.0, 0.0, 1.0]])).tolist()
     [[0.0, 0.0, 1.0], [3.0, 1.0, 2.0]]
@@ -186,17 +167,8 @@ def box_size(box: Floats) -> float:
 def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
     """Return each triangle's area, |(b - a) x (c - a)| / 2.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Figure units.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    (T,)
-        Areas, squared units.
+    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices. Returns (T,), areas,
+    squared units.
     """
     return 0.5 * np.linalg.norm(area_vectors(positions, triangles), axis=1)
 
@@ -222,17 +194,8 @@ def typical_place(mesh: Mesh) -> tuple[Floats, float]:
 def volume(positions: Floats, triangles: Ints) -> float:
     """Return the volume that a closed mesh encloses: sum a . (b x c) / 6 (divergence theorem).
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Figure units.
-    triangles : (T, 3)
-        Vertex indices, counter-clockwise from outside.
-
-    Returns
-    -------
-    float
-        Cubed units; negative if the triangles are clockwise.
+    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices, counter-clockwise
+    from outside. Returns cubed units; negative if the triangles are clockwise.
 
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)
@@ -247,19 +210,9 @@ def volume(positions: Floats, triangles: Ints) -> float:
 def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     """Split vertices along texture seams, so that each has one texture coordinate, as on GPUs.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        V vertices, U texture coordinates.
-
-    Returns
-    -------
-    sources : (R,) int32
-        Mesh vertex that each split vertex is a copy of; vertices without triangles are included.
-    uv_indices : (R,) int32
-        Texture coordinate of each split vertex.
-    triangles : (T, 3) int32
-        Indices into the split vertices.
+    Returns ``sources``: (R,) int32, mesh vertex that each split vertex is a copy of; vertices
+    without triangles are included; ``uv_indices``: (R,) int32, texture coordinate of each split
+    vertex; ``triangles``: (T, 3) int32, indices into the split vertices.
     """
     if mesh.uv_triangles is None or mesh.uvs is None:
         identity = np.arange(mesh.n_vertices, dtype=np.int32)
@@ -290,17 +243,8 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
 def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
     """Return a mesh with one texture coordinate per vertex, for formats that require this.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        V vertices.
-
-    Returns
-    -------
-    mesh : Mesh
-        R vertices, split along texture seams.
-    sources : (R,) int32
-        Original vertex of each of these.
+    Returns ``mesh``: R vertices, split along texture seams; ``sources``: (R,) int32, original
+    vertex of each of these.
     """
     sources, uv_indices, triangles = split_seams(mesh)
     return Mesh(
@@ -321,17 +265,9 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
 def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     """Return unit normals averaged over each vertex's triangles, weighted by area.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Figure units.
-    triangles : (T, 3)
-        Vertex indices, counter-clockwise from outside.
-
-    Returns
-    -------
-    (V, 3)
-        Unit normals; +y for a vertex that has no triangles or only degenerate ones.
+    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices, counter-clockwise
+    from outside. Returns (V, 3), unit normals; +y for a vertex that has no triangles or only
+    degenerate ones.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()
@@ -353,12 +289,8 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
 def visible_triangles(mesh: Mesh, hidden: Collection[int]) -> Bools:
     """Return a mask of the triangles that are not in a hidden part: (T,) bool.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        With or without parts.
-    hidden : collection of int
-        Indices of the hidden parts; indices that are not parts of the mesh are ignored.
+    ``mesh``: with or without parts. ``hidden``: indices of the hidden parts; indices that are not
+    parts of the mesh are ignored.
     """
     shown: Bools = ~np.isin(mesh.part_indices, list(hidden))
     return shown
@@ -376,17 +308,8 @@ def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
 def area_vectors(positions: Floats, triangles: Ints) -> Floats:
     """Return (b - a) x (c - a) of each triangle: its normal, scaled to twice its area.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Figure units.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    (T, 3)
-        Squared units.
+    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices. Returns (T, 3),
+    squared units.
     """
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return np.cross(b - a, c - a)

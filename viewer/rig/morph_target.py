@@ -23,24 +23,16 @@ MORPH_GROUP = "morph"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MorphTarget:
-    """Target positions of some vertices of a mesh, absolute rather than offsets.
-
-    Attributes
-    ----------
-    name : str
-        Label of its slider.
-    vertices : (N,) int32
-        Indices into the mesh, without repetition.
-    positions : (N, 3)
-        In the mesh's own space and unit.
-    normals : (N, 3) or None
-        Normals as stored; None if the normals of the mesh are unchanged.
-    """
+    """Target positions of some vertices of a mesh, absolute rather than offsets."""
 
     name: str
+    """Label of its slider."""
     vertices: Ints
+    """(N,) int32. Indices into the mesh, without repetition."""
     positions: Floats
+    """(N, 3). In the mesh's own space and unit."""
     normals: Floats | None = None
+    """(N, 3) or None. Normals as stored; None if the normals of the mesh are unchanged."""
 
     def __post_init__(self) -> None:
         vertices = frozen("vertices", self.vertices, (None,), np.int32)
@@ -58,23 +50,9 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
 
     Normals are computed with the same formula, before skinning. Joints do not move.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh; its own blend shapes, if any, come first and must be morphs too.
-    targets : sequence of MorphTarget
-        Any number of targets.
-
-    Returns
-    -------
-    Figure
-        The figure itself if there are no targets.
-
-    Raises
-    ------
-    RigError
-        If a vertex index lies outside the mesh, or the figure has no mesh, or has blend shapes
-        other than morphs.
+    ``figure``: figure with a mesh; its own blend shapes, if any, come first and must be morphs too.
+    Returns the figure itself if there are no targets. Raises ``RigError`` if a vertex index lies
+    outside the mesh, or the figure has no mesh, or has blend shapes other than morphs.
     """
     if not targets:
         return figure
@@ -111,10 +89,7 @@ def on_one_joint(figure: Figure) -> Figure:
     Weights of blend shapes belong to a pose, and a pose needs a skeleton. The mesh stays in its
     bind pose.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh; a skin without a skeleton is replaced.
+    ``figure``: figure with a mesh; a skin without a skeleton is replaced.
     """
     mesh = figure.require_mesh()
     empty = np.zeros(0, dtype=np.int32)

@@ -12,12 +12,7 @@ _NOT_ZERO = set("123456789n")  # "inf" and "nan" contain an n
 def number_text(value: float, spec: str = "g") -> str:
     """Format a number, without a minus sign if it rounds to 0.
 
-    Parameters
-    ----------
-    value : float
-        Any number.
-    spec : str
-        Format specification, as for Python's ``format``.
+    ``spec``: format specification, as for Python's ``format``.
 
     >>> number_text(-0.0), number_text(-0.04, ".1f"), number_text(-0.0, "+.1f")
     ('0', '0.0', '+0.0')
@@ -41,14 +36,8 @@ def short_number(value: float) -> str:
 def angle_text(radians: float, in_degrees: bool, sign: str = "") -> str:
     """Format an angle in the unit of the display: ``"28.6°"`` or ``"0.500 rad"``.
 
-    Parameters
-    ----------
-    radians : float
-        The angle.
-    in_degrees : bool
-        Degrees rather than radians.
-    sign : str
-        ``"+"`` to show the sign of positive angles too.
+    ``in_degrees``: degrees rather than radians. ``sign``: ``"+"`` to show the sign of positive
+    angles too.
     """
     if in_degrees:
         return f"{number_text(math.degrees(radians), f'{sign}.1f')}\N{DEGREE SIGN}"

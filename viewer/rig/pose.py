@@ -24,34 +24,24 @@ _Indices = NDArray[np.intp]
 
 @dataclass(slots=True, eq=False)
 class Pose:
-    """The mutable state of one figure; arrays are changed in place.
-
-    Attributes
-    ----------
-    dofs : (D,)
-        Lengths or radians.
-    translations : (J, 3)
-        Offsets from the skeleton's rest translations, which follow the figure's shape.
-    rotations, scales : (J, 4), (J, 3)
-        Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale factors.
-    shape_weights : (S,)
-        Weights of the figure's blend shapes; missing trailing weights are treated as 0.
-    figure_scale : float
-        Scale of the whole skinned figure about its origin, applied after skinning.
-    figure_translation : (3,)
-        Translation of the whole skinned figure, applied after its scale.
-    posed : PosedSkeleton or None
-        Cached matrices; up to date if they have the key of the current values.
-    """
+    """The mutable state of one figure; arrays are changed in place."""
 
     dofs: Floats
+    """(D,). Lengths or radians."""
     translations: Floats
+    """(J, 3). Offsets from the skeleton's rest translations, which follow the figure's shape."""
     rotations: Floats
     scales: Floats
+    """(J, 4), (J, 3). Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale
+    factors."""
     shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    """(S,). Weights of the figure's blend shapes; missing trailing weights are treated as 0."""
     figure_scale: float = 1.0
+    """Scale of the whole skinned figure about its origin, applied after skinning."""
     figure_translation: Floats = field(default_factory=lambda: np.zeros(3))
+    """(3,). Translation of the whole skinned figure, applied after its scale."""
     posed: PosedSkeleton | None = field(default=None, init=False, repr=False)
+    """Cached matrices; up to date if they have the key of the current values."""
     _key: NumberKey | None = field(default=None, init=False, repr=False)
 
     @property
@@ -78,21 +68,14 @@ class Pose:
 
 
 class PoseKey(NamedTuple):
-    """All values of a pose at one moment, to compare and to restore; see ``pose_of``.
-
-    Attributes
-    ----------
-    numbers : NumberKey
-        The pose's ``skinning_key``.
-    scale : float
-        The pose's ``figure_scale``.
-    translation : tuple of 3 floats
-        The pose's ``figure_translation``.
-    """
+    """All values of a pose at one moment, to compare and to restore; see ``pose_of``."""
 
     numbers: NumberKey
+    """The pose's ``skinning_key``."""
     scale: float
+    """The pose's ``figure_scale``."""
     translation: tuple[float, ...]
+    """The pose's ``figure_translation``."""
 
 
 def pose_key(pose: Pose) -> PoseKey:
@@ -150,17 +133,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     z give R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
     Joints with a constraint follow their source instead.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    pose : Pose
-        DOFs in lengths and radians.
-
-    Returns
-    -------
-    (J, 4, 4)
-        Joint-to-parent matrices.
+    ``pose``: DOFs in lengths and radians. Returns (J, 4, 4), joint-to-parent matrices.
     """
     local = np.zeros((skeleton.n_joints, 4, 4))
     local[:, 3, 3] = 1.0
@@ -190,17 +163,8 @@ def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
 def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
     """Multiply the rotation DOFs of every joint, one row of all joints at a time.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    dofs : (..., D)
-        Lengths and radians, of any number of poses.
-
-    Returns
-    -------
-    (..., J, 3, 3)
-        The first row of a joint is applied first.
+    ``dofs``: (..., D), lengths and radians, of any number of poses. Returns (..., J, 3, 3), the
+    first row of a joint is applied first.
     """
     if skeleton.posing is not None:
         return skeleton.posing.rotations(dofs)
@@ -238,15 +202,7 @@ class _Factor:
 
 
 class _AxisProducts:
-    """Order in which the rotation DOFs of each joint are multiplied.
-
-    Parameters
-    ----------
-    n_joints : int
-        J.
-    factors : sequence of _Factor
-        The first is applied first.
-    """
+    """Order in which the rotation DOFs of each joint are multiplied."""
 
     def __init__(self, n_joints: int, factors: list[_Factor]) -> None:
         self._n_joints, self._factors = n_joints, factors
@@ -254,15 +210,8 @@ class _AxisProducts:
     def at(self, dofs: Floats) -> Floats:
         """Return the product of each joint's rotations.
 
-        Parameters
-        ----------
-        dofs : (..., D)
-            Rotations in radians; other DOFs are not used.
-
-        Returns
-        -------
-        (..., J, 3, 3)
-            Matrices for column vectors; the identity for joints without rotations.
+        ``dofs``: (..., D), rotations in radians; other DOFs are not used. Returns (..., J, 3, 3),
+        matrices for column vectors; the identity for joints without rotations.
         """
         result: Floats | None = None
         for factor in self._factors:
@@ -281,15 +230,8 @@ class _AxisProducts:
 def axis_products(n_joints: int, joints: Ints, axes: Ints, rows: _Indices) -> _AxisProducts:
     """Return the order of multiplication of rotation DOFs.
 
-    Parameters
-    ----------
-    n_joints : int
-        J.
-    joints, axes : (N,)
-        Joint and axis (0, 1, 2 for x, y, z) of each rotation; the first one of a joint is applied
-        first.
-    rows : (N,)
-        Index of each rotation in the DOFs.
+    ``joints``, ``axes``: (N,), joint and axis (0, 1, 2 for x, y, z) of each rotation; the first one
+    of a joint is applied first. ``rows``: (N,), index of each rotation in the DOFs.
     """
     factors = []
     for chosen in _by_rank(joints):
@@ -321,14 +263,8 @@ class PosedSkeleton:
 
     A pose caches its latest instance; see ``viewer.rig.kinematics.posed_skeleton``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton of the shaped figure.
-    key : NumberKey
-        The pose's ``skinning_key``.
-    world : (J, 4, 4)
-        Joint-to-figure matrices of that pose; made read-only.
+    ``key``: the pose's ``skinning_key``. ``world``: (J, 4, 4), joint-to-figure matrices of that
+    pose; made read-only.
     """
 
     __slots__ = ("_palette", "_skin", "key", "skeleton", "world")
@@ -342,15 +278,7 @@ class PosedSkeleton:
     def palette(self, skin: Skin) -> Floats:
         """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
 
-        Parameters
-        ----------
-        skin : Skin
-            Skin of the shaped figure.
-
-        Returns
-        -------
-        (J, 4, 4)
-            Bind-to-posed matrices, read-only.
+        Returns (J, 4, 4), bind-to-posed matrices, read-only.
         """
         if self._skin is not skin:
             self._palette = self.world @ skin.inverse_bind

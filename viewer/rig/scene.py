@@ -48,67 +48,45 @@ class Swinging(Protocol):
 
 @dataclass(slots=True, eq=False)
 class Actor:
-    """A figure posed and placed in a scene.
-
-    Attributes
-    ----------
-    figure : Figure
-        Immutable; actors may share it.
-    pose : Pose or None
-        This actor's own pose; None if the figure has no skeleton.
-    clip : Motion or None
-        Its motion, which ``viewer.rig.motion.evaluation.pose_actor`` evaluates.
-    placement : (4, 4)
-        Figure space to scene space.
-    visible : bool
-        Whether it is drawn.
-    offset : float
-        Delay of its clip on the scene's clock, seconds.
-    person : int or None
-        Track number in a capture of several people; negative without a track.
-    color : (r, g, b) or None
-        Linear, 0 to 1; None for the default colour.
-    opacity : float
-        Below 1, the actor is drawn as one translucent layer: nothing inside it is visible.
-    points : (K, 4) or None
-        Captured points at the current time: x, y, z, confidence.
-    is_present : bool
-        Whether its clip covers the current time.
-    animation : int
-        Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none.
-    origin : Path or None
-        File of its figure; figures from the same file play their animations together.
-    called : str
-        Name of the recording opened for this actor; empty to use the figure's name.
-    hidden_parts : frozenset of int
-        Parts of the mesh that are not drawn, by index.
-    springs : Swinging or None
-        Simulation of its spring joints while its clip plays; if None, the clip moves them.
-    shape_space : ShapeSpace
-        Model and gender of a captured body, as stated by its file or the user; not necessarily
-        those of the figure that shows it.
-    drive : Drive or None
-        Motion of another skeleton from which the clip was retargeted; None for other clips.
-    """
+    """A figure posed and placed in a scene."""
 
     figure: Figure
+    """Immutable; actors may share it."""
     pose: Pose | None = None
+    """This actor's own pose; None if the figure has no skeleton."""
     clip: Motion | None = None
+    """Its motion, which ``viewer.rig.motion.evaluation.pose_actor`` evaluates."""
     placement: Floats = field(default_factory=lambda: np.eye(4))
+    """(4, 4). Figure space to scene space."""
     visible: bool = True
+    """Whether it is drawn."""
     offset: float = 0.0
+    """Delay of its clip on the scene's clock, seconds."""
     person: int | None = None
+    """Track number in a capture of several people; negative without a track."""
     color: tuple[float, float, float] | None = None
+    """(r, g, b) or None. Linear, 0 to 1; None for the default colour."""
     opacity: float = 1.0
+    """Below 1, the actor is drawn as one translucent layer: nothing inside it is visible."""
     points: Floats | None = None
+    """(K, 4) or None. Captured points at the current time: x, y, z, confidence."""
     is_present: bool = True
+    """Whether its clip covers the current time."""
     called: str = ""
+    """Name of the recording opened for this actor; empty to use the figure's name."""
     animation: int = -1
+    """Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none."""
     origin: Path | None = None
+    """File of its figure; figures from the same file play their animations together."""
     hidden_parts: frozenset[int] = frozenset()
+    """Parts of the mesh that are not drawn, by index."""
     springs: Swinging | None = None
+    """Simulation of its spring joints while its clip plays; if None, the clip moves them."""
     shape_space: ShapeSpace = ShapeSpace()
+    """Model and gender of a captured body, as stated by its file or the user; not necessarily those
+    of the figure that shows it."""
     drive: Drive | None = None
+    """Motion of another skeleton from which the clip was retargeted; None for other clips."""
 
     @property
     def title(self) -> str:
@@ -187,44 +165,31 @@ def figure_pose(figure: Figure) -> Pose:
 
 @dataclass(slots=True, eq=False, weakref_slot=True)
 class Scene:
-    """Actors that are shown together, and the cameras of their capture.
-
-    Attributes
-    ----------
-    actors : list of Actor
-        In drawing order.
-    diagnostics : tuple of Diagnostic
-        Findings of the readers.
-    world_up : "y", "z" or None
-        Up axis; None for the up axis of the first figure.
-    views : tuple of CameraView
-        Calibrated cameras of a capture.
-    facts : tuple of (str, str)
-        Contents of captures among the files, for ``viewer info``.
-    images : CameraImages or None
-        Images of the cameras, if available.
-    time : float or None
-        Current time of its motions, seconds; None for their start.
-    files : list of Path
-        All files from which it was read, including images; no output may overwrite them. Models
-        of people who appear later are appended when they are read.
-    space : "world", "camera" or ""
-        The space of its captured people, if their files contain both; empty otherwise.
-    in_space : callable or None
-        Returns the same scene with people in ``"world"`` or ``"camera"`` space, read completely;
-        None if there is only one space.
-    """
+    """Actors that are shown together, and the cameras of their capture."""
 
     actors: list[Actor]
+    """In drawing order."""
     diagnostics: tuple[Diagnostic, ...] = ()
+    """Findings of the readers."""
     world_up: Literal["y", "z"] | None = None
+    """One of "y", "z" or None. Up axis; None for the up axis of the first figure."""
     views: tuple[CameraView, ...] = ()
+    """Calibrated cameras of a capture."""
     facts: tuple[tuple[str, str], ...] = ()
+    """Contents of captures among the files, for ``viewer info``."""
     time: float | None = None
+    """Current time of its motions, seconds; None for their start."""
     files: list[Path] = field(default_factory=list)
+    """All files from which it was read, including images; no output may overwrite them. Models of
+    people who appear later are appended when they are read."""
     images: CameraImages | None = None
+    """Images of the cameras, if available."""
     space: str = ""
+    """One of "world", "camera" or "". The space of its captured people, if their files contain
+    both; empty otherwise."""
     in_space: Callable[[str], Scene] | None = None
+    """Returns the same scene with people in ``"world"`` or ``"camera"`` space, read completely;
+    None if there is only one space."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -249,17 +214,8 @@ def scene_points(scene: Scene, show: str = "skin") -> Floats:
 
     A few outliers far away are clamped to the bounding box of the other 99.9 % of the points.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene with any number of actors.
-    show : "skin", "skeleton", "both" or "binding"
-        Parts that are drawn.
-
-    Returns
-    -------
-    (N, 3)
-        Scene space; the origin alone if nothing is visible.
+    ``show``: one of "skin", "skeleton", "both" or "binding", parts that are drawn. Returns (N, 3),
+    scene space; the origin alone if nothing is visible.
     """
     clouds = [actor_points(actor, show) for actor in scene.actors if actor.is_drawn]
     clouds = [cloud for cloud in clouds if len(cloud)]
@@ -282,17 +238,8 @@ def scene_box(scene: Scene, show: str = "skin") -> Floats:
 def actor_points(actor: Actor, show: str = "skin") -> Floats:
     """Return the points of the drawn parts of an actor.
 
-    Parameters
-    ----------
-    actor : Actor
-        A placed and posed actor.
-    show : "skin", "skeleton", "both" or "binding"
-        Parts that are drawn; a part that the figure lacks is replaced by one that it has.
-
-    Returns
-    -------
-    (N, 3)
-        Scene space.
+    ``show``: one of "skin", "skeleton", "both" or "binding", parts that are drawn; a part that the
+    figure lacks is replaced by one that it has. Returns (N, 3), scene space.
     """
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
@@ -327,15 +274,7 @@ def scene_unit(scene: Scene) -> str:
     A scale that converts the figure's unit into another one, such as a placement's scale, is taken
     into account; any other scale of a pose is assumed to be the user's choice.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene with any number of actors.
-
-    Returns
-    -------
-    str
-        Key of ``viewer.rig.units.METRES``; empty if no unit is known.
+    Returns key of ``viewer.rig.units.METRES``; empty if no unit is known.
     """
     from viewer.rig.units import METRES
 

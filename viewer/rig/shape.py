@@ -67,23 +67,10 @@ def shaped_skeleton(figure: Figure, weights: Floats) -> Skeleton:
     Morph targets of glTF and FBX files leave the joints in place, and their sums over large meshes
     are expensive.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton, with or without blend shapes.
-    weights : (N,)
-        N <= S; missing weights are 0.
-
-    Returns
-    -------
-    Skeleton
-        The figure's own skeleton if its joints do not follow its shape.
-
-    Raises
-    ------
-    RigError
-        If there is no skeleton, or if the joints follow the shape and there are more weights than
-        blend shapes.
+    ``figure``: figure with a skeleton, with or without blend shapes. ``weights``: (N,), N <= S;
+    missing weights are 0. Returns the figure's own skeleton if its joints do not follow its shape.
+    Raises ``RigError`` if there is no skeleton, or if the joints follow the shape and there are
+    more weights than blend shapes.
     """
     shapes = figure.blend_shapes
     if figure.joint_regressor is None and (shapes is None or shapes.space is None):
@@ -145,17 +132,8 @@ def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
     """Return the rest translations for new joint positions, with unchanged rotations and scales.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the rest rotations and scales.
-    joints : (..., J, 3)
-        New rest positions, figure units.
-
-    Returns
-    -------
-    (..., J, 3)
-        Translations relative to the parent joint.
+    ``joints``: (..., J, 3), new rest positions, figure units. Returns (..., J, 3), translations
+    relative to the parent joint.
     """
     linear = world_matrices(skeleton, _zero_pose(skeleton))[:, :3, :3]
     parents = skeleton.parents
@@ -182,17 +160,8 @@ def _zero_pose(skeleton: Skeleton) -> Pose:
 def joint_shifts(figure: Figure, weights: Floats) -> Floats:
     """Return how far shapes move the rest joints, J(beta) - J(0).
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with or without blend shapes.
-    weights : (F, S)
-        Weights of F shapes.
-
-    Returns
-    -------
-    (F, J, 3)
-        Figure units.
+    ``figure``: figure with or without blend shapes. ``weights``: (F, S), weights of F shapes.
+    Returns (F, J, 3), figure units.
     """
     shapes = figure.blend_shapes
     if shapes is None or shapes.space is None:
@@ -220,15 +189,8 @@ _directions: Memo[Figure, Floats] = Memo()
 def joint_directions(figure: Figure) -> Floats:
     """Return the offsets D of the rest joints per blend shape: J(beta) = J(0) + sum_s beta_s D_s.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with or without blend shapes and joint regressor.
-
-    Returns
-    -------
-    (S, J, 3)
-        Figure units per weight of 1; zeros where joints do not follow the mesh.
+    ``figure``: figure with or without blend shapes and joint regressor. Returns (S, J, 3), figure
+    units per weight of 1; zeros where joints do not follow the mesh.
     """
     from viewer.rig.blendshapes import regress_joints
 
@@ -254,19 +216,7 @@ def joint_directions(figure: Figure) -> Floats:
 def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Floats:
     """Return the weights of a figure's correctives in a pose.
 
-    Parameters
-    ----------
-    correctives : Correctives
-        The figure's correctives.
-    skeleton : Skeleton
-        Skeleton of the shaped figure.
-    pose : Pose
-        DOFs in lengths and radians.
-
-    Returns
-    -------
-    (P,)
-        One per row of the correctives.
+    ``pose``: DOFs in lengths and radians. Returns (P,), one per row of the correctives.
     """
     from viewer.rig.blendshapes import corrective_weights
 
@@ -278,21 +228,8 @@ def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Fl
 def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:
     """Return the vertices before skinning: the rest mesh plus the pose correctives.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with its shape applied.
-    mesh : Mesh
-        The rest mesh.
-    pose : Pose
-        DOFs in lengths and radians.
-    correct : bool
-        Whether to add the pose correctives, if the figure has any.
-
-    Returns
-    -------
-    (V, 3)
-        In the bind pose.
+    ``pose``: DOFs in lengths and radians. ``correct``: whether to add the pose correctives, if the
+    figure has any. Returns (V, 3), in the bind pose.
     """
     if not correct or figure.correctives is None or figure.skeleton is None:
         return mesh.positions

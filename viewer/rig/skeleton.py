@@ -27,59 +27,46 @@ FIRST_ROTATION = 3
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Skeleton:
-    """Joints as parallel arrays, parents before children.
-
-    Attributes
-    ----------
-    names : tuple of J str
-        Names, which may repeat or be empty: joints are identified by index.
-    parents : (J,) int32
-        Index of the parent, smaller than the joint's own; -1 for a root.
-    rest_translations, rest_rotations, rest_scales : (J, 3), (J, 4), (J, 3)
-        Local transform before any DOF: lengths, quaternions (x, y, z, w), factors.
-    dof_joints, dof_kinds : (D,) int32
-        Joint of each DOF, and its index into ``DOF_KINDS``. The first rotation row of a joint
-        is applied first.
-    rest_dofs : (D,)
-        Values of the pose stored in the file: lengths or radians, within the limits.
-    dof_limits : (D, 2)
-        Smallest and largest value; -inf and inf if unlimited.
-    boxes : (J, 2, 3) or None
-        Lowest and highest corner of the box drawn for each joint, in joint space.
-    boxes_from_bones : bool
-        Whether a reader made the boxes, each from its joint to the next ones or to the far end of
-        the last bone. They are parallel to the joint's axes, so they do not fit oblique bones:
-        pictures show bones by default.
-    auxiliary : (J,) bool or None
-        Joints that are not in the file: a reader added them to represent a transform or a second
-        binding exactly. They have no DOFs, and ``shown_joints`` omits them: lists, pictures and
-        messages show the nearest ancestor in their place. None if there are none.
-    humanoid : Humanoid or None
-        Joints with the standard names of human bones, if the file states them.
-    constraints : tuple of Constraint
-        Constraints of joints that follow others, in the order of evaluation; at most one per joint.
-    springs : Springs or None
-        Joints that are simulated as springs while a motion plays.
-    posing : JointPosing or None
-        Rules by which joints follow the DOFs instead of rotating about x, y and z.
-    """
+    """Joints as parallel arrays, parents before children."""
 
     names: tuple[str, ...]
+    """Names, which may repeat or be empty: joints are identified by index."""
     parents: Ints
+    """(J,) int32. Index of the parent, smaller than the joint's own; -1 for a root."""
     rest_translations: Floats
     rest_rotations: Floats
     rest_scales: Floats
+    """(J, 3), (J, 4), (J, 3). Local transform before any DOF: lengths, quaternions (x, y, z, w),
+    factors."""
     dof_joints: Ints
     dof_kinds: Ints
+    """(D,) int32. Joint of each DOF, and its index into ``DOF_KINDS``. The first rotation row of a
+    joint is applied first."""
     rest_dofs: Floats
+    """(D,). Values of the pose stored in the file: lengths or radians, within the limits."""
     dof_limits: Floats
+    """(D, 2). Smallest and largest value; -inf and inf if unlimited."""
     boxes: Floats | None = None
+    """(J, 2, 3) or None. Lowest and highest corner of the box drawn for each joint, in joint space.
+    (J, 2, 3) or None. Lowest and highest corner of the box drawn for each joint, in joint space."""
     boxes_from_bones: bool = False
+    """Whether a reader made the boxes, each from its joint to the next ones or to the far end of
+    the last bone. They are parallel to the joint's axes, so they do not fit oblique bones:
+    pictures show bones by default."""
     auxiliary: Bools | None = None
+    """(J,) bool or None. Joints that are not in the file: a reader added them to represent a
+    transform or a second binding exactly. They have no DOFs, and ``shown_joints`` omits them:
+    lists, pictures and messages show the nearest ancestor in their place. None if there are
+    none."""
     humanoid: Humanoid | None = None
+    """Joints with the standard names of human bones, if the file states them."""
     constraints: tuple[Constraint, ...] = ()
+    """Constraints of joints that follow others, in the order of evaluation; at most one per joint.
+    Constraints of joints that follow others, in the order of evaluation; at most one per joint."""
     springs: Springs | None = None
+    """Joints that are simulated as springs while a motion plays."""
     posing: JointPosing | None = None
+    """Rules by which joints follow the DOFs instead of rotating about x, y and z."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -157,19 +144,9 @@ class Skeleton:
 def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skeleton:
     """Return a skeleton of unlimited ball joints without rest rotations.
 
-    Parameters
-    ----------
-    names : tuple of J str
-        Names of the joints.
-    parents : (J,)
-        -1 for the root; parents come before their children.
-    joints : (J, 3)
-        Rest positions, figure units.
-
-    Returns
-    -------
-    Skeleton
-        Skeleton with three rotation DOFs for every joint, about x, y and z.
+    ``parents``: (J,), -1 for the root; parents come before their children. ``joints``: (J, 3), rest
+    positions, figure units. Returns skeleton with three rotation DOFs for every joint, about x, y
+    and z.
     """
     count = len(parents)
     above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
@@ -189,17 +166,7 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
 def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
     """Clamp DOF values to their limits.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the limits.
-    dofs : (..., D)
-        Lengths or radians.
-
-    Returns
-    -------
-    (..., D)
-        The nearest allowed values.
+    ``dofs``: (..., D), lengths or radians. Returns (..., D), the nearest allowed values.
     """
     return np.clip(dofs, skeleton.dof_limits[:, 0], skeleton.dof_limits[:, 1])
 
@@ -210,16 +177,8 @@ _labels: Memo[Skeleton, tuple[str, ...]] = Memo()
 def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
     """Return a unique label for every joint.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the joint names.
-
-    Returns
-    -------
-    tuple of J str
-        ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` if unnamed.
-        Auxiliary joints have the label of the joint that is shown in their place.
+    Returns ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` if unnamed.
+    Auxiliary joints have the label of the joint that is shown in their place.
     """
     return _labels.get(skeleton, (), lambda: _made_labels(skeleton))
 
@@ -270,17 +229,7 @@ def shown_parents(skeleton: Skeleton) -> Ints:
 def dof_label(skeleton: Skeleton, dof: int) -> str:
     """Return the label of a DOF, as on the command line: ``"knee.x"``, ``"root.ty"``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    dof : int
-        Row of the DOF.
-
-    Returns
-    -------
-    str
-        Joint label, a dot, and the kind from ``DOF_KINDS``.
+    Returns joint label, a dot, and the kind from ``DOF_KINDS``.
     """
     return f"{joint_label(skeleton, skeleton.dof_joints[dof])}.{DOF_KINDS[skeleton.dof_kinds[dof]]}"
 
@@ -295,17 +244,8 @@ def dof_labels(skeleton: Skeleton) -> list[str]:
 def find_dof(skeleton: Skeleton, label: str) -> int:
     """Return the row of the DOF called ``label``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    label : str
-        ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index; case-insensitive.
-
-    Raises
-    ------
-    RigError
-        If there is no such DOF, or several joints have that name.
+    ``label``: ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index; case-insensitive. Raises
+    ``RigError`` if there is no such DOF, or several joints have that name.
     """
     joint_text, dot, kind = label.rpartition(".")
     if not dot or kind.lower() not in DOF_KINDS:
@@ -323,17 +263,8 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
 def find_joint(skeleton: Skeleton, text: str) -> int:
     """Return the index of the joint called ``text``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the joint names.
-    text : str
-        A joint's name, ``"NAME#INDEX"`` or ``"#INDEX"``; case-insensitive.
-
-    Raises
-    ------
-    RigError
-        If there is no such joint, or several joints have that name.
+    ``text``: a joint's name, ``"NAME#INDEX"`` or ``"#INDEX"``; case-insensitive. Raises
+    ``RigError`` if there is no such joint, or several joints have that name.
     """
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:

@@ -22,27 +22,21 @@ class Skin:
     A padded (V, K) table would need V times the largest K: one vertex with a thousand
     influences would multiply the memory of all others. A flat list represents any number of
     influences exactly.
-
-    Attributes
-    ----------
-    starts : (V + 1,) int32
-        Vertex v has the influences from ``starts[v]`` up to, but not including, ``starts[v + 1]``.
-    joints : (N,) int32
-        Joint of each influence; if a vertex lists a joint twice, the weights are summed.
-    weights : (N,)
-        Weights as stored: not sorted, not normalised, possibly 0.
-    inverse_bind : (J, 4, 4)
-        Bind-space-to-joint matrices.
-    dqs_fractions : (V,) or None
-        The fraction of dual quaternion skinning that the file asks for at each vertex, the rest is
-        linear; None for linear blend skinning.
     """
 
     starts: Ints
+    """(V + 1,) int32. Vertex v has the influences from ``starts[v]`` up to, but not including,
+    ``starts[v + 1]``."""
     joints: Ints
+    """(N,) int32. Joint of each influence; if a vertex lists a joint twice, the weights are summed.
+    (N,) int32. Joint of each influence; if a vertex lists a joint twice, the weights are summed."""
     weights: Floats
+    """(N,). Weights as stored: not sorted, not normalised, possibly 0."""
     inverse_bind: Floats
+    """(J, 4, 4). Bind-space-to-joint matrices."""
     dqs_fractions: Floats | None = None
+    """(V,) or None. The fraction of dual quaternion skinning that the file asks for at each vertex,
+    the rest is linear; None for linear blend skinning."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -85,17 +79,7 @@ def skin_from_lists(
 ) -> Skin:
     """Build a skin from (joint, weight) pairs per vertex; meant for small, hand-made figures.
 
-    Parameters
-    ----------
-    influences : V lists of pairs
-        Pairs in vertex order.
-    inverse_bind : (J, 4, 4)
-        Bind-space-to-joint matrices.
-
-    Returns
-    -------
-    Skin
-        Skin with the same pairs in the same order.
+    ``inverse_bind``: (J, 4, 4), bind-space-to-joint matrices.
 
     >>> skin_from_lists([[(0, 1.0)], []], np.eye(4)[None]).starts.tolist()
     [0, 1, 1]
@@ -157,21 +141,9 @@ def skin_from_entries(
 ) -> Skin:
     """Build a skin from the entries of a sparse matrix, in any order.
 
-    Parameters
-    ----------
-    n_vertices : int
-        V.
-    vertices, joints : (N,)
-        Row and column of each weight; the order within a vertex is preserved.
-    weights : (N,)
-        As stored.
-    inverse_bind : (J, 4, 4)
-        Bind-space-to-joint matrices.
-
-    Returns
-    -------
-    Skin
-        Skin with the same entries, vertex by vertex.
+    ``vertices``, ``joints``: (N,), row and column of each weight; the order within a vertex is
+    preserved. ``weights``: (N,), as stored. ``inverse_bind``: (J, 4, 4), bind-space-to-joint
+    matrices.
     """
     order = np.argsort(vertices, kind="stable")
     counts = np.bincount(vertices, minlength=n_vertices)
@@ -199,19 +171,8 @@ def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) ->
     For the entries of one skin and the negated entries of another, this is the L1 distance of their
     rows, regardless of the order of influences and of duplicate joints.
 
-    Parameters
-    ----------
-    n_vertices : int
-        V.
-    vertices, joints : (N,)
-        Row and column of each entry.
-    weights : (N,)
-        Signed weights.
-
-    Returns
-    -------
-    (V,)
-        0 for a vertex without entries.
+    ``vertices``, ``joints``: (N,), row and column of each entry. ``weights``: (N,), signed weights.
+    Returns (V,), 0 for a vertex without entries.
     """
     n_joints = int(joints.max(initial=0)) + 1
     entries, places = np.unique(vertices.astype(np.int64) * n_joints + joints, return_inverse=True)
@@ -229,17 +190,7 @@ def strongest_first(skin: Skin) -> Skin:
 def limit_influences(skin: Skin, count: int) -> Skin:
     """Prune the influences of each vertex, as an engine limited to ``count`` influences does.
 
-    Parameters
-    ----------
-    skin : Skin
-        Any number of influences.
-    count : int
-        Number of the strongest influences to keep.
-
-    Returns
-    -------
-    Skin
-        Influences of the same joint are merged, then pruned, then scaled to a sum of 1.
+    Returns influences of the same joint are merged, then pruned, then scaled to a sum of 1.
     """
     ordered = strongest_first(merged(skin))
     rank = np.arange(len(ordered.joints)) - np.repeat(

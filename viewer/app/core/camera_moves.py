@@ -20,13 +20,6 @@ def keep_fitting(state: AppState, grows: bool) -> None:
     """Extend the known extent of the scene; fit the camera to it unless the user has moved it.
 
     Called in each frame once the free part of the view is known.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the camera and the scene.
-    grows : bool
-        Whether more of the motion is still being read.
     """
     framing = state.framing
     framing.watch(state.camera)
@@ -43,12 +36,7 @@ def keep_fitting(state: AppState, grows: bool) -> None:
 def fit_points(state: AppState, points: Floats) -> None:
     """Aim the camera at some points, fill the view with them, and keep it fitted.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the camera, which stops following a calibrated camera.
-    points : (N, 3)
-        Scene space.
+    ``points``: (N, 3), scene space.
     """
     framing = state.framing
     framing.is_fitting, framing.points = True, points
@@ -108,10 +96,7 @@ def _covered_height(state: AppState, points: Floats) -> float:
 def look_through_view(state: AppState, view: CameraView) -> None:
     """Look through a calibrated camera of the scene.
 
-    Raises
-    ------
-    RigError
-        If the size of the camera's images is unknown.
+    Raises ``RigError`` if the size of the camera's images is unknown.
     """
     scene = state.scene
     seen = camera_from_view(view, _size(state), scene.up, state.box, view_in(view, scene))

@@ -28,21 +28,14 @@ FASTEST = 4.0
 
 
 class PosedFor(NamedTuple):
-    """Key that identifies the poses: actors are posed again only if it changes.
-
-    Attributes
-    ----------
-    time : float
-        Seconds.
-    interpolate_gaps : bool
-        Whether captures are interpolated in their gaps.
-    clips : tuple
-        Clip and offset of each actor; clips are replaced, never modified.
-    """
+    """Key that identifies the poses: actors are posed again only if it changes."""
 
     time: float
+    """Seconds."""
     interpolate_gaps: bool
+    """Whether captures are interpolated in their gaps."""
     clips: tuple[object, ...]
+    """Clip and offset of each actor; clips are replaced, never modified."""
 
 
 @dataclass(slots=True)
@@ -114,10 +107,7 @@ class Clock:
 
         If only the frame rate changes, time and range stay on their frames.
 
-        Parameters
-        ----------
-        chosen : Actor, optional
-            Actor whose capture defines the frames, if it has one.
+        ``chosen``: actor whose capture defines the frames, if it has one.
         """
         was_whole = (self.start, self.end) == self.whole
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
@@ -226,13 +216,7 @@ class Clock:
         self.start, self.end = start, end
 
     def advance(self, seconds: float) -> None:
-        """Advance by some wall clock time, if playing.
-
-        Parameters
-        ----------
-        seconds : float
-            Seconds since the last call.
-        """
+        """Advance by some wall clock time, if playing."""
         if not self.playing or not self.has_motion:
             return
         step = seconds * self.speed
@@ -275,12 +259,8 @@ class Clock:
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
         """Pose all actors if the time or a clip has changed; return whether they were posed.
 
-        Parameters
-        ----------
-        chosen : Actor, optional
-            As for ``follow``, which runs first if clips changed.
-        again : bool
-            Pose the actors even if nothing has changed.
+        ``chosen``: as for ``follow``, which runs first if clips changed. ``again``: pose the actors
+        even if nothing has changed.
         """
         actors, before = self.scene.actors, self.posed_for
         clips = tuple((actor.clip, actor.offset) for actor in actors)
@@ -308,12 +288,7 @@ class Clock:
     def go_back(self, time: float, chosen: Actor | None = None) -> None:
         """Go to a time with restored actors and clips, and pose the actors for it.
 
-        Parameters
-        ----------
-        time : float
-            Seconds.
-        chosen : Actor, optional
-            As for ``follow``.
+        ``chosen``: as for ``follow``.
         """
         self.follow(chosen)
         self.seek(time)

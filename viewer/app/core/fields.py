@@ -29,18 +29,11 @@ _CLAMP = imgui.SliderFlags_.always_clamp
 def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: float = 0.0) -> str:
     """Draw the label of the next widget, and return the widget's own label, which is hidden.
 
-    Parameters
-    ----------
-    label : str
-        Text, and optionally an ID after ``##`` or ``###`` to distinguish equal labels, as in ImGui.
-    width : float
-        Width of the widget in font sizes; the widget then directly follows its label. 0 aligns it
-        with the widgets above and below and lets it fill the line.
-    column : float
-        Width of the label in window coordinates, for rows of one line. By default, it depends on
-        the panel's width, and a longer label is placed above its widget.
-    needs : float
-        Minimum width of the widget in window coordinates; the label shrinks to allow for it.
+    ``label``: text, and optionally an ID after ``##`` or ``###`` to distinguish equal labels, as in
+    ImGui. ``width``: width of the widget in font sizes; the widget then directly follows its label.
+    0 aligns it with the widgets above and below and lets it fill the line. ``column``: width of the
+    label in window coordinates, for rows of one line. By default, it depends on the panel's width,
+    and a longer label is placed above its widget.
     """
     text = label.partition("##")[0]
     hidden = label[label.index("###") :] if "###" in label else f"##{label}"
@@ -78,18 +71,7 @@ def slider_float(
 ) -> tuple[bool, float]:
     """Draw a slider without a visible label; return whether it was moved, and its value.
 
-    Parameters
-    ----------
-    state : AppState
-        Receives messages about typed numbers.
-    label : str
-        Hidden label, as from ``begin_field``.
-    value, low, high : float
-        Value, and the ends of the track.
-    text : str
-        Format of the number.
-    flags : int
-        ImGui's ``SliderFlags_``.
+    ``label``: hidden label, as from ``begin_field``. ``flags``: ImGui's ``SliderFlags_``.
     """
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, high), text, flags)
@@ -117,14 +99,7 @@ def drag_float(
 ) -> tuple[bool, float]:
     """Draw a number that is changed by dragging it, or typed after a click; see ``slider_float``.
 
-    Parameters
-    ----------
-    state, label, value, text
-        As for ``slider_float``.
-    speed : float
-        Change per pixel.
-    low : float
-        Minimum value.
+    ``state``, ``label``, ``value``, ``text``: as for ``slider_float``. ``speed``: change per pixel.
     """
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, math.inf), text, _CLAMP)
@@ -148,14 +123,7 @@ def drag_int(
 def in_row(hidden: str, values: Sequence[Number], draw: Callable[[str, Number], None]) -> None:
     """Draw several fields of equal widths in the space of one; they count as one item.
 
-    Parameters
-    ----------
-    hidden : str
-        Hidden label, as from ``begin_field``.
-    values : sequence
-        Values of the fields.
-    draw : callable
-        Draws a field, given its own hidden label and its value.
+    ``hidden``: hidden label, as from ``begin_field``.
     """
     gap = imgui.get_style().item_inner_spacing.x
     room = imgui.calc_item_width() - (len(values) - 1) * gap

@@ -72,16 +72,8 @@ class _MotionExtent:
     def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
         """Sample a few more frames; return whether there were any left.
 
-        Parameters
-        ----------
-        scene : Scene
-            Scene that is shown; it is not modified.
-        clock : Clock
-            Source of the times of frames.
-        show : str
-            Visible parts of the figures, a key of ``SHOWN``.
-        grows : bool
-            Whether more of the motion is still being read.
+        ``scene``: scene that is shown; it is not modified. ``show``: visible parts of the figures,
+        a key of ``SHOWN``.
         """
         shapes = tuple(map(_own_shape, scene.actors))
         motions = tuple(map(_own_motion, scene.actors))
@@ -173,10 +165,7 @@ class Framing:
     def restart(self, fits: bool = True) -> None:
         """Fit the camera to the current scene, and keep fitting it.
 
-        Parameters
-        ----------
-        fits : bool
-            Whether to fit the camera; False leaves it unchanged.
+        ``fits``: whether to fit the camera; False leaves it unchanged.
         """
         self.extent.restart()
         self.is_fitting, self.points = fits, None

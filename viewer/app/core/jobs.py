@@ -14,28 +14,19 @@ Report = Callable[[int, int, str], None]
 
 
 class Job(Protocol):
-    """Interface of a running job.
-
-    Attributes
-    ----------
-    title : str
-        Description of the job.
-    error : str
-        Reason why the job failed; empty if it did not.
-    lines : list of str
-        Messages when the job ends.
-    output : str
-        The kind of output that is lost if the job does not end, such as ``"export"``; empty if it
-        has none.
-    is_cancelled : bool
-        Whether it was cancelled; its thread may need a moment to end.
-    """
+    """Interface of a running job."""
 
     title: str
+    """Description of the job."""
     error: str
+    """Reason why the job failed; empty if it did not."""
     lines: list[str]
+    """Messages when the job ends."""
     output: str
+    """The kind of output that is lost if the job does not end, such as ``"export"``; empty if it
+    has none."""
     is_cancelled: bool
+    """Whether it was cancelled; its thread may need a moment to end."""
 
     @property
     def is_done(self) -> bool:
@@ -64,21 +55,9 @@ class _EndedError(ViewerError):
 class CountedJob:
     """Job in its own thread that reports its progress and can be cancelled between steps.
 
-    Parameters
-    ----------
-    title : str
-        Description of the job until it reports its first step.
-    act : callable
-        Gets a ``Report`` and returns messages about the result; may raise ViewerError.
-    finish : callable, optional
-        Applies the result of a successful job; called in the frame loop.
-    output : str
-        The kind of files that the job writes, such as ``"export"``; empty if it writes none.
-
-    Attributes
-    ----------
-    is_change : bool
-        Whether the job has a result to apply that changes the scene.
+    ``act``: gets a ``Report`` and returns messages about the result; may raise ViewerError.
+    ``output``: the kind of files that the job writes, such as ``"export"``; empty if it writes
+    none.
     """
 
     def __init__(
@@ -147,14 +126,7 @@ class CountedJob:
 class FrameJob:
     """Job that draws, one step after each frame of the window.
 
-    Parameters
-    ----------
-    title : str
-        Description of the job.
-    steps : generator
-        Yields (done, total) after each step and returns messages; closing it cleans up.
-    output : str
-        The kind of files that the job writes, such as ``"recording"``.
+    ``output``: the kind of files that the job writes, such as ``"recording"``.
     """
 
     def __init__(

@@ -36,12 +36,7 @@ class MessageLog:
     def add(self, text: str, kind: str = "note") -> None:
         """Add a message; a repeated message is counted and moves to the end.
 
-        Parameters
-        ----------
-        text : str
-            One line.
-        kind : str
-            One of ``KINDS``.
+        ``kind``: one of ``KINDS``.
         """
         message = self._messages.pop((kind, text), None)
         if message is None:
@@ -86,15 +81,7 @@ class Messages:
     _logged_error: str = ""  # displayed error that is already in the log
 
     def show(self, text: str, is_status: bool = False) -> None:
-        """Show a message for some seconds, and add it to the log.
-
-        Parameters
-        ----------
-        text : str
-            One line.
-        is_status : bool
-            Whether it reports the result of a key or button and replaces the previous such message.
-        """
+        """Show a message for some seconds, and add it to the log."""
         until = time.monotonic() + _NOTE_SECONDS + len(text) / 30.0
         # A repeated message stays longer and does not push others out of the view.
         self.notes[:] = [

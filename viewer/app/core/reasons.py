@@ -18,15 +18,7 @@ def no_motion(state: AppState) -> str:
 
 
 def no_panel(state: AppState, needs: str) -> str:
-    """Return the reason why a panel has nothing to show.
-
-    Parameters
-    ----------
-    state : AppState
-        The state, with the scene.
-    needs : str
-        Entry of the table of panels.
-    """
+    """Return the reason why a panel has nothing to show."""
     if needs == "motion" and any(actor.figure.animations for actor in state.scene.actors):
         return ""
     if needs == "motion":

@@ -103,10 +103,7 @@ class AppState:
     def of(self, kind: type[Part]) -> Part:
         """Return a feature's own state, created on first use.
 
-        Parameters
-        ----------
-        kind : type
-            Dataclass of the feature with a default for every field.
+        ``kind``: dataclass of the feature with a default for every field.
         """
         part = self._parts.get(kind)
         if part is None:
@@ -176,10 +173,7 @@ class AppState:
     def set_front(self, front: Front) -> None:
         """Set or estimate the axis that the figures face; the camera rotates with it.
 
-        Parameters
-        ----------
-        front : str
-            ``"auto"``, or an axis such as ``"+z"``, other than the up axis.
+        ``front``: ``"auto"``, or an axis such as ``"+z"``, other than the up axis.
         """
         ahead = front_azimuth(guess_front(self.scene) if front == "auto" else front, self.scene.up)
         orbit(self.camera, ahead - self.camera.front, 0.0)

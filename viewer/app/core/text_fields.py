@@ -48,21 +48,10 @@ _LONGEST = 100  # maximum number of characters of a number typed by hand
 def text_field(hidden: str, text: str, hint: str = "", flags: int = 0) -> tuple[bool, str]:
     """Draw a text field, whose text is selected when the field gets the focus.
 
-    Parameters
-    ----------
-    hidden : str
-        Hidden label, as from ``begin_field``.
-    text, hint : str
-        The text, and a placeholder shown in grey while it is empty.
-    flags : int
-        ImGui's ``InputTextFlags_``.
-
-    Returns
-    -------
-    changed : bool
-        Whether the text was edited, or with ``enter_returns_true`` whether Enter was pressed.
-    text : str
-        The text.
+    ``hidden``: hidden label, as from ``begin_field``. ``text``, ``hint``: the text, and a
+    placeholder shown in grey while it is empty. ``flags``: ImGui's ``InputTextFlags_``. Returns
+    ``changed``: whether the text was edited, or with ``enter_returns_true`` whether Enter was
+    pressed.
     """
     flags |= _FLAGS.auto_select_all
     return imgui.input_text_with_hint(hidden, hint, text, flags)
@@ -76,12 +65,7 @@ def search_field(hidden: str, text: str, hint: str) -> str:
 def name_field(hidden: str, name: str, hint: str) -> tuple[bool, str]:
     """Draw a field for a file name; all but the suffix is selected at first.
 
-    Returns
-    -------
-    entered : bool
-        Whether Enter was pressed.
-    name : str
-        The name.
+    Returns ``entered``: whether Enter was pressed.
     """
     name = text_field(hidden, name, hint)[1]
     editing = imgui.internal.get_input_text_state(imgui.get_item_id())
@@ -102,23 +86,9 @@ def number_field(
     Enter, Tab or a click elsewhere enters the number; Escape restores the old one. Text that is not
     a number is marked while it is typed, and causes a message if it is entered.
 
-    Parameters
-    ----------
-    state : AppState
-        Receives the message.
-    hidden : str
-        Hidden label, as from ``begin_field``.
-    value : float
-        Number shown.
-    text : str
-        Format of the number, with its unit.
-    is_whole : bool
-        Whether the number must be a whole number.
-
-    Returns
-    -------
-    float or None
-        The number that was entered, if any.
+    ``hidden``: hidden label, as from ``begin_field``. ``text``: format of the number, with its
+    unit. ``is_whole``: whether the number must be a whole number. Returns the number that was
+    entered, if any.
     """
     unit = unit_of(text)
     wrong = _mistake(hidden, unit)
@@ -203,19 +173,10 @@ def _number_with_unit(text: str, value: float) -> str:
 def read_number(text: str, unit: str = "") -> float:
     """Return a typed number in the unit of its field.
 
-    Parameters
-    ----------
-    text : str
-        A number or a calculation with ``+ - * / ( )`` and ``pi``, and optionally a unit. A comma
-        may be used as the decimal point.
-    unit : str
-        Unit that the field shows; empty if it has none.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a number, the number is too large, or its unit is not accepted by the
-        field.
+    ``text``: a number or a calculation with ``+ - * / ( )`` and ``pi``, and optionally a unit. A
+    comma may be used as the decimal point. ``unit``: unit that the field shows; empty if it has
+    none. Raises ``ValueError`` if the text is not a number, the number is too large, or its unit is
+    not accepted by the field.
 
     >>> read_number("90/2"), read_number("-(1 + 2) * .5"), read_number("1,5 s", "s")
     (45.0, -1.5, 1.5)

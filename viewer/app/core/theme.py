@@ -67,12 +67,7 @@ _DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a lig
 def apply_theme(scale: float, theme: str = "dark") -> None:
     """Set up font, style and behaviour of the current ImGui context.
 
-    Parameters
-    ----------
-    scale : float
-        Scale of fonts and sizes; 1 for a standard screen.
-    theme : str
-        ``"dark"`` or ``"light"``.
+    ``theme``: ``"dark"`` or ``"light"``.
     """
     font = interface_font()
     if font is not None:

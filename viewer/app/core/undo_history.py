@@ -174,15 +174,7 @@ class History:
         return bool(self._redo)
 
     def undo(self, scene: Scene, options: DisplayOptions, pose_at: _PoseAt) -> bool:
-        """Undo one step; return whether there was one.
-
-        Parameters
-        ----------
-        scene, options : Scene, DisplayOptions
-            The objects to restore to their previous state.
-        pose_at : callable
-            Goes to a time and poses the actors for it by their restored clips.
-        """
+        """Undo one step; return whether there was one."""
         self.observe(scene, options, busy=False)
         if not self._undo:
             return False

@@ -45,17 +45,8 @@ class ViewFrame:
     def at_depth_of(self, point: Floats, place: Place) -> Floats:
         """Return the scene point at a window position, at the depth of another point.
 
-        Parameters
-        ----------
-        point : (3,)
-            Scene space, in front of the eye.
-        place : (float, float)
-            Window coordinates.
-
-        Returns
-        -------
-        (3,)
-            Point on the plane through the other point that is parallel to the image plane.
+        ``point``: (3,), scene space, in front of the eye. Returns (3,), point on the plane through
+        the other point that is parallel to the image plane.
         """
         clip = self.matrix @ np.append(point, 1.0)
         found = np.linalg.solve(self.matrix, self._clip(place, clip[2], clip[3]))

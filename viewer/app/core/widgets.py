@@ -66,12 +66,8 @@ def disabled(state: AppState, why: str) -> Iterator[None]:
 def explain(text: str, why: str = "") -> None:
     """Give the last widget a tooltip with its effect, or the reason why it is disabled.
 
-    Parameters
-    ----------
-    text : str
-        Effect of the widget; may be empty.
-    why : str
-        Reason why it is disabled; empty if it is enabled.
+    ``text``: effect of the widget; may be empty. ``why``: reason why it is disabled; empty if it is
+    enabled.
     """
     if not why and imgui.get_current_context().last_item_data.item_flags & _DISABLED:
         # The reason of the enclosing block is shown already.
@@ -87,17 +83,7 @@ def show_tooltip(text: str) -> None:
 
 
 def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
-    """Begin a small window over the view that takes no input; ``imgui.end`` must follow.
-
-    Parameters
-    ----------
-    name : str
-        Name of the overlay's window.
-    x, y : float
-        Position, in window coordinates.
-    pivot : (float, float)
-        Corner placed at that position: (0, 0) for the upper left, (1, 1) for the lower right.
-    """
+    """Begin a small window over the view that takes no input; ``imgui.end`` must follow."""
     imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
     imgui.set_next_window_bg_alpha(0.86)
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking
@@ -110,17 +96,8 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
     """Begin a separate window, which opens in the centre; ``imgui.end`` must follow.
 
-    Parameters
-    ----------
-    title : str
-        Text of the title bar.
-    size : (float, float)
-        Width and height when it first appears, in font sizes; smaller if the window is small.
-
-    Returns
-    -------
-    shown, stays : bool
-        Whether its content is visible, and False once the user closes it.
+    ``size``: width and height when it first appears, in font sizes; smaller if the window is small.
+    Returns whether its content is visible, and False once the user closes it.
     """
     letter, viewport = imgui.get_font_size(), imgui.get_main_viewport()
     room = (
@@ -271,15 +248,5 @@ def key_name(state: AppState, usual: str) -> str:
 
 
 def with_key(state: AppState, text: str, usual: str) -> str:
-    """Return the text of a button or tooltip, followed by the name of its key.
-
-    Parameters
-    ----------
-    state : AppState
-        Provides the names.
-    text : str
-        The text, which describes the key's effect.
-    usual : str
-        Label of the key in the table of keys.
-    """
+    """Return the text of a button or tooltip, followed by the name of its key."""
     return f"{text} ({key_name(state, usual)})"

@@ -154,19 +154,9 @@ def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
 def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: float) -> Points:
     """Return a curve of a sampled animation: at most 2000 points, each exactly at a frame.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        The motion.
-    row : int
-        Row, see ``curves_of``.
-    low, high : float
-        Visible range, seconds; only as many frames are skipped as this range requires.
-
-    Returns
-    -------
-    times, values : (P,)
-        Seconds; lengths or radians without jumps of 2 pi. NaN in gaps.
+    ``row``: row, see ``curves_of``. ``low``, ``high``: visible range, seconds; only as many frames
+    are skipped as this range requires. Returns (P,), seconds; lengths or radians without jumps of 2
+    pi. NaN in gaps.
     """
     timing = clip.timing
     first, step = 0, 1

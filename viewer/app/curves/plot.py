@@ -433,15 +433,7 @@ def _draw_handle(
 
 
 def edit(plot: _Plot, touched: bool) -> None:
-    """Handle clicks and keys in the plot.
-
-    Parameters
-    ----------
-    plot : Plot
-        Current plot.
-    touched : bool
-        Whether the mouse is over a key or tangent, which then handles clicks.
-    """
+    """Handle clicks and keys in the plot."""
     state, view, keyed = plot.state, plot.view, keyed_of(plot.state.actor)
     if keyed is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
         return
@@ -537,12 +529,7 @@ def _ui_scale() -> float:
 def value_limits(values: Floats, least: float) -> tuple[float, float]:
     """Return the ends of an axis that shows some values, with a margin.
 
-    Parameters
-    ----------
-    values : (N,)
-        Values; those that are not finite are ignored.
-    least : float
-        Minimum height of the axis, so that rounding errors do not look like motion.
+    ``values``: (N,), values; those that are not finite are ignored.
 
     >>> value_limits(np.array([0.0, 100.0]), 0.1), value_limits(np.array([30.0, 30.0]), 0.1)
     ((-16.0, 116.0), (15.0, 45.0))

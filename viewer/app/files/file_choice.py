@@ -17,30 +17,13 @@ PICTURES = (".png", ".jpg", ".jpeg")
 class FileDialog:
     """An open folder and the files chosen in it.
 
-    Parameters
-    ----------
-    folder : Path
-        Initial folder.
-    done : callable
-        Called with the state and the choice: files, one folder, or one file to write.
-        If omitted, the chosen files are opened.
-    purpose : str
-        ``"open"``, ``"folder"`` or ``"save"``.
-    title : str
-        Title of the dialog.
-    suffixes : tuple of str
-        Suffixes of the listed files, and of those that can be written in place of the suggested
-        one; if empty, those of all formats that can be opened.
-    name : str
-        Suggested name of the file to write; its suffix is added to names without a suffix.
-    more : callable, optional
-        Draws additional options, given the state and the dialog.
-    more_rows : float
-        Height of these options in lines of text.
-    written : callable, optional
-        Returns all files that are written for a name; if omitted, only the named file is written.
-    is_single : bool
-        Whether only one file can be chosen.
+    ``done``: called with the state and the choice: files, one folder, or one file to write. If
+    omitted, the chosen files are opened. ``purpose``: ``"open"``, ``"folder"`` or ``"save"``.
+    ``suffixes``: suffixes of the listed files, and of those that can be written in place of the
+    suggested one; if empty, those of all formats that can be opened. ``name``: suggested name of
+    the file to write; its suffix is added to names without a suffix. ``written``: returns all files
+    that are written for a name; if omitted, only the named file is written. ``is_single``: whether
+    only one file can be chosen.
     """
 
     def __init__(

@@ -163,17 +163,7 @@ def _foot_height(dialog: FileDialog) -> float:
 
 
 def _draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Path]:
-    """Draw the list of files; return a file that was double-clicked.
-
-    Parameters
-    ----------
-    state : AppState
-        Records the positions of the files.
-    dialog : FileDialog
-        The dialog, whose folder and selection are changed.
-    below : float
-        Height to leave free, in window coordinates.
-    """
+    """Draw the list of files; return a file that was double-clicked."""
     moved = _move(dialog)
     result: list[Path] = []
     if imgui.begin_child("files", (0.0, -below), imgui.ChildFlags_.borders):

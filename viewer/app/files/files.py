@@ -56,29 +56,9 @@ class Loader:
 
     Dropping a loader discards its result.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        Files to open.
-    attempts : sequence of sequences of Path
-        Tried in order until one loads; if all fail, the last error is reported.
-    wake : callable
-        Called from the thread when loading ends.
-    settings : MotionSettings, optional
-        Settings for reading motions.
-    opened : sequence of Path
-        Files of the current scene, to whose figures the motions are applied.
-
-    Attributes
-    ----------
-    scene : Scene or None
-        The scene that was read.
-    builders : list of Builder
-        Builders of captures whose first frames are in the scene.
-    addition : Contents or None
-        Poses and images for the open figure, if the files contain nothing else.
-    error : str
-        Reason why nothing was read; empty if there is no error.
+    ``addition``: poses and images for the open figure, if the files contain nothing else.
+    ``error``: reason why nothing was read; empty if there is no error. ``attempts``: tried in order
+    until one loads; if all fail, the last error is reported.
     """
 
     def __init__(
@@ -185,19 +165,8 @@ class Loader:
 class Stream:
     """Thread that reads parts of captures, which the frame loop adds to the scene.
 
-    Parameters
-    ----------
-    builders : sequence of Builder
-        Builders of the captures; their actors are in the scene.
-    wake : callable
-        Called from the thread when a part is ready.
-
-    Attributes
-    ----------
-    error : str
-        Reason why reading ended early; empty if there is no error.
-    finishing : float
-        Completed fraction of the final motions of driven figures; negative before they are begun.
+    ``error``: reason why reading ended early; empty if there is no error. ``finishing``: completed
+    fraction of the final motions of driven figures; negative before they are begun.
     """
 
     def __init__(self, builders: Sequence[Builder], wake: Callable[[], None]) -> None:
@@ -266,19 +235,9 @@ class Stream:
     def take(self) -> tuple[list[Actor], list[Diagnostic], bool]:
         """Add the parts read since the last call to the scene.
 
-        Returns
-        -------
-        new : list of Actor
-            Actors of people who appeared.
-        notes : list of Diagnostic
-            Messages about the parts.
-        grew : bool
-            Whether anything was added.
-
-        Raises
-        ------
-        RigError
-            If bodies do not match the model; the stream then ends.
+        Returns ``new``: actors of people who appeared; ``notes``: messages about the parts;
+        ``grew``: whether anything was added. Raises ``RigError`` if bodies do not match the model;
+        the stream then ends.
         """
         new: list[Actor] = []
         notes: list[Diagnostic] = []

@@ -86,12 +86,8 @@ class _Part:
 def ask_for_motion(state: AppState, suffix: str = "") -> None:
     """Open the dialog; all actors are preselected if there are several.
 
-    Parameters
-    ----------
-    state : AppState
-        Receives the dialog.
-    suffix : str
-        Suffix of the suggested name of a file with edited keys; that of the first format if empty.
+    ``suffix``: suffix of the suggested name of a file with edited keys; that of the first format if
+    empty.
     """
     moving = _moving_actors(state)
     asks = len(moving) > 1 or state.actor not in moving
@@ -174,20 +170,9 @@ def unsuited_formats(actor: Actor) -> dict[str, str]:
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     """Return all files that are written for a name.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the scene and the chosen actor.
-    path : Path
-        A file, or a folder: a name without suffix.
-    everyone : bool
-        Whether all actors are written, or only the chosen one.
-
-    Returns
-    -------
-    list of Path
-        One file per actor, or one for all if the format holds several figures, and a ``.bin`` next
-        to each ``.gltf``; for a folder, its folder of frames.
+    ``path``: a file, or a folder: a name without suffix. ``everyone``: whether all actors are
+    written, or only the chosen one. Returns one file per actor, or one for all if the format holds
+    several figures, and a ``.bin`` next to each ``.gltf``; for a folder, its folder of frames.
     """
     if not path.suffix:
         return [path / _FRAMES]
@@ -215,19 +200,10 @@ def save_motion(
 
     glTF gets all animations of a figure with their own keys, unless the range is a part of one.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the actors; receives the job, or an error.
-    path : Path
-        Target, whose suffix selects the format; without a suffix, it is an EasyMocap folder. Either
-        all files are written or none.
-    everyone : bool
-        Whether all actors are written, or only the chosen one. Folders, and formats that hold
-        several figures, contain all of them, including those that do not move; other formats get
-        one file per actor.
-    safe_names : bool
-        As in ``MotionOptions``.
+    ``path``: target, whose suffix selects the format; without a suffix, it is an EasyMocap folder.
+    Either all files are written or none. ``everyone``: whether all actors are written, or only the
+    chosen one. Folders, and formats that hold several figures, contain all of them, including those
+    that do not move; other formats get one file per actor. ``safe_names``: as in ``MotionOptions``.
     """
     if why := no_job_room(state):
         state.error = why
@@ -428,16 +404,7 @@ def _draw_formats(
 ) -> None:
     """Draw a list of formats; a choice changes the suffix of the name.
 
-    Parameters
-    ----------
-    state : AppState
-        Records where the rows are drawn.
-    dialog : FileDialog
-        Dialog whose name is changed.
-    formats : mapping
-        Exporters by suffix; ``FOLDER`` for a folder.
-    missing : mapping
-        Reasons why formats cannot be written, by suffix.
+    ``formats``: exporters by suffix; ``FOLDER`` for a folder.
     """
     typed = Path(dialog.typed_name()).suffix.lower()
     now = typed if typed in formats else dialog.suffix or FOLDER

@@ -42,12 +42,7 @@ def _groups(data: bytes) -> list[tuple[str, ...]]:
 def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
     """Move files to the front of the list and save it; return an error message, empty if saved.
 
-    Parameters
-    ----------
-    recent : list
-        Groups of files, modified in place.
-    paths : sequence of Path
-        Files that were opened together.
+    ``recent``: groups of files, modified in place.
     """
     if not paths:
         return ""

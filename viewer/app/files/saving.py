@@ -18,19 +18,7 @@ from viewer.progress import receiving
 def save_files(
     state: AppState, act: Callable[[], object], files: list[Path], saved: object = None
 ) -> None:
-    """Write files unless the scene was read from one of them, and show the result.
-
-    Parameters
-    ----------
-    state : AppState
-        Receives the message.
-    act : callable
-        Writes the files.
-    files : list of Path
-        The files.
-    saved : object, optional
-        The edited object that the files contain.
-    """
+    """Write files unless the scene was read from one of them, and show the result."""
     try:
         # The dialog has already asked whether to replace existing files.
         check_targets(files, state.inputs, force=True)
@@ -50,19 +38,8 @@ def save_in_background(
 ) -> None:
     """Write files in a job that reports its progress; cancelling it leaves all files unchanged.
 
-    Parameters
-    ----------
-    state : AppState
-        Receives the job, or an error if another job is running or the scene was read from a file
-        that would be replaced.
-    act : callable
-        Writes the files in another thread and returns notes.
-    files : sequence of Path
-        The files; the job is named after the first.
-    inputs : sequence of Path
-        Further files that must not be replaced.
-    saved : object, optional
-        The edited object that the files contain.
+    ``state``: receives the job, or an error if another job is running or the scene was read from a
+    file that would be replaced. ``inputs``: further files that must not be replaced.
     """
     if why := no_job_room(state):
         state.error = why

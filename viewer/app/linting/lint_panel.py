@@ -480,12 +480,7 @@ def _differs(actor: Actor, old: Actor) -> bool:
 def _choose_finding(state: AppState, index: int) -> None:
     """Show a finding: its actor, joint and time; -1 or the same index again clears the selection.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the camera, which moves to the finding in the next frame.
-    index : int
-        Index into ``state.of(Linting).checked.findings``.
+    ``index``: index into ``state.of(Linting).checked.findings``.
     """
     view = state.of(Linting)
     view.chosen = -1 if index == view.chosen else index
@@ -516,15 +511,7 @@ def _is_in_scene(state: AppState, finding: Finding) -> bool:
 
 
 def _is_known_there(state: AppState, finding: Finding) -> bool:
-    """Return whether an actor's figure is still the one that was checked.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the last check.
-    finding : Finding
-        A finding of that check.
-    """
+    """Return whether an actor's figure is still the one that was checked."""
     known, index = state.of(Linting).checked, finding.actor
     if known is None or index is None or not _is_in_scene(state, finding):
         return False

@@ -83,17 +83,9 @@ def _key(state: AppState) -> object:
 def marks_of(places: Places) -> tuple[Marks, str]:
     """Return markers for locations, and a note if there are too many to mark them all.
 
-    Parameters
-    ----------
-    places : Places
-        Places to mark; those that are not finite are omitted.
-
-    Returns
-    -------
-    marks : Marks
-        Points at vertices and joints, edges of triangles.
-    note : str
-        Note about places that are not marked; empty if all are.
+    ``places``: places to mark; those that are not finite are omitted. Returns ``marks``: points at
+    vertices and joints, edges of triangles; ``note``: note about places that are not marked; empty
+    if all are.
     """
     vertices, joints = _finite(places.vertices), _finite(places.joints)
     triangles = _finite(places.triangles)
@@ -131,16 +123,7 @@ def _radius(count: int) -> float:
 def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     """Aim the camera at some points, and move it to the front if it would see them from behind.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the camera, which moves immediately.
-    points : (N, 3)
-        Scene space.
-    facing : (3,)
-        Mean normal, as in ``Places``.
-    around : float
-        Minimum extent to show around their centre, as a fraction of the actor's size.
+    ``points``: (N, 3), scene space. ``facing``: (3,), mean normal, as in ``Places``.
     """
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding

@@ -53,13 +53,6 @@ def choose_animation(state: AppState, index: int) -> None:
 
     Edited keys are kept while other animations play. If the file's keys are invalid, an error
     message is shown and nothing changes.
-
-    Parameters
-    ----------
-    state : AppState
-        Holds the actors.
-    index : int
-        Index among the animations of the chosen actor; -1 for none.
     """
     chosen = state.actor
     if index == played(chosen) or not -1 <= index < len(chosen.figure.animations):
@@ -126,15 +119,7 @@ def _put_aside(state: AppState, actor: Actor) -> None:
 
 
 def step_animation(state: AppState, by: int) -> None:
-    """Play the next or previous animation of the chosen actor; the last one wraps to the first.
-
-    Parameters
-    ----------
-    state : AppState
-        Holds the actors.
-    by : int
-        1 or -1.
-    """
+    """Play the next or previous animation of the chosen actor; the last one wraps to the first."""
     count = len(state.actor.figure.animations)
     if not count:
         state.say_status(no_animations(state))

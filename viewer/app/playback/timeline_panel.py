@@ -211,12 +211,7 @@ def set_rate(state: AppState, rate: float) -> None:
 
     Keyed clips have no frames: only the rate for stepping and frame numbers is set for them.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the actors; their clips are replaced, so that the edit can be undone.
-    rate : float
-        Frames per second; a rate outside ``_LIMITS`` is rejected with a message.
+    ``rate``: frames per second; a rate outside ``_LIMITS`` is rejected with a message.
     """
     if foreign_rate(state) or rate == rate_of(state):
         return

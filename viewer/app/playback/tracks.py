@@ -133,14 +133,7 @@ def _draw_keys(
 def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[float, float]]:
     """Return the extents of bars, widened to be visible.
 
-    Parameters
-    ----------
-    places : sequence of float
-        Start and end of each bar, alternating, in points.
-    narrowest : float
-        Minimum width of a bar, unless its neighbours leave less room.
-    end : float
-        Right end of the track.
+    ``narrowest``: minimum width of a bar, unless its neighbours leave less room.
 
     >>> bars([0.0, 9.0, 20.0, 20.0, 22.0, 30.0, 40.0, 40.0], 5.0, 40.0)
     [(0.0, 9.0), (16.0, 21.0), (22.0, 30.0), (35.0, 40.0)]
@@ -158,17 +151,8 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
 def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     """Return the intervals in which a motion's actor is present.
 
-    Parameters
-    ----------
-    clip : Motion
-        A motion; in keyed clips the actor is always present.
-    shortest : float
-        Gaps shorter than this, in seconds, are ignored, because they would be invisible.
-
-    Returns
-    -------
-    list of (float, float)
-        Start and end times in the clip's own time, seconds.
+    ``shortest``: gaps shorter than this, in seconds, are ignored, because they would be invisible.
+    Returns start and end times in the clip's own time, seconds.
     """
     if isinstance(clip, Clip | TransformClip):
         return [(clip.start, clip.end)]
@@ -210,15 +194,6 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float]) -> None:
 def ruler_text_place(x: float, length: float, end: float) -> float:
     """Return the start of a number on the ruler: right of its tick, or left of it at the end.
 
-    Parameters
-    ----------
-    x : float
-        Position of the tick, points.
-    length : float
-        Width of the number, points.
-    end : float
-        End of the ruler, points.
-
     >>> ruler_text_place(50.0, 20.0, 100.0), ruler_text_place(90.0, 20.0, 100.0)
     (53.0, 67.0)
     """
@@ -250,17 +225,7 @@ def _nice_step(smallest: float) -> int:
 def key_times(actor: Actor, joint: int) -> Floats:
     """Return the times of an actor's keys.
 
-    Parameters
-    ----------
-    actor : Actor
-        An actor with any motion; a sampled motion has no keys.
-    joint : int
-        Joint whose keys are returned; -1 for the keys of all channels.
-
-    Returns
-    -------
-    (N,)
-        Scene times in seconds, increasing.
+    Returns (N,), scene times in seconds, increasing.
     """
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None or not isinstance(clip, Clip | TransformClip):

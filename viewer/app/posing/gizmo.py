@@ -228,17 +228,7 @@ def _grabbed(state: AppState, place: Place) -> Handle | None:
 
 
 def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
-    """Return the handle of the selected joint at a window position.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the tool, the actor and the selected joint.
-    frame : ViewFrame
-        Projection of the scene.
-    place : (float, float)
-        Position of the pointer, window coordinates.
-    """
+    """Return the handle of the selected joint at a window position."""
     posing = state.of(Posing)
     posed, pose = selected(state), state.actor.pose
     if posed is None or pose is None:
@@ -514,15 +504,7 @@ def _text_box(
 
 
 def limit_arcs(joint: PosedJoint, pose: Pose) -> list[_LimitArc]:
-    """Return an arc for each free rotation DOF with two finite limits.
-
-    Parameters
-    ----------
-    joint : PosedJoint
-        The joint in the scene.
-    pose : Pose
-        Pose of the actor.
-    """
+    """Return an arc for each free rotation DOF with two finite limits."""
     skeleton, found = joint.skeleton, []
     axes = rotation_axes(skeleton, pose, joint.joint)
     for dof in rotation_dofs(skeleton, joint.joint, free=True).tolist():
@@ -571,14 +553,7 @@ def _bone(joint: PosedJoint) -> Floats:
 def arc_points(arc: _LimitArc, center: Floats, radius: float) -> Floats:
     """Return points along an arc from its low to its high end: (N, 3), scene space.
 
-    Parameters
-    ----------
-    arc : LimitArc
-        Arc to draw, limited to 2 pi.
-    center : (3,)
-        Position of the joint.
-    radius : float
-        Scene units.
+    ``center``: (3,), position of the joint. ``radius``: scene units.
     """
     low, high = arc.low, min(arc.high, arc.low + _WHOLE)
     count = max(2, math.ceil((high - low) / _STEP) + 1)

@@ -46,15 +46,7 @@ def _first_opened(actor: Actor) -> set[int]:
 
 
 def select_joint(state: AppState, joint: int) -> None:
-    """Select a joint of the chosen actor, and reveal its row.
-
-    Parameters
-    ----------
-    state : AppState
-        Receives the selection; a filter that hides the joint is cleared.
-    joint : int
-        Index, 0 or more.
-    """
+    """Select a joint of the chosen actor, and reveal its row."""
     tree = joint_tree(state)
     state.selected_joint = tree.scrolls_to = joint
     skeleton = state.actor.figure.skeleton

@@ -335,18 +335,9 @@ def joint_rows(
 ) -> _Rows:
     """Return the listed rows as (joint, DOF or -1 for the joint's own row, depth).
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Joints and DOFs.
-    opened : frozenset of int
-        Joints whose DOFs and children are listed.
-    wanted : str
-        If not empty, only joints whose name contains it are listed, without hierarchy.
-    has_own : bool
-        Whether a row with the file's own numbers, ``_OWN_NUMBERS``, follows each joint's DOFs.
-    moved : frozenset of int
-        Joints with rows for ``_TRANSLATION`` and ``_SCALE`` after their DOFs.
+    ``wanted``: if not empty, only joints whose name contains it are listed, without hierarchy.
+    ``has_own``: whether a row with the file's own numbers, ``_OWN_NUMBERS``, follows each joint's
+    DOFs. ``moved``: joints with rows for ``_TRANSLATION`` and ``_SCALE`` after their DOFs.
     """
     key = (opened, wanted, has_own, moved)
     return _known_rows.get(skeleton, key, lambda: _rows(skeleton, *key))
@@ -413,17 +404,7 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
 
 
 def _draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> None:
-    """Draw a description of the captured points, and their list.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the filter and the minimum confidence of drawn points.
-    actor : Actor
-        Actor that consists of captured points.
-    layout : PointLayout
-        Names of the points.
-    """
+    """Draw a description of the captured points, and their list."""
     points = actor.points if actor.is_present else None
     imgui.push_text_wrap_pos(0.0)
     imgui.text_unformatted(

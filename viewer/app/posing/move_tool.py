@@ -48,15 +48,8 @@ def longest_chain(skeleton: Skeleton, joint: int) -> int:
 def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     """Return the joints that rotate when a joint is dragged, the nearest first: (N,) int32.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton with the hierarchy.
-    joint : int
-        Index of the dragged joint.
-    asked : int
-        Maximum number; 0 means two, without the root, which would rotate the whole figure, unless
-        nothing else can rotate.
+    ``asked``: maximum number; 0 means two, without the root, which would rotate the whole figure,
+    unless nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)
     if not asked and len(chain) > 1:
@@ -78,13 +71,8 @@ def shifts(skeleton: Skeleton, joint: int) -> bool:
 def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
     """Return the arrows of a joint; none if it cannot be translated.
 
-    Parameters
-    ----------
-    joint : PosedJoint
-        The joint in the scene.
-    orientation : str
-        A key of ``ORIENTATIONS``. A joint with one or two translation DOFs has arrows along their
-        axes instead.
+    ``orientation``: a key of ``ORIENTATIONS``. A joint with one or two translation DOFs has arrows
+    along their axes instead.
     """
     if not shifts(joint.skeleton, joint.joint):
         return []
@@ -102,18 +90,7 @@ def grab_arrow(
 ) -> Arrow | None:
     """Return the arrow under the pointer, or None.
 
-    Parameters
-    ----------
-    found : list of Arrow
-        Arrows to choose from.
-    center : (3,)
-        Position of the joint, scene space.
-    frame : ViewFrame
-        Projection of the scene.
-    place : (float, float)
-        Position of the pointer, window coordinates.
-    reach : float
-        Largest distance from the pointer, points.
+    ``center``: (3,), position of the joint, scene space.
     """
     best, nearest, scale = None, reach * frame.scale, frame.scale
     length = LENGTH * frame.unit_length(center)
@@ -132,19 +109,7 @@ def grab_arrow(
 
 
 class ReachHandle:
-    """Handle of a joint that is dragged by inverse kinematics.
-
-    Parameters
-    ----------
-    posed : PosedJoint
-        The joint at the start of the drag.
-    start : Pose
-        Pose at the start of the drag.
-    place : (float, float)
-        Position of the pointer at the start of the drag.
-    length : int
-        Number of joints above it that may rotate.
-    """
+    """Handle of a joint that is dragged by inverse kinematics."""
 
     def __init__(self, posed: PosedJoint, start: Pose, place: Place, length: int) -> None:
         self.posed, self.start, self.place, self.length = posed, start.copy(), place, length
@@ -173,16 +138,7 @@ class ReachHandle:
 class MoveHandle:
     """Handle of a root, or of a joint with translation DOFs.
 
-    Parameters
-    ----------
-    posed : PosedJoint
-        The joint at the start of the drag.
-    start : Pose
-        Pose at the start of the drag.
-    place : (float, float)
-        Position of the pointer at the start of the drag.
-    arrow : Arrow or None
-        Arrow along which the joint moves; None to move it in the image plane.
+    ``arrow``: arrow along which the joint moves; None to move it in the image plane.
     """
 
     def __init__(

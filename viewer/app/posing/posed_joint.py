@@ -49,15 +49,7 @@ class PosedJoint:
 
         Cofactors transform rotation axes correctly even through reflected and stretched frames.
 
-        Parameters
-        ----------
-        axis : (3,)
-            Rotation axis in the parent's frame.
-
-        Returns
-        -------
-        (3,)
-            Unit vector, scene space.
+        ``axis``: (3,), rotation axis in the parent's frame. Returns (3,), unit vector, scene space.
         """
         x, y, z = self.parent_linear.T
         cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
@@ -71,10 +63,7 @@ class PosedJoint:
     def axes(self, orientation: str) -> Floats:
         """Return the axes of an orientation as the columns of a rotation: (3, 3), scene space.
 
-        Parameters
-        ----------
-        orientation : str
-            A key of ``ORIENTATIONS``.
+        ``orientation``: a key of ``ORIENTATIONS``.
         """
         if orientation == "world":
             return np.eye(3)
@@ -93,14 +82,7 @@ def _axes(linear: Floats) -> Floats:
 def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoint | None:
     """Return a joint of an actor, or None if it has no such joint.
 
-    Parameters
-    ----------
-    actor : Actor
-        A placed and posed actor.
-    joint : int
-        Index of the joint; -1 for none.
-    pose : Pose, optional
-        Pose to use in place of the actor's.
+    ``pose``: pose to use in place of the actor's.
     """
     pose = actor.pose if pose is None else pose
     if pose is None or joint < 0:

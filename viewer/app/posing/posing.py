@@ -161,10 +161,8 @@ class Posing:
 def pause_for_edit(state: AppState) -> None:
     """Pause a clip that would overwrite the chosen actor's pose in the next frame; show a message.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the chosen actor, which is about to be posed; unchanged if no clip drives it.
+    ``state``: state with the chosen actor, which is about to be posed; unchanged if no clip drives
+    it.
     """
     clip, clock = state.actor.clip, state.clock
     if clip is None:

@@ -51,16 +51,7 @@ class Ring:
 def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> list[Ring]:
     """Return the rings of a joint; none if it cannot rotate.
 
-    Parameters
-    ----------
-    joint : PosedJoint
-        The joint in the scene.
-    pose : Pose
-        Pose of its actor.
-    orientation : str
-        A key of ``ORIENTATIONS``.
-    frame : ViewFrame
-        Projection of the scene.
+    ``orientation``: a key of ``ORIENTATIONS``.
     """
     skeleton = joint.skeleton
     if rotates_freely(skeleton, joint.joint):
@@ -84,14 +75,8 @@ def toward_eye(frame: ViewFrame, point: Floats) -> Floats:
 def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = None) -> Floats:
     """Return points of a closed circle around an axis: (N, 3).
 
-    Parameters
-    ----------
-    center, axis : (3,)
-        Scene space; the axis of unit length.
-    radius : float
-        Scene units.
-    start : (3,), optional
-        Direction of the first point, perpendicular to the axis.
+    ``center``, ``axis``: (3,), scene space; the axis of unit length. ``radius``: scene units.
+    ``start``: (3,), direction of the first point, perpendicular to the axis.
     """
     first = _across(axis) if start is None else start
     second = np.cross(axis, first)
@@ -112,18 +97,7 @@ def grab_ring(
 
     The nearest of several rings is chosen; the half of a ring behind the joint counts as farther.
 
-    Parameters
-    ----------
-    found : list of Ring
-        Rings to choose from.
-    center : (3,)
-        Position of the joint, scene space.
-    frame : ViewFrame
-        Projection of the scene.
-    place : (float, float)
-        Position of the pointer, window coordinates.
-    reach : float
-        Largest distance from the pointer, points.
+    ``center``: (3,), position of the joint, scene space.
     """
     best, nearest = None, reach * frame.scale
     length = frame.unit_length(center)
@@ -156,20 +130,8 @@ def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
 class RotateHandle:
     """Handle of a ring.
 
-    Parameters
-    ----------
-    posed : PosedJoint
-        The joint at the start of the drag.
-    start : Pose
-        Pose at the start of the drag.
-    ring : Ring
-        The ring that is dragged.
-    held : (3,)
-        Direction from the joint to the grabbed point: a unit vector, scene space.
-    place : (float, float)
-        Position of the pointer at the start of the drag.
-    in_degrees : bool
-        Whether angles are shown in degrees instead of radians.
+    ``held``: (3,), direction from the joint to the grabbed point: a unit vector, scene space.
+    ``in_degrees``: whether angles are shown in degrees instead of radians.
     """
 
     def __init__(

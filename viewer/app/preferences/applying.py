@@ -27,12 +27,7 @@ _PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"
 def start_with(state: AppState, preferences: Preferences) -> None:
     """Apply stored preferences to a new window.
 
-    Parameters
-    ----------
-    state : AppState
-        State whose preferences and angle unit are set.
-    preferences : Preferences
-        The stored preferences.
+    ``state``: state whose preferences and angle unit are set.
     """
     state.put(preferences)
     state.in_degrees = preferences.in_degrees

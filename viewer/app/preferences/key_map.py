@@ -74,15 +74,8 @@ def label_of(shortcut: Shortcut, keys: Mapping[str, str]) -> str:
 def conflicts(keys: Mapping[str, str]) -> dict[str, str]:
     """Return the actions whose key also runs another action.
 
-    Parameters
-    ----------
-    keys : mapping
-        Changed keys, as in ``Preferences.keys``.
-
-    Returns
-    -------
-    dict
-        Maps the name of an action to the text of another action with the same key.
+    ``keys``: changed keys, as in ``Preferences.keys``. Returns maps the name of an action to the
+    text of another action with the same key.
     """
     users: dict[int, list[Shortcut]] = {}
     for shortcut in KEYS:

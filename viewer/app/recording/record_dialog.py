@@ -136,13 +136,7 @@ class RecordingState:
 
 
 class Preview:
-    """Draws the preview into a texture whenever the preview changes.
-
-    Parameters
-    ----------
-    programs : Programs
-        Programs of the context that is current in every call.
-    """
+    """Draws the preview into a texture whenever the preview changes."""
 
     def __init__(self, programs: Programs) -> None:
         self._programs, self.context = programs, programs.context
@@ -152,15 +146,7 @@ class Preview:
         self._old: list[Target] = []
 
     def draw(self, state: AppState, key: object) -> None:
-        """Draw the preview if the Record window is open and the image has changed.
-
-        Parameters
-        ----------
-        state : AppState
-            State with the settings; receives the texture.
-        key : object
-            Identifies the image of the view.
-        """
+        """Draw the preview if the Record window is open and the image has changed."""
         recording = state.of(RecordingState)
         settings = recording.settings
         self._release_old()
@@ -397,14 +383,8 @@ def _start(state: AppState, paths: list[Path]) -> None:
 def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:
     """Return the display options of a recording.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the options of the view, which are copied.
-    settings : RecordSettings
-        Settings of the recording.
-    n_frames : int
-        Number of frames; several frames are not drawn in final quality unless it is chosen.
+    ``state``: state with the options of the view, which are copied. ``n_frames``: number of frames;
+    several frames are not drawn in final quality unless it is chosen.
     """
     options = copy.deepcopy(state.options)
     if settings.look:

@@ -40,10 +40,8 @@ _FULL = 360.0  # full revolution, degrees
 class RecordedMarks:
     """Annotations of a moving scene: those of the pinned vertex and of the chosen finding.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the marks and the explanation; they are copied, so later changes have no effect.
+    ``state``: state with the marks and the explanation; they are copied, so later changes have no
+    effect.
     """
 
     def __init__(self, state: AppState) -> None:
@@ -57,17 +55,8 @@ class RecordedMarks:
     def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
         """Return the annotations of one frame.
 
-        Parameters
-        ----------
-        scene : Scene
-            Posed scene with the actors of the state, or copies of them.
-        size : (int, int)
-            Width and height of the image, pixels.
-
-        Raises
-        ------
-        ViewerError
-            If a figure's shapes cannot be read.
+        ``size``: width and height of the image, pixels. Raises ``ViewerError`` if a figure's shapes
+        cannot be read.
         """
         found = []
         if self._finding is not None:
@@ -91,33 +80,8 @@ def _recording_steps(
 ) -> Generator[tuple[int, int], None, list[str]]:
     """Record the playback range from the current view.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the scene, which is copied: later edits do not affect the recording.
-    programs : Programs
-        Programs of the context that is current in every step.
-    settings : RecordSettings
-        Settings of the recording.
-    path : Path
-        Target file; ``{frame}`` in the name of numbered images stands for their number.
-    ghost : Ghost, optional
-        Surface that is drawn over the scene.
-
-    Yields
-    ------
-    (int, int)
-        Number of completed frames, and their total.
-
-    Returns
-    -------
-    list of str
-        Messages about the written files.
-
-    Raises
-    ------
-    ViewerError
-        If a frame cannot be drawn or written.
+    ``state``: state with the scene, which is copied: later edits do not affect the recording.
+    ``path``: target file; ``{frame}`` in the name of numbered images stands for their number.
     """
     times, numbers, rate = recorded_times(state, settings)
     size = settings.pixels((state.view_rect[2], state.view_rect[3]))
@@ -204,15 +168,7 @@ def _sink(
 
 
 def start_recording(state: AppState, renderer: Renderer) -> None:
-    """Start a requested recording unless another job is running.
-
-    Parameters
-    ----------
-    state : AppState
-        Holds the request, and receives the job.
-    renderer : Renderer
-        Renderer of the view, whose programs and marks are used.
-    """
+    """Start a requested recording unless another job is running."""
     recording = state.of(RecordingState)
     path, settings, recording.wanted = recording.wanted, recording.settings, None
     if path is None or settings is None or state.job is not None:

@@ -56,15 +56,6 @@ def change_drive(
 
     Long motions are retargeted in the background. If retargeting fails or is cancelled, or the
     drive is changed meanwhile, as by redo, a message is shown and nothing changes.
-
-    Parameters
-    ----------
-    state : AppState
-        State with a driven actor.
-    change : callable
-        Returns the changed drive.
-    tell : callable
-        Reports success.
     """
     if no_job_room(state):
         state.say_status(no_job_room(state))

@@ -292,17 +292,7 @@ def _draw_choice(state: AppState, shown: _Shown, joint: int, partner: int) -> No
 
 
 def _draw_preview(state: AppState, shown: _Shown, size: tuple[float, float]) -> None:
-    """Draw both skeletons at rest; a click selects a joint of the figure, a drag orbits.
-
-    Parameters
-    ----------
-    state : AppState
-        State that contains the panel's state.
-    shown : Shown
-        The match.
-    size : (float, float)
-        Width and height in window coordinates.
-    """
+    """Draw both skeletons at rest; a click selects a joint of the figure, a drag orbits."""
     view = state.of(JointMatch)
     corner = imgui.get_cursor_screen_pos()
     imgui.invisible_button("##preview", (max(size[0], 1.0), max(size[1], 1.0)))
@@ -472,17 +462,7 @@ def is_automatic(state: AppState) -> str:
 
 
 def match_joint(state: AppState, joint: int, partner: int) -> None:
-    """Let another joint of the motion drive a joint of the chosen figure.
-
-    Parameters
-    ----------
-    state : AppState
-        State with a driven actor.
-    joint : int
-        Joint of the figure.
-    partner : int
-        Joint of the motion; -1 to keep the figure's joint at rest.
-    """
+    """Let another joint of the motion drive a joint of the chosen figure."""
     actor = state.actor
     if actor.drive is None:
         return

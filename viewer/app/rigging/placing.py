@@ -86,13 +86,8 @@ def similarity_now(state: AppState, template: Template) -> Similarity:
 def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
     """Return the similarity nearest to a matrix; its scale is the geometric mean over the axes.
 
-    Parameters
-    ----------
-    matrix : (4, 4)
-        Matrix that is nearly a similarity, without reflection; rounding errors are removed.
-    like : Similarity or None
-        Similarity before the change. If it stretches the template along the template's axes, the
-        result does so too.
+    ``matrix``: (4, 4), matrix that is nearly a similarity, without reflection; rounding errors are
+    removed.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     own = np.ones(3)

@@ -299,13 +299,6 @@ def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
     """Return a motion that begins and ends in a pose; None if no joint can rotate.
 
     Each joint except the roots rotates about the axis with the widest range, within its limits.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton with J joints and their DOFs.
-    pose : Pose
-        Pose of the skeleton.
     """
     order = depth_first(skeleton.parents)
     dofs = [dof for joint in order.tolist() if (dof := _bending_dof(skeleton, joint)) >= 0]

@@ -221,15 +221,7 @@ def _draw_dot(
 
 
 def _use_gizmo(state: AppState, template: Template) -> None:
-    """Draw the handles at the centre of the template, and apply their movement.
-
-    Parameters
-    ----------
-    state : AppState
-        State with a target, and a tool other than landmarks.
-    template : Template
-        Template in its current pose.
-    """
+    """Draw the handles at the centre of the template, and apply their movement."""
     view = state.of(Rigging)
     assert view.target is not None  # checked by the caller
     place = target_place(view.target)

@@ -133,14 +133,7 @@ def start_reading(
 ) -> None:
     """Read the chosen template, or a template from other files, which is then chosen.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the chosen template, which is read if there are no paths.
-    paths : tuple of Path
-        Files of the template.
-    then : callable, optional
-        Called in the frame loop once the template has been read.
+    ``state``: state with the chosen template, which is read if there are no paths.
     """
     key = "file" if paths else state.of(Rigging).template_key
 
@@ -246,17 +239,7 @@ def _search_settings(choices: RigChoices) -> AlignmentSettings:
 
 
 def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSettings:
-    """Return the settings of an alignment by three or more landmarks.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the landmarks.
-    mesh : Mesh
-        Mesh of the posed template.
-    refines : bool
-        Whether the alignment is refined by closest points.
-    """
+    """Return the settings of an alignment by three or more landmarks."""
     target = target_mesh(state)
 
     def pair(landmark: Landmark) -> list[Floats]:
@@ -345,25 +328,7 @@ def align_template(
 ) -> Placing:
     """Align a template with a target.
 
-    Parameters
-    ----------
-    template : Template
-        Template in its initial pose.
-    own : Template
-        Template before any fit.
-    target : Mesh
-        Mesh with which to align it.
-    settings : AlignmentSettings
-        Settings of the alignment.
-    fits : bool
-        Whether joints may be rotated and limbs resized.
-    progress : callable
-        Called with the fraction done and the name of the current step; may raise to cancel.
-
-    Raises
-    ------
-    RigError
-        As for ``align``.
+    Raises ``RigError``: as for ``align``.
     """
     plain = template.pose.copy()
     plain.shape_weights = np.zeros(0)  # the shape is now part of the figure
@@ -385,12 +350,7 @@ def align_template(
 def _with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
     """Return a result whose report names the alignment method, if the alignment was given.
 
-    Parameters
-    ----------
-    rigged : Rigged
-        Result of the transfer.
-    placing : Placing or None
-        Placement that was passed to the transfer; None if there was none.
+    ``placing``: placement that was passed to the transfer; None if there was none.
     """
     known = placing.alignment if placing is not None else None
     if placing is None or known is None or rigged.alignment is None:
@@ -408,23 +368,7 @@ def _match_fields(
 ) -> tuple[tuple[VertexField, ...], float]:
     """Find the vertices of a target that match an aligned template.
 
-    Parameters
-    ----------
-    template : Template
-        Template in its current pose.
-    similarity : Similarity
-        Transform from template to target.
-    mesh : Mesh
-        Mesh of the target.
-    settings : MatchSettings
-        Conditions for a match.
-
-    Returns
-    -------
-    fields : tuple of VertexField
-        Matched or not, distance, and angle in degrees, of each vertex.
-    fraction : float
-        Fraction of the vertices that match.
+    Returns ``fields``: matched or not, distance, and angle in degrees, of each vertex.
     """
     assert template.figure.mesh is not None  # templates have meshes
     posed = similarity.apply(deform(template.figure, template.pose)[0])
@@ -457,14 +401,8 @@ def _transfer_settings(
 ) -> TransferSettings:
     """Return the settings to transfer the rig of a template from its current placement.
 
-    Parameters
-    ----------
-    choices : RigChoices
-        Settings of the panel.
-    method : str
-        A key of ``METHODS``.
-    placing : Placing or None
-        Placement of the template; None for a method that needs none.
+    ``method``: a key of ``METHODS``. ``placing``: placement of the template; None for a method that
+    needs none.
     """
     alignment = AlignmentSettings()
     if placing is not None:

@@ -45,15 +45,7 @@ class Flight:
 
 
 def fly_from(state: AppState, before: Camera) -> None:
-    """Animate the camera from an earlier position to its current one.
-
-    Parameters
-    ----------
-    state : AppState
-        State whose camera is already at the end of the animation.
-    before : Camera
-        A copy of the camera at the start.
-    """
+    """Animate the camera from an earlier position to its current one."""
     flight, start, end = state.of(Flight), _place(before), _place(state.camera)
     if start.key() == end.key():
         flight.ends = None

@@ -60,16 +60,8 @@ def hover_joint(state: AppState) -> None:
 def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scale: float) -> None:
     """Find the actor under a resting pointer if there are several actors, but not too many.
 
-    Parameters
-    ----------
-    state : AppState
-        State whose ``Hovered`` receives the actor.
-    renderer : Renderer
-        The renderer that drew the scene.
-    size : (int, int)
-        Width and height of the view, pixels.
-    scale : float
-        Pixels per window coordinate.
+    ``state``: state whose ``Hovered`` receives the actor. ``size``: width and height of the view,
+    pixels.
     """
     hovered, mouse, now = state.of(Hovered), imgui.get_io().mouse_pos, imgui.get_time()
     place = (mouse.x, mouse.y)

@@ -71,11 +71,6 @@ class OutlineLayer:
 
     The item under the pointer changes often, whereas the image of the scene, which may be the
     average of many passes, is cached: so outlines have an image of their own.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -88,16 +83,7 @@ class OutlineLayer:
     ) -> moderngl.Texture | None:
         """Return the outlines as sRGB with straight alpha; None if there are none.
 
-        Parameters
-        ----------
-        state : AppState
-            State with the selected and hovered parts.
-        renderer : Renderer
-            The renderer that drew the scene.
-        size : (int, int)
-            Width and height of the view, pixels.
-        picture : object
-            Key of the image of the scene.
+        ``size``: width and height of the view, pixels.
         """
         outlined = outlined_parts(state)
         if not outlined:

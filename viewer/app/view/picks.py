@@ -42,18 +42,7 @@ def answer_picks(
 ) -> None:
     """Handle the pending click, and describe the vertex under the mouse once the mouse is still.
 
-    Parameters
-    ----------
-    state : AppState
-        Receives the results.
-    renderer : Renderer
-        Renderer that has drawn the scene.
-    size : (int, int)
-        Size of the view, pixels.
-    scale : float
-        Pixels per window coordinate.
-    picture : object
-        Key of the drawn image, which changes whenever the image changes.
+    ``size``: size of the view, pixels.
     """
     picking = state.of(Picking)
     wanted, picking.wanted = picking.wanted, None
@@ -122,10 +111,7 @@ def spot_at(
 ) -> Spot | None:
     """Return the item at a pixel, None for the background; see ``vertex_at`` for the parameters.
 
-    Raises
-    ------
-    ViewerError
-        If a figure's shapes cannot be read.
+    Raises ``ViewerError`` if a figure's shapes cannot be read.
     """
     pick = _pick(state, renderer, size, pixel, state.options)
     found = vertex_at(state, renderer, size, pixel)
@@ -197,21 +183,8 @@ def vertex_at(
 ) -> tuple[int, int, int] | None:
     """Return the vertex of the surface visible at a pixel.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the scene.
-    renderer : Renderer
-        Renderer that has drawn the scene.
-    size : (int, int)
-        Size of the view, pixels.
-    pixel : (float, float)
-        Distance from the left and upper edges of the view.
-
-    Returns
-    -------
-    (actor, vertex, triangle) or None
-        Indices; the triangle is -1 if the reduced mesh is drawn, which has different triangles.
+    ``size``: size of the view, pixels. Returns (actor, vertex, triangle) or None, indices; the
+    triangle is -1 if the reduced mesh is drawn, which has different triangles.
     """
     options = state.options
     # Only surfaces are picked, even where joints or keypoints are drawn over them.

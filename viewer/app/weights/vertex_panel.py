@@ -103,19 +103,7 @@ def draw(state: AppState) -> None:
 def _fitting(room: float, font_size: float) -> tuple[float, int]:
     """Return the font scale and the number of decimals with which rows fit into the panel.
 
-    Parameters
-    ----------
-    room : float
-        Width of the panel, points.
-    font_size : float
-        Normal font size, points.
-
-    Returns
-    -------
-    scale : float
-        Scale of the font, 0.75 to 1.
-    digits : int
-        Number of decimals: four, or three if the smallest font is still too large.
+    Returns ``digits``: number of decimals: four, or three if the smallest font is still too large.
 
     >>> _fitting(300.0, 15.0), _fitting(240.0, 15.0)[1], _fitting(50.0, 15.0)
     ((1.0, 4), 4, (0.75, 3))
@@ -220,10 +208,7 @@ def _draw_swatch(color: Floats) -> None:
 def matrix_text(matrix: Floats) -> str:
     """Return a matrix as rows of numbers in full precision.
 
-    Parameters
-    ----------
-    matrix : (4, 4)
-        Matrix to copy.
+    ``matrix``: (4, 4), matrix to copy.
     """
     return "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
 
@@ -304,15 +289,7 @@ def _draw_number(value: float, digits: int) -> None:
 
 
 def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
-    """Return the colours of the influences, as for dominant joints: (K, 3), sRGB.
-
-    Parameters
-    ----------
-    explanation : Explanation
-        Explanation of a vertex.
-    skeleton : Skeleton
-        Skeleton of its figure.
-    """
+    """Return the colours of the influences, as for dominant joints: (K, 3), sRGB."""
     colors = _palettes.get(skeleton, (), lambda: joint_palette(skeleton.parents))
     return colors[explanation.joints, :3] / 255.0
 
@@ -320,12 +297,7 @@ def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
 def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotation, ...]:
     """Return the annotation of the pinned vertex; the same object as long as nothing changes.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the posed scene; a vertex that cannot be explained is unpinned.
-    size : (int, int)
-        Width and height of the image, pixels.
+    ``size``: width and height of the image, pixels.
     """
     view = state.of(Weights)
     pinned = view.pinned
@@ -352,16 +324,7 @@ def vertex_annotation(
 ) -> Annotation:
     """Return a dot at a vertex, and lines from it to its rigid images M_i p with their weights.
 
-    Parameters
-    ----------
-    explanation : Explanation
-        Explanation of the vertex in the actor's pose.
-    actor : Actor
-        Actor with a skeleton.
-    draws_lines : bool
-        Whether lines are drawn in addition to the dot.
-    size : (int, int)
-        Width and height of the image, pixels.
+    ``size``: width and height of the image, pixels.
     """
     scale = picture_scale(size)
     vertex = apply_transform(actor.placement, explanation.position)

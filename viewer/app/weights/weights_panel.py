@@ -287,12 +287,7 @@ def _draw_vertex_tools(state: AppState) -> None:
 def no_view(state: AppState, key: str) -> str:
     """Return the reason why a scalar quantity cannot be shown; a joint or field may yet be chosen.
 
-    Parameters
-    ----------
-    state : AppState
-        State with the scene.
-    key : str
-        A key of ``SCALARS``.
+    ``key``: a key of ``SCALARS``.
     """
     figures = [actor.figure for actor in state.scene.actors if actor.figure.mesh is not None]
     if not figures:
@@ -394,17 +389,7 @@ def toggle_picking(state: AppState) -> None:
 
 
 def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
-    """Pin a vertex, and explain it in the Vertex panel.
-
-    Parameters
-    ----------
-    state : AppState
-        State with the scene.
-    actor : int
-        Index of the actor in the scene.
-    vertex : int
-        Index of the vertex in the figure.
-    """
+    """Pin a vertex, and explain it in the Vertex panel."""
     figure = state.scene.actors[actor].figure
     if not figure.is_attached:
         state.say_status("This figure has no skin attached to a skeleton: no influences to explain")
@@ -424,10 +409,7 @@ def unpin(state: AppState) -> None:
 def explained(state: AppState) -> Explanation | None:
     """Return the explanation of the pinned vertex in the current pose; None if none is pinned.
 
-    Raises
-    ------
-    ViewerError
-        If the figure's shapes cannot be read.
+    Raises ``ViewerError`` if the figure's shapes cannot be read.
     """
     view, actors = state.of(Weights), state.scene.actors
     pinned = view.pinned

@@ -25,23 +25,10 @@ def fit_axes(
     axes x = R f p + w x R f' p + t, where f' are the current factors. This is linear in all
     unknowns.
 
-    Parameters
-    ----------
-    template, target, rounds
-        As for ``slide``.
-    start : Similarity
-        Approximate alignment, with one scale.
-    rotations : bool
-        Whether the rotation is also refined: a rotation found with a single scale is biased
-        towards the stretched target's diagonal.
-    own : bool
-        Whether the axes are the template's.
-
-    Returns
-    -------
-    Similarity
-        Alignment with factors; the best one so far if the next fit would be a reflection or too few
-        pairs are left.
+    ``template``, ``target``, ``rounds``: as for ``slide``. ``rotations``: whether the rotation is
+    also refined: a rotation found with a single scale is biased towards the stretched target's
+    diagonal. Returns alignment with factors; the best one so far if the next fit would be a
+    reflection or too few pairs are left.
     """
     similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):

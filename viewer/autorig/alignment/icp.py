@@ -52,15 +52,7 @@ class Side(Protocol):
 
 
 class Cloud:
-    """A mesh as a dense point cloud: a fast search, accurate to half the point spacing.
-
-    Parameters
-    ----------
-    samples : SurfaceSamples
-        Points for which closest points on the other mesh are searched.
-    dense : SurfaceSamples
-        Points that are searched.
-    """
+    """A mesh as a dense point cloud: a fast search, accurate to half the point spacing."""
 
     def __init__(self, samples: SurfaceSamples, dense: SurfaceSamples) -> None:
         self.samples, self._dense = samples, dense
@@ -83,14 +75,7 @@ class Cloud:
 class Triangles:
     """A mesh as its triangles: an exact search, without pairs on the borders of holes.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices.
-    count : int
-        Number of points for which closest points on the other mesh are searched.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices.
     """
 
     def __init__(self, positions: Floats, triangles: Ints, count: int) -> None:
@@ -147,21 +132,8 @@ def iterate(
     Each iteration ignores pairs that are farther apart than three times the median, that have
     normals more than 60 degrees apart (ignoring their signs), or that lie on the border of a hole.
 
-    Parameters
-    ----------
-    template, target : Side
-        The surface to move, and the surface with which to align it.
-    start : Similarity
-        Approximate alignment; its factors are preserved.
-    rounds : int
-        Maximum number of iterations; fewer if the relative change of the error is below 1e-5.
-    scales : bool
-        Whether the scale is also fitted.
-
-    Returns
-    -------
-    Similarity
-        The best alignment so far if too few pairs are left to continue.
+    ``rounds``: maximum number of iterations; fewer if the relative change of the error is below
+    1e-5. Returns the best alignment so far if too few pairs are left to continue.
     """
     similarity, before = start, np.inf
     for _ in range(rounds):
@@ -195,15 +167,8 @@ def slide(
     the rotation w, the shift v and the relative change of scale u. The second term prevents
     unbounded sliding.
 
-    Parameters
-    ----------
-    template, target, start, rounds, scales
-        As for ``iterate``; factors of the start must be 1.
-
-    Returns
-    -------
-    Similarity
-        The best alignment so far if too few pairs are left to continue.
+    ``template``, ``target``, ``start``, ``rounds``, ``scales``: as for ``iterate``; factors of the
+    start must be 1. Returns the best alignment so far if too few pairs are left to continue.
     """
     similarity, best, lowest, idle = start, start, np.inf, 0
     for _ in range(rounds):
@@ -295,34 +260,22 @@ def capped_rms(distances: Floats, cap: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """Distances of samples from the surface of the other mesh, in the target's unit.
-
-    Attributes
-    ----------
-    towards : (N,)
-        From the target's samples to the template.
-    away : (M,)
-        From the template's samples to the target.
-    uneven_towards, uneven_away : (N,), (M,)
-        The same distances without the median offset along the normals, so that a jacket at a
-        constant distance of two centimetres from the skin has a small error.
-    """
+    """Distances of samples from the surface of the other mesh, in the target's unit."""
 
     towards: Floats
+    """(N,). From the target's samples to the template."""
     away: Floats
+    """(M,). From the template's samples to the target."""
     uneven_towards: Floats
     uneven_away: Floats
+    """(N,), (M,). The same distances without the median offset along the normals, so that a jacket
+    at a constant distance of two centimetres from the skin has a small error."""
 
 
 def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
     """Return the distances of samples from the surface of the other mesh.
 
-    Parameters
-    ----------
-    template, target : Side
-        As for ``iterate``.
-    similarity : Similarity
-        The alignment to evaluate.
+    ``template``, ``target``: as for ``iterate``.
     """
     ours, theirs = template.samples.positions, target.samples.positions
     near = template.find(similarity.undo(theirs))

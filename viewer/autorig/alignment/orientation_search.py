@@ -32,19 +32,13 @@ _IN_PLACE = 300  # number of samples from which it is determined whether a mesh 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A possible alignment with its error.
-
-    Attributes
-    ----------
-    similarity : Similarity
-        Template to target.
-    error : float
-        Trimmed mean distance over the target's size: in both directions in a search; only from the
-        target to the template for a mesh that is in place, as it may be a part of the template.
-    """
+    """A possible alignment with its error."""
 
     similarity: Similarity
+    """Template to target."""
     error: float
+    """Trimmed mean distance over the target's size: in both directions in a search; only from the
+    target to the template for a mesh that is in place, as it may be a part of the template."""
 
 
 def axis_direction(name: str) -> Floats:
@@ -59,22 +53,10 @@ def axis_rotations(
 ) -> list[Floats]:
     """Return the rotations that map axes to axes: 24, 4 or 1, the identity first if included.
 
-    Parameters
-    ----------
-    template_up : "y" or "z"
-        Up axis of the template. Y-up figures face +z, z-up figures +x.
-    up, facing : str, optional
-        Axes, from ``AXES``, to which the template's up and forward axes are mapped.
-
-    Returns
-    -------
-    list of (3, 3)
-        Proper rotations.
-
-    Raises
-    ------
-    RigError
-        If up and facing are the same or opposite.
+    ``template_up``: either "y" or "z", up axis of the template. Y-up figures face +z, z-up figures
+    +x. ``up``, ``facing``: axes, from ``AXES``, to which the template's up and forward axes are
+    mapped. Returns list of (3, 3), proper rotations. Raises ``RigError`` if up and facing are the
+    same or opposite.
     """
     for name in filter(None, (up, facing)):
         if name not in AXES:
@@ -108,21 +90,10 @@ def unit_scale(ratio: float) -> float:
 def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bool) -> Candidate:
     """Return the best of the placements that keep the origin fixed.
 
-    Parameters
-    ----------
-    template, target : Cloud
-        Samples and search structures.
-    rotations : list of (3, 3)
-        From ``axis_rotations``.
-    scaled : bool
-        Whether scales between units are also tried.
-
-    Returns
-    -------
-    Candidate
-        The first of several candidates with similar errors, so that nothing is rotated
-        unnecessarily: most figures look nearly the same from behind. The error is measured in one
-        direction: a shirt on the body fits, regardless of the parts that it does not cover.
+    ``rotations``: list of (3, 3), from ``axis_rotations``. ``scaled``: whether scales between units
+    are also tried. Returns the first of several candidates with similar errors, so that nothing is
+    rotated unnecessarily: most figures look nearly the same from behind. The error is measured in
+    one direction: a shirt on the body fits, regardless of the parts that it does not cover.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []
@@ -144,22 +115,9 @@ def search(
 ) -> Candidate:
     """Return the best candidate after a few iterations for each, and more for the best four.
 
-    Parameters
-    ----------
-    template, target : Cloud
-        Samples and search structures.
-    rotations : list of (3, 3)
-        From ``axis_rotations``.
-    scale : float or None
-        Fixed scale; if None, the search starts from the ratio of the mean distances from the
-        centroid, which, unlike box sizes, do not depend on the orientation of a mesh.
-    report : callable
-        Called with the completed fraction; may raise to cancel.
-
-    Returns
-    -------
-    Candidate
-        The candidate with the smallest two-way error.
+    ``rotations``: list of (3, 3), from ``axis_rotations``. ``scale``: fixed scale; if None, the
+    search starts from the ratio of the mean distances from the centroid, which, unlike box sizes,
+    do not depend on the orientation of a mesh.
     """
     ours, theirs = template.samples.positions, target.samples.positions
     start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale

@@ -76,27 +76,18 @@ _FIXED = 1e6  # penalty on fixed unknowns
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """A template fitted to a target.
-
-    Attributes
-    ----------
-    figure : Figure
-        Figure with resized limbs.
-    pose : Pose
-        DOFs are within their limits; the joints' quaternions contain the remaining rotation.
-    similarity : Similarity
-        Map from the posed figure to the target.
-    rotated : (J, 3)
-        Total rotation vectors of the joints, radians.
-    grown : (2, J)
-        Logarithms of the scales along and across the limbs.
-    """
+    """A template fitted to a target."""
 
     figure: Figure
+    """Figure with resized limbs."""
     pose: Pose
+    """DOFs are within their limits; the joints' quaternions contain the remaining rotation."""
     similarity: Similarity
+    """Map from the posed figure to the target."""
     rotated: Floats
+    """(J, 3). Total rotation vectors of the joints, radians."""
     grown: Floats
+    """(2, J). Logarithms of the scales along and across the limbs."""
 
 
 def fit_pose(
@@ -112,20 +103,8 @@ def fit_pose(
 
     Limbs of a symmetric template are scaled equally on both sides.
 
-    Parameters
-    ----------
-    template : Figure
-        Figure with mesh, skeleton and skin, and its shape applied.
-    pose : Pose
-        Initial pose; not modified. Pose correctives are ignored.
-    similarity : Similarity
-        Initial map from the posed template to the target; without factors.
-    far, near : Side
-        The target, with a fast search for the first iterations and an exact search for the last.
-    scales : bool
-        Whether the template's size and its proportions may change.
-    report : callable
-        Called with the completed fraction; may raise to cancel.
+    ``pose``: initial pose; not modified. Pose correctives are ignored. ``similarity``: initial map
+    from the posed template to the target; without factors.
     """
     mesh, skeleton, _ = template.attached()
     limbs = limbs_of(template)
@@ -231,69 +210,46 @@ def _put_rotations(skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignedTemplate:
-    """A template's vertices and joints in the target's frame.
-
-    Attributes
-    ----------
-    positions, normals : (V, 3)
-        Vertices of the template.
-    joints, axes : (J, 3)
-        Joints of the template, and unit vectors along their limbs.
-    """
+    """A template's vertices and joints in the target's frame."""
 
     positions: Floats
     normals: Floats
+    """(V, 3). Vertices of the template."""
     joints: Floats
     axes: Floats
+    """(J, 3). Joints of the template, and unit vectors along their limbs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """Corresponding vertices of the template and points of the target.
-
-    Attributes
-    ----------
-    vertices : (N,)
-        Vertices of the template, matched with points that face the same way.
-    targets, normals : (N, 3)
-        Points of the target and the normals there.
-    ends : (M,)
-        Vertices of the template, regardless of their orientation.
-    end_targets : (M, 3)
-        The points of the target closest to them.
-    """
+    """Corresponding vertices of the template and points of the target."""
 
     vertices: Ints
+    """(N,). Vertices of the template, matched with points that face the same way."""
     targets: Floats
     normals: Floats
+    """(N, 3). Points of the target and the normals there."""
     ends: Ints
+    """(M,). Vertices of the template, regardless of their orientation."""
     end_targets: Floats
+    """(M, 3). The points of the target closest to them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseStep:
-    """Result of an iteration, in the target's frame.
-
-    Attributes
-    ----------
-    middle : (3,)
-        Centre of the whole figure's rotation and scaling.
-    rotation, shift : (3,)
-        Rotation vector and shift of the whole figure; the shift in the target's unit.
-    growth : float
-        Logarithm of the whole figure's scale.
-    rotation_vectors : (J, 3)
-        Rotation vectors of the joints; 0 for roots, which rotate with the whole figure.
-    limb_growths : (2, J)
-        Logarithms of the limbs' scales: along, across.
-    """
+    """Result of an iteration, in the target's frame."""
 
     middle: Floats
+    """(3,). Centre of the whole figure's rotation and scaling."""
     rotation: Floats
     shift: Floats
+    """(3,). Rotation vector and shift of the whole figure; the shift in the target's unit."""
     growth: float
+    """Logarithm of the whole figure's scale."""
     rotation_vectors: Floats
+    """(J, 3). Rotation vectors of the joints; 0 for roots, which rotate with the whole figure."""
     limb_growths: Floats
+    """(2, J). Logarithms of the limbs' scales: along, across."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -319,30 +275,10 @@ def solve_step(
 ) -> PoseStep:
     """Solve the linear problem above.
 
-    Parameters
-    ----------
-    aligned : AlignedTemplate
-        The template.
-    limbs : Limbs
-        Weights and fractions of its joints.
-    parents : (J,)
-        -1 for roots.
-    pairs : Pairs
-        At least one pair.
-    size : float
-        Size of the target.
-    rotated : (J, 3)
-        Sum of the rotations of previous iterations, radians.
-    grown : (2, J)
-        Sum of the limbs' growths in previous iterations.
-    scales : bool
-        Whether the figure and its limbs may be scaled.
-
-    Returns
-    -------
-    PoseStep
-        Step in which no joint rotates by more than 0.3 radians and nothing grows by more than a
-        fifth.
+    ``parents``: (J,), -1 for roots. ``rotated``: (J, 3), sum of the rotations of previous
+    iterations, radians. ``grown``: (2, J), sum of the limbs' growths in previous iterations.
+    Returns step in which no joint rotates by more than 0.3 radians and nothing grows by more than a
+    fifth.
     """
     middle = aligned.positions[pairs.vertices].mean(axis=0)
     frame = _Frame(middle, size, aligned, limbs, parents)

@@ -58,30 +58,20 @@ _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedAlignment:
-    """Alignment, pose and proportions of a template.
-
-    Attributes
-    ----------
-    alignment : Alignment
-        Alignment of the template in ``pose``.
-    figure : Figure
-        The template, with scaled limbs if needed.
-    pose : Pose
-        The given pose of the template, or the fitted pose.
-    positions : (V, 3)
-        The template's vertices in that pose, in the template's frame.
-    lines : tuple of Diagnostic
-        Messages about changes to pose and proportions, and about better options.
-    most_rotated : (float, str)
-        The largest joint rotation in radians, and the joint's name; (0, "") if none.
-    """
+    """Alignment, pose and proportions of a template."""
 
     alignment: Alignment
+    """Alignment of the template in ``pose``."""
     figure: Figure
+    """The template, with scaled limbs if needed."""
     pose: Pose
+    """The given pose of the template, or the fitted pose."""
     positions: Floats
+    """(V, 3). The template's vertices in that pose, in the template's frame."""
     lines: tuple[Diagnostic, ...]
+    """Messages about changes to pose and proportions, and about better options."""
     most_rotated: tuple[float, str] = (0.0, "")
+    """The largest joint rotation in radians, and the joint's name; (0, "") if none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,31 +96,10 @@ def align_posed(
 ) -> PosedAlignment:
     """Align a template with a target, rotating its joints if its pose differs.
 
-    Parameters
-    ----------
-    template : Figure
-        Figure with mesh, skeleton and skin, and its shape applied.
-    pose : Pose
-        Pose of the template, without shape weights.
-    target : Mesh
-        Mesh with triangles.
-    settings : AlignmentSettings
-        Known facts about the alignment. With a separate scale per axis, nothing is fitted; with a
-        known scale, only the pose is fitted.
-    fits : bool
-        Whether pose and proportions may change.
-    report : callable
-        Called with the completed fraction and the current step; may raise to cancel.
-
-    Returns
-    -------
-    PosedAlignment
-        Alignment of the unchanged template, unless a fitted template is much better.
-
-    Raises
-    ------
-    RigError
-        See ``align``.
+    ``pose``: pose of the template, without shape weights. ``settings``: known facts about the
+    alignment. With a separate scale per axis, nothing is fitted; with a known scale, only the pose
+    is fitted. Returns alignment of the unchanged template, unless a fitted template is much better.
+    Raises ``RigError``: see ``align``.
     """
     posed = deform(template, pose)[0]
     ours = Posed(posed, template.require_mesh().triangles)

@@ -25,24 +25,16 @@ from viewer.rig.skinning.lbs import move
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limbs:
-    """The part of the mesh that each joint moves.
-
-    Attributes
-    ----------
-    weights : (V, J)
-        Weights of the skin, normalised to a sum of 1 per vertex.
-    fractions : (V, J)
-        Sums of the weights of a joint and all below it.
-    axes : (J, 3)
-        Unit vectors along the limbs, in the bind pose; 0 for a joint without influence.
-    partners : (J,)
-        Mirror counterpart of each joint, or the joint itself.
-    """
+    """The part of the mesh that each joint moves."""
 
     weights: Floats
+    """(V, J). Weights of the skin, normalised to a sum of 1 per vertex."""
     fractions: Floats
+    """(V, J). Sums of the weights of a joint and all below it."""
     axes: Floats
+    """(J, 3). Unit vectors along the limbs, in the bind pose; 0 for a joint without influence."""
     partners: Ints
+    """(J,). Mirror counterpart of each joint, or the joint itself."""
 
 
 def limbs_of(figure: Figure) -> Limbs:
@@ -50,11 +42,6 @@ def limbs_of(figure: Figure) -> Limbs:
 
     An axis points from the joint to those below it, each weighted by its fraction of the mesh,
     or, for a leaf joint, to the mean of its vertices.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure with mesh, skeleton and skin.
     """
     mesh, skeleton, skin = figure.attached()
     parents = skeleton.parents
@@ -83,19 +70,8 @@ def limbs_of(figure: Figure) -> Limbs:
 def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
     """Return a figure with scaled limbs: mesh, bind pose and rest skeleton.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with mesh, skeleton and skin.
-    limbs : Limbs
-        Limbs of this figure.
-    lengths, girths : (J,)
-        Factors along and across the limbs.
-
-    Returns
-    -------
-    Figure
-        Figure with the same joints and weights; all other vertex data is unchanged.
+    ``lengths``, ``girths``: (J,), factors along and across the limbs. Returns figure with the same
+    joints and weights; all other vertex data is unchanged.
     """
     mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(

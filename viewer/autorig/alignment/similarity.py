@@ -17,27 +17,18 @@ _ON_LINE = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Similarity:
-    """A map of points, p' = F s R H p + t, F = diag(factors), H = diag(own_factors).
-
-    Attributes
-    ----------
-    scale : float
-        Scale common to all axes.
-    rotation : (3, 3)
-        Proper rotation, applied after ``own_factors``.
-    shift : (3,)
-        Translation in the unit of the target space.
-    factors : (3,)
-        Additional scales along the axes of the target space; their product is 1.
-    own_factors : (3,)
-        Additional scales along the axes of the source space.
-    """
+    """A map of points, p' = F s R H p + t, F = diag(factors), H = diag(own_factors)."""
 
     scale: float
+    """Scale common to all axes."""
     rotation: Floats
+    """(3, 3). Proper rotation, applied after ``own_factors``."""
     shift: Floats
+    """(3,). Translation in the unit of the target space."""
     factors: Floats
+    """(3,). Additional scales along the axes of the target space; their product is 1."""
     own_factors: Floats = field(default_factory=lambda: np.ones(3))
+    """(3,). Additional scales along the axes of the source space."""
 
     def __post_init__(self) -> None:
         for name, shape in (
@@ -84,23 +75,9 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
     With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
     s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).
 
-    Parameters
-    ----------
-    points, targets : (N, 3)
-        Pairs, N >= 3.
-    scale : float, optional
-        Scale; fitted if omitted.
-
-    Returns
-    -------
-    Similarity
-        Similarity whose factors are all 1.
-
-    Raises
-    ------
-    RigError
-        If there are fewer than three pairs, or the points are collinear: any rotation about
-        the line then fits equally well.
+    ``points``, ``targets``: (N, 3), pairs, N >= 3. ``scale``: scale; fitted if omitted. Raises
+    ``RigError`` if there are fewer than three pairs, or the points are collinear: any rotation
+    about the line then fits equally well.
 
     >>> corners = np.eye(3)
     >>> found = fit_similarity(corners, 2.0 * corners[[1, 2, 0]])

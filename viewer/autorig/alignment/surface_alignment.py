@@ -50,49 +50,34 @@ _BAD = 0.03  # ratio of RMS error to size above which a warning is given
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posed:
-    """A surface to align: the posed template, or the target.
-
-    Attributes
-    ----------
-    positions : (V, 3)
-        Positions in the mesh's own unit.
-    triangles : (T, 3)
-        Vertex indices.
-    """
+    """A surface to align: the posed template, or the target."""
 
     positions: Floats
+    """(V, 3). Positions in the mesh's own unit."""
     triangles: Ints
+    """(T, 3). Vertex indices."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignmentSettings:
-    """Known facts about an alignment, and options.
-
-    Attributes
-    ----------
-    up, facing : str or None
-        The target's axes, from ``orientation_search.AXES``; None to detect them.
-    scale : str
-        One of ``SCALES``.
-    landmarks : (N, 2, 3) or None
-        Three or more pairs of points of the posed template and the target. They replace
-        the search.
-    refines : bool
-        Whether closest points refine landmarks or the result of the search.
-    matrix : (4, 4) or None
-        A given alignment, such as one set by hand in the window; it replaces the search.
-    samples : int
-        Points distributed over each surface for which closest points on the other are searched.
-        The run time of a fit is proportional to it.
-    """
+    """Known facts about an alignment, and options."""
 
     up: str | None = None
     facing: str | None = None
+    """The target's axes, from ``orientation_search.AXES``; None to detect them."""
     scale: str = "uniform"
+    """One of ``SCALES``."""
     landmarks: Floats | None = None
+    """(N, 2, 3) or None. Three or more pairs of points of the posed template and the target. They
+    replace the search."""
     refines: bool = True
+    """Whether closest points refine landmarks or the result of the search."""
     matrix: Floats | None = None
+    """(4, 4) or None. A given alignment, such as one set by hand in the window; it replaces the
+    search."""
     samples: int = field(default_factory=lambda: SAMPLES)
+    """Points distributed over each surface for which closest points on the other are searched. The
+    run time of a fit is proportional to it."""
 
     @property
     def dense(self) -> int:
@@ -111,46 +96,27 @@ class AlignmentSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """Placement of the posed template in the target's frame.
-
-    Attributes
-    ----------
-    similarity : Similarity
-        Template to target, in the target's unit; never a reflection.
-    error : float
-        Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
-        size.
-    away : float
-        The same distance of the template from the target; large if the target is only a part of a
-        figure.
-    uneven : (float, float)
-        RMS distances over the size in the same two directions, without the median offset between
-        the surfaces. All distances are included, each clamped to 5 %, so that protruding ends of
-        limbs are included.
-    how : str
-        ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` if pose and
-        proportions were also fitted, unless landmarks were given.
-    """
+    """Placement of the posed template in the target's frame."""
 
     similarity: Similarity
+    """Template to target, in the target's unit; never a reflection."""
     error: float
+    """Trimmed RMS distance (the best 90 %) of the target from the template, over the target's size.
+    Trimmed RMS distance (the best 90 %) of the target from the template, over the target's size."""
     away: float
+    """The same distance of the template from the target; large if the target is only a part of a
+    figure."""
     uneven: tuple[float, ...]
+    """RMS distances over the size in the same two directions, without the median offset between the
+    surfaces. All distances are included, each clamped to 5 %, so that protruding ends of limbs
+    are included."""
     how: str
+    """``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` if pose and
+    proportions were also fitted, unless landmarks were given."""
 
     @classmethod
     def of(cls, template: Side, target: Side, similarity: Similarity, how: str) -> Alignment:
-        """Return an alignment together with its errors.
-
-        Parameters
-        ----------
-        template, target : Side
-            Both meshes.
-        similarity : Similarity
-            Placement of the template.
-        how : str
-            As in the attribute with this name.
-        """
+        """Return an alignment together with its errors."""
         size = target.size
         gaps = gaps_between(template, target, similarity)
         return cls(
@@ -167,13 +133,8 @@ class Alignment:
 def misfit(alignment: Alignment, is_part: bool) -> float:
     """Return the score by which alignments are compared: the mean of the uneven errors both ways.
 
-    Parameters
-    ----------
-    alignment : Alignment
-        Alignment with its errors.
-    is_part : bool
-        Whether the target is only a part of the template; other parts of the template are then
-        ignored.
+    ``is_part``: whether the target is only a part of the template; other parts of the template are
+    then ignored.
     """
     towards, away = alignment.uneven
     return towards if is_part else 0.5 * (towards + away)
@@ -193,26 +154,8 @@ def align(
     rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
     refined on the surfaces.
 
-    Parameters
-    ----------
-    template, target : Posed
-        Surfaces in approximately the same pose.
-    template_up : "y" or "z"
-        The template's up axis.
-    settings : AlignmentSettings
-        Known facts and options.
-    report : callable
-        Called with the completed fraction and the current step; may raise to cancel.
-
-    Returns
-    -------
-    Alignment
-        Alignment with its error.
-
-    Raises
-    ------
-    RigError
-        If a mesh has no area, landmarks are collinear, or axes contradict each other.
+    ``template_up``: either "y" or "z", the template's up axis. Raises ``RigError`` if a mesh has no
+    area, landmarks are collinear, or axes contradict each other.
     """
     report(0.0, "alignment")
     samples = settings.samples
@@ -279,11 +222,8 @@ def _refined(
 def similarity_of(matrix: Floats) -> Similarity:
     """Return a 4 x 4 matrix as a similarity, with separate scales in at most one of the spaces.
 
-    Raises
-    ------
-    RigError
-        If it reflects, shears, or scales along directions other than the axes of the template or
-        of the target.
+    Raises ``RigError`` if it reflects, shears, or scales along directions other than the axes of
+    the template or of the target.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     determinant = float(np.linalg.det(linear))

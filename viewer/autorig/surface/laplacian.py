@@ -23,18 +23,10 @@ def laplacian(mesh: Welded) -> tuple[Any, Floats]:
     Islands with non-manifold edges have no cotangent operator: they get the graph
     Laplacian of their edges, and their vertices all have the mesh's mean area.
 
-    Parameters
-    ----------
-    mesh : Welded
-        W vertices. Scale it to size 1 if the areas are to be compared with the operator, which
-        has no unit.
-
-    Returns
-    -------
-    operator : sparse (W, W)
-        Symmetric and positive semidefinite; rows sum to 0.
-    areas : (W,)
-        Squared units, at least 1e-9 of their mean; all 1 if no triangle has an area.
+    ``mesh``: W vertices. Scale it to size 1 if the areas are to be compared with the operator,
+    which has no unit. Returns ``operator``: sparse (W, W), symmetric and positive semidefinite;
+    rows sum to 0; ``areas``: (W,), squared units, at least 1e-9 of their mean; all 1 if no triangle
+    has an area.
     """
     broken = np.unique(mesh.islands[non_manifold_edges(mesh.triangles)])
     is_broken: Bools = np.isin(mesh.islands, broken)
@@ -57,17 +49,8 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     vertices, and the contribution of each triangle stays positive semidefinite, which clamping
     large cotangents would not ensure.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    sparse (V, V)
-        Dimensionless, with the opposite sign of the Laplacian in calculus.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns sparse (V, V),
+    dimensionless, with the opposite sign of the Laplacian in calculus.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     >>> L = cotangent_laplacian(square, np.array([[0, 1, 2], [0, 2, 3]]))
@@ -83,17 +66,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
 def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
     """Return the Laplacian of the graph of edges: L_ij = -1, L_ii = number of neighbours.
 
-    Parameters
-    ----------
-    n_vertices : int
-        V.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    sparse (V, V)
-        Dimensionless.
+    ``triangles``: (T, 3), vertex indices. Returns sparse (V, V), dimensionless.
     """
     links = edges(triangles)
     return _from_edges(n_vertices, links, np.ones(len(links)))
@@ -106,17 +79,8 @@ def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
     obtuse triangle, the obtuse corner owns half of the area and the others a quarter (Meyer et al.
     2003, fig. 4).
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    (V,)
-        Squared units; the sum is the area of the mesh.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns (V,), squared
+    units; the sum is the area of the mesh.
     """
     cotangents = _cotangents(positions, triangles)
     corners = positions[triangles]

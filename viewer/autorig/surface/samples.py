@@ -13,18 +13,12 @@ from viewer.rig.mesh import triangle_areas
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceSamples:
-    """Points of a surface, and the normals there.
-
-    Attributes
-    ----------
-    positions : (N, 3)
-        The mesh's unit.
-    normals : (N, 3)
-        Unit normals of the triangles on which they lie.
-    """
+    """Points of a surface, and the normals there."""
 
     positions: Floats
+    """(N, 3). The mesh's unit."""
     normals: Floats
+    """(N, 3). Unit normals of the triangles on which they lie."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "positions", frozen("positions", self.positions, (None, 3)))
@@ -46,24 +40,8 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
     sqrt u (1 - v) + c v sqrt u (Turk 1990), with u and v from the R2 sequence (multiples of the
     plastic number's powers).
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices.
-    count : int
-        Number of points, N.
-
-    Returns
-    -------
-    SurfaceSamples
-        N points.
-
-    Raises
-    ------
-    RigError
-        If no triangle has an area.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Raises ``RigError`` if
+    no triangle has an area.
     """
     chosen = _even_triangles(positions, triangles, count)
     plastic = 1.32471795724474602596  # the real root of x^3 = x + 1
@@ -80,24 +58,8 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
 def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
     """Return some vertices of a surface, approximately evenly distributed by area.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices.
-    count : int
-        Maximum number of vertices.
-
-    Returns
-    -------
-    (N,)
-        Sorted vertex indices, each once; N <= count.
-
-    Raises
-    ------
-    RigError
-        If no triangle has an area.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns (N,), sorted
+    vertex indices, each once; N <= count. Raises ``RigError`` if no triangle has an area.
     """
     return np.unique(triangles[_even_triangles(positions, triangles, count), 0])
 

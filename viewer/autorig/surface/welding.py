@@ -21,25 +21,17 @@ _NEAR = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Welded:
-    """A mesh without coincident vertices.
-
-    Attributes
-    ----------
-    positions : (W, 3)
-        Position of the first of the vertices that were joined.
-    triangles : (F, 3) int32
-        Triangles with three different corners.
-    vertices : (V,) int32
-        The welded vertex of each vertex of the mesh.
-    islands : (W,) int32
-        Connected component of each welded vertex, counted from 0. A vertex without a triangle is a
-        separate island.
-    """
+    """A mesh without coincident vertices."""
 
     positions: Floats
+    """(W, 3). Position of the first of the vertices that were joined."""
     triangles: Ints
+    """(F, 3) int32. Triangles with three different corners."""
     vertices: Ints
+    """(V,) int32. The welded vertex of each vertex of the mesh."""
     islands: Ints
+    """(W,) int32. Connected component of each welded vertex, counted from 0. A vertex without a
+    triangle is a separate island."""
 
     @property
     def n_islands(self) -> int:
@@ -50,23 +42,10 @@ class Welded:
 def weld(positions: Floats, triangles: Ints) -> Welded:
     """Join coincident vertices, drop triangles that collapse to edges, and label the islands.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit. Vertices closer than 1e-4 of the median edge are treated as coincident.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    Welded
-        A triangle without area is preserved if its corners differ: it closes a gap at a T-junction,
-        where only one side of an edge has a vertex.
-
-    Raises
-    ------
-    RigError
-        If SciPy is missing.
+    ``positions``: (V, 3), any unit. Vertices closer than 1e-4 of the median edge are treated as
+    coincident. ``triangles``: (T, 3), vertex indices. Returns a triangle without area is preserved
+    if its corners differ: it closes a gap at a T-junction, where only one side of an edge has a
+    vertex. Raises ``RigError`` if SciPy is missing.
     """
     first, vertices = _joined_exactly(positions)
     tolerance = _NEAR * _median_edge(positions, triangles)
@@ -87,17 +66,8 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
 def islands(n_vertices: int, triangles: Ints) -> Ints:
     """Return the connected component of each vertex.
 
-    Parameters
-    ----------
-    n_vertices : int
-        V.
-    triangles : (T, 3)
-        Vertex indices.
-
-    Returns
-    -------
-    (V,) int32
-        Labels from 0, in the order of their first vertices.
+    ``triangles``: (T, 3), vertex indices. Returns (V,) int32, labels from 0, in the order of their
+    first vertices.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     links = edges(triangles)

@@ -25,31 +25,12 @@ def transfer_clip(
     Angles are unchanged; lengths are scaled with the figure, so that a path requires the same
     number of footsteps. The clip keeps the template's own axes, including its up axis.
 
-    Parameters
-    ----------
-    clip : Clip or SampledClip
-        Clip of the template.
-    skeleton : Skeleton
-        Skeleton of the target.
-    length_scale : float
-        Target units per unit of the template's figure space, 1 if nothing was scaled.
-    figure_scale : float
-        Scale of the whole figure in the template's pose: the target's lengths already
-        include it.
-    path_scale : float or None
-        Replaces ``length_scale`` for the figure's translation and its roots, which scale with the
-        length of the legs; None for the same factor.
-
-    Returns
-    -------
-    Clip or SampledClip
-        Clip with the same type, name and timing. Shape weights of captures are dropped, as the
-        target has a different shape.
-
-    Raises
-    ------
-    RigError
-        If the clip has a different number of joints, or moves a DOF that does not exist.
+    ``length_scale``: target units per unit of the template's figure space, 1 if nothing was scaled.
+    ``path_scale``: replaces ``length_scale`` for the figure's translation and its roots, which
+    scale with the length of the legs; None for the same factor. Returns clip with the same type,
+    name and timing. Shape weights of captures are dropped, as the target has a different shape.
+    Raises ``RigError`` if the clip has a different number of joints, or moves a DOF that does not
+    exist.
     """
     path = length_scale if path_scale is None else path_scale
     roots = skeleton.parents < 0

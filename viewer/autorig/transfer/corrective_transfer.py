@@ -29,27 +29,10 @@ def transfer_correctives(
     The closest point of an unmatched vertex may be on a different limb, so
     correctives fade smoothly to 0 at unmatched vertices.
 
-    Parameters
-    ----------
-    correctives : Correctives
-        Offsets of the template's vertices.
-    points : SurfacePoints
-        Closest template point for each of the target's V vertices.
-    triangles : (T, 3)
-        Triangles of the template.
-    matched : (V,) bool
-        Vertices that lie on the template.
-    positions : (V, 3)
-        The target's vertices.
-    target_triangles : (F, 3)
-        Triangles of the target.
-    scale : float
-        Target units per template unit.
-
-    Returns
-    -------
-    Correctives or None
-        None if the result would have more than ``MOST_NUMBERS`` values.
+    ``triangles``: (T, 3), triangles of the template. ``matched``: (V,) bool, vertices that lie on
+    the template. ``positions``: (V, 3), the target's vertices. ``target_triangles``: (F, 3).
+    ``scale``: target units per template unit. Returns none if the result would have more than
+    ``MOST_NUMBERS`` values.
     """
     offsets = correctives.values()
     if len(offsets) * len(positions) * 3 > MOST_NUMBERS:

@@ -24,22 +24,15 @@ _SMOOTH = 0.01  # weight of smoothness relative to reproducing the pose when a t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InvertedSkinning:
-    """A mesh at rest, with the matrices that pose it.
-
-    Attributes
-    ----------
-    positions : (V, 3)
-        Positions in the bind pose; pose correctives are still included.
-    matrices : (V, 3, 4)
-        The matrix that poses each vertex.
-    guarded : (V,) bool
-        Vertices whose matrix is nearly singular: the inverse of the nearest rotation is used
-        instead, so posing does not reproduce them exactly.
-    """
+    """A mesh at rest, with the matrices that pose it."""
 
     positions: Floats
+    """(V, 3). Positions in the bind pose; pose correctives are still included."""
     matrices: Floats
+    """(V, 3, 4). The matrix that poses each vertex."""
     guarded: Bools
+    """(V,) bool. Vertices whose matrix is nearly singular: the inverse of the nearest rotation is
+    used instead, so posing does not reproduce them exactly."""
 
 
 def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedSkinning:
@@ -49,19 +42,8 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
     the nearest rotation (polar factor) replaces it, as dividing by a tiny value would tear the
     mesh; a vertex without influences is unchanged.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Posed vertices.
-    skin : Skin
-        Skin of V vertices.
-    palette : (J, 4, 4)
-        Skinning matrices of the pose, bind to posed.
-
-    Returns
-    -------
-    InvertedSkinning
-        Vertices in the bind pose of the skin.
+    ``positions``: (V, 3), posed vertices. ``palette``: (J, 4, 4), skinning matrices of the pose,
+    bind to posed.
     """
     matrices = blended_matrices(skin, palette)
     linear = matrices[:, :, :3]
@@ -97,19 +79,9 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     and their two-ring, with all others fixed, with the graph Laplacian L and lambda = 0.01. The
     problem is linear in x, so one linear system solves it.
 
-    Parameters
-    ----------
-    inverted : InvertedSkinning
-        Result of ``invert_skinning``.
-    posed : (V, 3)
-        The vertices t that posing should reproduce.
-    triangles : (T, 3)
-        Vertex indices; coincident vertices move together.
-
-    Returns
-    -------
-    (V, 3)
-        Rest positions, which equal those in ``inverted`` away from guarded vertices.
+    ``inverted``: result of ``invert_skinning``. ``posed``: (V, 3), the vertices t that posing
+    should reproduce. ``triangles``: (T, 3), vertex indices; coincident vertices move together.
+    Returns (V, 3), rest positions, which equal those in ``inverted`` away from guarded vertices.
     """
     if not inverted.guarded.any():
         return inverted.positions

@@ -19,21 +19,14 @@ _BLOCK = 1 << 20  # point-triangle pairs per batch, about 200 bytes each
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferredJoints:
-    """Joint positions in the target's frame.
-
-    Attributes
-    ----------
-    positions : (J, 3)
-        Positions in the pose of the target.
-    transferred : (J,) bool
-        Joints moved by the surface around them; the others moved with their parents.
-    measurable : (J,) bool
-        Joints with a non-empty row in the regressor.
-    """
+    """Joint positions in the target's frame."""
 
     positions: Floats
+    """(J, 3). Positions in the pose of the target."""
     transferred: Bools
+    """(J,) bool. Joints moved by the surface around them; the others moved with their parents."""
     measurable: Bools
+    """(J,) bool. Joints with a non-empty row in the regressor."""
 
 
 def surface_shifts(
@@ -45,24 +38,11 @@ def surface_shifts(
 ) -> tuple[Floats, Bools]:
     """Return the vectors from points to the closest points of a target, and their reliability.
 
-    Parameters
-    ----------
-    positions, normals : (V, 3)
-        The template's vertices, aligned with the target.
-    target_positions : (W, 3)
-        The target's vertices.
-    target_triangles : (T, 3)
-        Triangles of the target.
-    max_distance : float
-        Maximum distance in the target's unit.
-
-    Returns
-    -------
-    shifts : (V, 3)
-        Target minus template.
-    matched : (V,) bool
-        Whether the points are close enough, with surfaces at most 60 degrees apart in either
-        orientation.
+    ``positions``, ``normals``: (V, 3), the template's vertices, aligned with the target.
+    ``target_positions``: (W, 3), the target's vertices. ``target_triangles``: (T, 3).
+    ``max_distance``: maximum distance in the target's unit. Returns ``shifts``: (V, 3), target
+    minus template; ``matched``: (V,) bool, whether the points are close enough, with surfaces at
+    most 60 degrees apart in either orientation.
     """
     found = Surface(target_positions, target_triangles).closest(positions)
     facing = triangle_normals(target_positions, target_triangles)[found.triangles]
@@ -77,17 +57,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     A root uses the boundary with its children. Rows are not normalised; a joint without a boundary
     has an empty row.
 
-    Parameters
-    ----------
-    skin : Skin
-        Skin of the template.
-    parents : (J,)
-        -1 for roots.
-
-    Returns
-    -------
-    JointRegressor
-        Weights of vertices for each joint.
+    ``parents``: (J,), -1 for roots.
     """
     owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
     count = skin.n_joints
@@ -121,23 +91,10 @@ def transfer_joints(
     regressor in a posed mesh cancels out. If less than half of a row is matched, the joint moves
     with its parent.
 
-    Parameters
-    ----------
-    joints : (J, 3)
-        Joint positions, posed and aligned with the target.
-    parents : (J,)
-        -1 for roots; parents come first.
-    regressor : JointRegressor
-        The model's own regressor, or ``boundary_weights``.
-    shifts : (V, 3)
-        From ``surface_shifts``.
-    matched : (V,) bool
-        Whether each shift is reliable.
-
-    Returns
-    -------
-    TransferredJoints
-        In the unit of ``joints``.
+    ``joints``: (J, 3), joint positions, posed and aligned with the target. ``parents``: (J,), -1
+    for roots; parents come first. ``regressor``: the model's own regressor, or
+    ``boundary_weights``. ``shifts``: (V, 3), from ``surface_shifts``. ``matched``: (V,) bool,
+    whether each shift is reliable. Returns in the unit of ``joints``.
     """
     rows, columns, weights = regressor.joints, regressor.vertices, regressor.weights
     count = len(joints)
@@ -158,14 +115,8 @@ def transfer_joints(
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
     """Return whether joints lie outside a mesh: (J,) bool, also for a mesh that is inside out.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices.
-    joints : (J, 3)
-        In the same space.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. ``joints``: (J, 3), in
+    the same space.
     """
     outer: Bools = np.abs(winding_numbers(positions, triangles, joints)) < _INSIDE
     return outer
@@ -179,19 +130,9 @@ def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Float
     make the sum a fraction (Jacobson, Kavan, Sorkine-Hornung 2013), negative if the mesh is
     inside out: compare the absolute value with one half to test for the inside.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices, counter-clockwise from outside.
-    points : (N, 3)
-        Points to test, none of them on the surface.
-
-    Returns
-    -------
-    (N,)
-        Unitless.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices, counter-clockwise from
+    outside. ``points``: (N, 3), points to test, none of them on the surface. Returns (N,),
+    unitless.
     """
     total = np.zeros(len(points))
     step = max(1, _BLOCK // max(1, len(points)))

@@ -28,28 +28,19 @@ _LEGS = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestSkeleton:
-    """The target's skeleton, its binding, and the pose in which the target was found.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-        It has the template's rest pose in the template's axes and the target's unit, so clips and
-        poses of the template remain valid.
-    inverse_bind : (J, 4, 4)
-        Inverse bind matrices for the template's bind pose.
-    pose : Pose
-        Pose that puts the joints at their positions in the target.
-    root_scale : float
-        Scale of the root's lengths, see ``leg_scale``.
-    lines : tuple of Diagnostic
-        Messages about changes other than lengths.
-    """
+    """The target's skeleton, its binding, and the pose in which the target was found."""
 
     skeleton: Skeleton
+    """It has the template's rest pose in the template's axes and the target's unit, so clips and
+    poses of the template remain valid."""
     inverse_bind: Floats
+    """(J, 4, 4). Inverse bind matrices for the template's bind pose."""
     pose: Pose
+    """Pose that puts the joints at their positions in the target."""
     root_scale: float
+    """Scale of the root's lengths, see ``leg_scale``."""
     lines: tuple[Diagnostic, ...]
+    """Messages about changes other than lengths."""
 
 
 def fit_rest_skeleton(
@@ -68,27 +59,11 @@ def fit_rest_skeleton(
     template's, scaled like the legs; the figure's translation moves it to the target, and R is
     included in the root's rotation.
 
-    Parameters
-    ----------
-    template : Figure
-        Figure with the pose's shape applied, with skeleton and skin.
-    pose : Pose
-        Pose of the template.
-    similarity : Similarity
-        Map from the posed template, with the pose's own scale and translation, to the target.
-    joints : (J, 3)
-        Joint positions in the target's frame.
-    transferred : (J,) bool or None
-        Joints that were measured on the target. A symmetric template then gives a symmetric
-        skeleton: left and right offsets are averaged, or taken from the measured side.
-        None keeps the joints unchanged.
-    original : Skeleton or None
-        The template's skeleton before its limbs were scaled; None if they were not.
-
-    Returns
-    -------
-    RestSkeleton
-        Skeleton with lengths in the target's unit.
+    ``joints``: (J, 3), joint positions in the target's frame. ``transferred``: (J,) bool or None,
+    joints that were measured on the target. A symmetric template then gives a symmetric skeleton:
+    left and right offsets are averaged, or taken from the measured side. None keeps the joints
+    unchanged. ``original``: the template's skeleton before its limbs were scaled; None if they were
+    not. Returns skeleton with lengths in the target's unit.
     """
     skeleton, skin = template.require_skeleton(), template.require_skin()
     scale = similarity.scale * pose.figure_scale
@@ -287,14 +262,8 @@ def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> f
     it. If limbs were scaled or the whole figure was stretched, root heights and translations
     therefore scale with the legs.
 
-    Parameters
-    ----------
-    before, after : Skeleton
-        Skeletons with the same joints.
-    up : "y" or "z"
-        Up axis of both skeletons.
-    otherwise : float
-        Result if there are no legs, as for hands, heads, or a root on the ground.
+    ``up``: either "y" or "z", up axis of both skeletons. ``otherwise``: result if there are no
+    legs, as for hands, heads, or a root on the ground.
     """
     axis = "xyz".index(up)
     heights = _heights(before, axis)

@@ -17,64 +17,44 @@ _FEW = 0.75  # fraction of matched vertices below which too many weights are est
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidIslands:
-    """Connected parts of a target that do not meet the template and are attached rigidly.
-
-    Attributes
-    ----------
-    vertices : (R,) int32
-        The first vertex of each island.
-    counts : (R,) int32
-        Number of vertices of each island; coincident vertices are counted once.
-    joints : (R,) int32
-        The joint with the largest weight in each island.
-    distances : (R,)
-        Distances from the mean of each island's vertices to the template, in the target's unit.
-    """
+    """Connected parts of a target that do not meet the template and are attached rigidly."""
 
     vertices: Ints
+    """(R,) int32. The first vertex of each island."""
     counts: Ints
+    """(R,) int32. Number of vertices of each island; coincident vertices are counted once."""
     joints: Ints
+    """(R,) int32. The joint with the largest weight in each island."""
     distances: Floats
+    """(R,). Distances from the mean of each island's vertices to the template, in the target's
+    unit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeightTransfer:
-    """Weights of a target's vertices, and their origin.
-
-    Attributes
-    ----------
-    starts, joints, weights
-        As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
-    matched : (V,) bool
-        Vertices whose weights come from the template's surface.
-    inpainted : (V,) bool
-        Vertices whose weights were inpainted. Vertices that are neither matched nor inpainted
-        belong to a rigid island.
-    distances : (V,)
-        Distances to the template, in the target's unit.
-    angles : (V,)
-        Radians between the normals of both meshes; 0 if the target has none.
-    points : SurfacePoints or None
-        The V points of the template that were compared; None if only its vertices were compared.
-    backwards : (V,) bool
-        Vertices of parts whose triangles are wound the wrong way.
-    rigid : RigidIslands
-        Parts without any matched vertex.
-    lines : tuple of Diagnostic
-        Messages for the user; joints by index, from 0.
-    """
+    """Weights of a target's vertices, and their origin."""
 
     starts: Ints
     joints: Ints
     weights: Floats
+    """As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``."""
     matched: Bools
+    """(V,) bool. Vertices whose weights come from the template's surface."""
     inpainted: Bools
+    """(V,) bool. Vertices whose weights were inpainted. Vertices that are neither matched nor
+    inpainted belong to a rigid island."""
     distances: Floats
+    """(V,). Distances to the template, in the target's unit."""
     angles: Floats
+    """(V,). Radians between the normals of both meshes; 0 if the target has none."""
     points: SurfacePoints | None
+    """The V points of the template that were compared; None if only its vertices were compared."""
     backwards: Bools
+    """(V,) bool. Vertices of parts whose triangles are wound the wrong way."""
     rigid: RigidIslands
+    """Parts without any matched vertex."""
     lines: tuple[Diagnostic, ...]
+    """Messages for the user; joints by index, from 0."""
 
     def skin(self, inverse_bind: Floats) -> Skin:
         """Return the weights as a skin bound by ``inverse_bind``, (J, 4, 4)."""
@@ -84,12 +64,8 @@ class WeightTransfer:
 def nothing_matched(distances: Floats, size: float) -> str:
     """Return the message for a target that does not meet the template anywhere.
 
-    Parameters
-    ----------
-    distances : (V,)
-        Distances from the template.
-    size : float
-        The target's box diagonal, in the same unit.
+    ``distances``: (V,), distances from the template. ``size``: the target's box diagonal, in the
+    same unit.
     """
     far = float(np.median(distances)) / size
     return (
@@ -109,14 +85,8 @@ def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
 def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnostic, ...]:
     """Return messages about matched, reversed and inpainted parts.
 
-    Parameters
-    ----------
-    found : Matches
-        Matches of the welded vertices.
-    inpainted : (W,) bool
-        The vertices that were inpainted.
-    method : str
-        Solver; "direct" by default.
+    ``inpainted``: (W,) bool, the vertices that were inpainted. ``method``: solver; "direct" by
+    default.
     """
     ratio = float(found.matched.mean())
     values = {

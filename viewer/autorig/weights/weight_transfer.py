@@ -56,21 +56,14 @@ _NO_SUM = 1e-12  # minimum sum of weights that can be normalised
 
 @dataclass(frozen=True, slots=True)
 class WeightSettings:
-    """Options of a weight transfer.
-
-    Attributes
-    ----------
-    match : MatchSettings
-        Criteria by which a vertex lies on the template.
-    smoothing_rounds : int
-        Smoothing iterations of the inpainted weights and their neighbourhoods; 0 for none.
-    max_influences : int or None
-        Number of strongest influences kept per vertex; None for all.
-    """
+    """Options of a weight transfer."""
 
     match: MatchSettings = field(default_factory=MatchSettings)
+    """Criteria by which a vertex lies on the template."""
     smoothing_rounds: int = 0
+    """Smoothing iterations of the inpainted weights and their neighbourhoods; 0 for none."""
     max_influences: int | None = None
+    """Number of strongest influences kept per vertex; None for all."""
 
     def __post_init__(self) -> None:
         if self.smoothing_rounds < 0:
@@ -90,32 +83,12 @@ def transferred_weights(
 ) -> WeightTransfer:
     """Transfer weights by closest points, and inpaint vertices that do not meet the template.
 
-    Parameters
-    ----------
-    template : Template
-        The template's surface, aligned with the target.
-    weights : Skin
-        Weights of the template's vertices.
-    positions : (V, 3)
-        The target's vertices.
-    triangles : (T, 3)
-        Triangles of the target.
-    settings : WeightSettings
-        Limits of matching, smoothing, number of influences.
-    report : callable
-        Called with a fraction from 0 to 1 and the current step; may raise to cancel.
-
-    Returns
-    -------
-    WeightTransfer
-        Weights whose rows sum to 1. No weight of the template is dropped, only inpainted weights
-        below 1e-6, and those of corners with a barycentric coordinate below 1e-6.
-
-    Raises
-    ------
-    RigError
-        If no vertex of the target meets the template, the target is a point, weights of the
-        template are missing, or SciPy is missing.
+    ``positions``: (V, 3), the target's vertices. ``triangles``: (T, 3), triangles of the target.
+    ``report``: called with a fraction from 0 to 1 and the current step; may raise to cancel.
+    Returns weights whose rows sum to 1. No weight of the template is dropped, only inpainted
+    weights below 1e-6, and those of corners with a barycentric coordinate below 1e-6. Raises
+    ``RigError`` if no vertex of the target meets the template, the target is a point, weights of
+    the template are missing, or SciPy is missing.
     """
     source = weight_matrix(weights, template.triangles)
     size = box_size(bounding_box(positions))
@@ -162,22 +135,11 @@ def nearest_weights(
 ) -> WeightTransfer:
     """Copy the weights of the nearest vertex.
 
-    Parameters
-    ----------
-    template : (V_S, 3)
-        The template's vertices, aligned with the target.
-    weights : Skin
-        The template's skin; weights are copied unchanged.
-    positions : (V, 3)
-        The target's vertices.
-    max_distance : float
-        Fraction of the target's box diagonal up to which a vertex is reported as matched. It
-        does not affect the weights.
-
-    Returns
-    -------
-    WeightTransfer
-        ``angles`` are all 0: this method does not use them.
+    ``template``: (V_S, 3), the template's vertices, aligned with the target. ``weights``: the
+    template's skin; weights are copied unchanged. ``positions``: (V, 3), the target's vertices.
+    ``max_distance``: fraction of the target's box diagonal up to which a vertex is reported as
+    matched. It does not affect the weights. Returns ``angles`` are all 0: this method does not use
+    them.
     """
     vertices, distances = nearest_vertices(template, positions)
     skin = skin_rows(weights, vertices)
@@ -277,31 +239,13 @@ def inpaint(
 ) -> tuple[Any, str]:
     """Solve for the weights of unmatched vertices.
 
-    Parameters
-    ----------
-    laplacian : sparse (W, W)
-        Positive semidefinite.
-    areas : (W,)
-        Areas of the vertices, positive.
-    weights : sparse (W, J) in rows
-        Weights; only those of matched vertices are read.
-    matched, unknown : (W,) bool
-        Known and unknown vertices; each island of unknown ones must touch a known one. Vertices
-        that are neither are ignored.
-    report : callable
-        Called with a fraction and the current step; may raise to cancel.
-
-    Returns
-    -------
-    weights : sparse (U, J) in rows
-        Weights of the unknown vertices, in order. No weight is negative; rows sum to 1.
-    method : str
-        Solver that succeeded: "direct" unless that failed.
-
-    Raises
-    ------
-    RigError
-        If no method solves the system, or SciPy is missing.
+    ``laplacian``: sparse (W, W), positive semidefinite. ``areas``: (W,), areas of the vertices,
+    positive. ``weights``: sparse (W, J) in rows, weights; only those of matched vertices are read.
+    ``matched``, ``unknown``: (W,) bool, known and unknown vertices; each island of unknown ones
+    must touch a known one. Vertices that are neither are ignored. Returns ``weights``: sparse (U,
+    J) in rows, weights of the unknown vertices, in order. No weight is negative; rows sum to 1;
+    ``method``: solver that succeeded: "direct" unless that failed. Raises ``RigError`` if no method
+    solves the system, or SciPy is missing.
     """
     sparse = scipy_part("sparse")
     wanted, given = np.nonzero(unknown)[0], np.nonzero(matched)[0]
@@ -407,21 +351,10 @@ def _ratio(a: Floats, b: Floats) -> Floats:
 def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) -> Any:
     """Blend weights with the mean of their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours).
 
-    Parameters
-    ----------
-    weights : sparse (W, J) in rows
-        Rows that sum to 1 keep that sum.
-    triangles : (F, 3)
-        Vertex indices; their edges define neighbours.
-    active : (W,) bool
-        Vertices that change; the others are only read.
-    rounds : int
-        Number of iterations.
-
-    Returns
-    -------
-    sparse (W, J) in rows
-        New weights below 1e-6 are dropped, and rows rescaled to their previous sum.
+    ``weights``: sparse (W, J) in rows, rows that sum to 1 keep that sum. ``triangles``: (F, 3),
+    vertex indices; their edges define neighbours. ``active``: (W,) bool, vertices that change; the
+    others are only read. Returns sparse (W, J) in rows, new weights below 1e-6 are dropped, and
+    rows rescaled to their previous sum.
     """
     sparse = scipy_part("sparse")
     links = edges(triangles)
@@ -449,21 +382,9 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) 
 def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> Bools:
     """Return the vertices connected to a source by a path of edges no longer than ``reach``.
 
-    Parameters
-    ----------
-    positions : (W, 3)
-        Any unit.
-    triangles : (F, 3)
-        Vertex indices.
-    sources : (W,) bool
-        Vertices at which the paths start.
-    reach : float
-        Maximum length in the unit of ``positions``.
-
-    Returns
-    -------
-    (W,) bool
-        Reached vertices, including the sources.
+    ``positions``: (W, 3), any unit. ``triangles``: (F, 3), vertex indices. ``sources``: (W,) bool,
+    vertices at which the paths start. ``reach``: maximum length in the unit of ``positions``.
+    Returns (W,) bool, reached vertices, including the sources.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     if not sources.any():
@@ -481,19 +402,10 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:
     """Return a skin's weights as a sparse (V, J) matrix whose rows sum to 1.
 
-    Parameters
-    ----------
-    skin : Skin
-        Stored weights need not sum to 1; repeated weights for a joint are added, negative ones set
-        to 0.
-    triangles : (T, 3)
-        Triangles of the same mesh. Vertices without triangles may have no weights.
-
-    Raises
-    ------
-    RigError
-        If the skin has fewer vertices than the triangles refer to, or the weights of a triangle
-        corner sum to 0.
+    ``skin``: stored weights need not sum to 1; repeated weights for a joint are added, negative
+    ones set to 0. ``triangles``: (T, 3), triangles of the same mesh. Vertices without triangles may
+    have no weights. Raises ``RigError`` if the skin has fewer vertices than the triangles refer to,
+    or the weights of a triangle corner sum to 0.
     """
     if triangles.max(initial=-1) >= skin.n_vertices:
         raise RigError(
@@ -514,14 +426,9 @@ def weight_matrix(skin: Skin, triangles: Ints) -> Any:
 def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) -> Skin:
     """Return a sparse (V, J) matrix of weights as a skin.
 
-    Parameters
-    ----------
-    rows : sparse (V, J) in rows
-        Rows that sum to 1.
-    inverse_bind : (J, 4, 4)
-        Bind-space-to-joint matrices.
-    max_influences : int, optional
-        Number of strongest influences kept per vertex, rescaled to a sum of 1; all if omitted.
+    ``rows``: sparse (V, J) in rows, rows that sum to 1. ``inverse_bind``: (J, 4, 4),
+    bind-space-to-joint matrices. ``max_influences``: number of strongest influences kept per
+    vertex, rescaled to a sum of 1; all if omitted.
     """
     rows.sort_indices()
     skin = Skin(rows.indptr, rows.indices, rows.data, inverse_bind)
@@ -561,24 +468,10 @@ def _matrix(skin: Skin) -> Any:
 def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
     """Return the nearest vertex of the template for each point.
 
-    Parameters
-    ----------
-    template : (V, 3)
-        Positions of its vertices, in the points' space.
-    points : (N, 3)
-        Positions of the target's vertices.
-
-    Returns
-    -------
-    vertices : (N,) int32
-        ``skin_rows(skin, vertices)`` returns the target's skin.
-    distances : (N,)
-        Distance to each of these vertices.
-
-    Raises
-    ------
-    RigError
-        If the template has no vertex, or SciPy is missing.
+    ``template``: (V, 3), positions of its vertices, in the points' space. ``points``: (N, 3),
+    positions of the target's vertices. Returns ``vertices``: (N,) int32, ``skin_rows(skin,
+    vertices)`` returns the target's skin; ``distances``: (N,), distance to each of these vertices.
+    Raises ``RigError`` if the template has no vertex, or SciPy is missing.
     """
     if len(template) == 0:
         raise RigError("expected a template with vertices, found none")

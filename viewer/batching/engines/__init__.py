@@ -47,33 +47,22 @@ def _ignore(text: str) -> None:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a batch.
-
-    Attributes
-    ----------
-    workers : int
-        Number of worker processes; engines that run in this process ignore it.
-    retries : int
-        Number of times an item is retried after its worker crashed, hung or ran out of memory.
-    timeout : float or None
-        Seconds after which the worker of an attempt is terminated; None for no limit.
-    memory : int or None
-        Bytes that a worker may allocate; None for no limit.
-    cluster : str
-        Cluster as given to ``--cluster``; empty for this machine.
-    is_stopping : callable
-        Returns whether no more items are to be started.
-    note : callable
-        Called with messages about workers, such as that none has started yet.
-    """
+    """Limits of a batch."""
 
     workers: int = 1
+    """Number of worker processes; engines that run in this process ignore it."""
     retries: int = 2
+    """Number of times an item is retried after its worker crashed, hung or ran out of memory."""
     timeout: float | None = None
+    """Seconds after which the worker of an attempt is terminated; None for no limit."""
     memory: int | None = None
+    """Bytes that a worker may allocate; None for no limit."""
     cluster: str = ""
+    """Cluster as given to ``--cluster``; empty for this machine."""
     is_stopping: Callable[[], bool] = _never
+    """Returns whether no more items are to be started."""
     note: Callable[[str], None] = _ignore
+    """Called with messages about workers, such as that none has started yet."""
 
 
 class Engine(Protocol):
@@ -87,10 +76,7 @@ class Engine(Protocol):
 def load_engine(name: str) -> Engine:
     """Return an engine.
 
-    Parameters
-    ----------
-    name : str
-        A key of ``ENGINES``.
+    ``name``: a key of ``ENGINES``.
     """
     engine: Engine = import_module(f"viewer.batching.engines.{name}")
     return engine

@@ -19,22 +19,15 @@ _KINDS = ("local", "tcp://", "slurm")
 
 @dataclass(frozen=True)
 class ClusterName:
-    """A parsed value of ``--cluster``.
-
-    Attributes
-    ----------
-    kind : str
-        ``local``: worker processes on this machine; ``address``: an existing scheduler; ``slurm``:
-        jobs that SLURM starts.
-    address : str
-        Address of the scheduler.
-    options : mapping of str to str
-        Options of the SLURM jobs, named as by ``sbatch``; empty values for flags.
-    """
+    """A parsed value of ``--cluster``."""
 
     kind: Literal["local", "address", "slurm"]
+    """``local``: worker processes on this machine; ``address``: an existing scheduler; ``slurm``:
+    jobs that SLURM starts."""
     address: str = ""
+    """Address of the scheduler."""
     options: Mapping[str, str] = field(default_factory=dict)
+    """Options of the SLURM jobs, named as by ``sbatch``; empty values for flags."""
 
     @property
     def workers_per_job(self) -> int:
@@ -53,10 +46,7 @@ class ClusterName:
 def parse_cluster(text: str) -> ClusterName:
     """Parse the value of ``--cluster``.
 
-    Raises
-    ------
-    ViewerError
-        If it is not a known kind, or an option has no name.
+    Raises ``ViewerError`` if it is not a known kind, or an option has no name.
 
     >>> parse_cluster("slurm:partition=gpu,time=2:00:00").options
     {'partition': 'gpu', 'time': '2:00:00'}

@@ -33,47 +33,32 @@ _jobs: dict[bytes, Job] = {}
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A request to a worker; pickled, because another version may be unable to load it.
-
-    Attributes
-    ----------
-    job, items : bytes
-        Pickled; a tuple of items, each with the time at which it was first submitted, in seconds
-        since 1970. The scheduler reruns tasks whose worker died without reporting it; outputs
-        that are newer than this time are then replaced.
-    folder : str
-        Working directory of the batch, to which paths are relative.
-    timeout, memory : float, int, optional
-        As in ``Limits``, for each item.
-    """
+    """A request to a worker; pickled, because another version may be unable to load it."""
 
     job: bytes
     items: bytes
+    """Pickled; a tuple of items, each with the time at which it was first submitted, in seconds
+    since 1970. The scheduler reruns tasks whose worker died without reporting it; outputs that
+    are newer than this time are then replaced."""
     folder: str
+    """Working directory of the batch, to which paths are relative."""
     timeout: float | None = None
     memory: int | None = None
+    """As in ``Limits``, for each item."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """The results of a task.
-
-    Attributes
-    ----------
-    worker : str
-        Address of the worker.
-    results : list of Result
-        Results of the first items, at least one; the other items were not started.
-    seconds : float
-        Time that they took.
-    missing : str
-        An input that does not exist on the worker; empty if there is none.
-    """
+    """The results of a task."""
 
     worker: str
+    """Address of the worker."""
     results: list[Result]
+    """Results of the first items, at least one; the other items were not started."""
     seconds: float
+    """Time that they took."""
     missing: str = ""
+    """An input that does not exist on the worker; empty if there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,14 +80,7 @@ class NoFolder:
 def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVersion | NoFolder:
     """Run items one after another in a thread of a worker.
 
-    Parameters
-    ----------
-    version : str
-        Version of the program that runs the batch.
-    key : str
-        Name of the task, for events.
-    call : tuple
-        Values of a ``Call``.
+    ``call``: values of a ``Call``.
     """
     from distributed import get_worker
 

@@ -37,19 +37,7 @@ def slurm_cluster(
     The options ``partition``, ``account``, ``time``, ``mem``, ``cpus`` (workers per job) and
     ``interface`` describe a job; all others are passed to ``sbatch``.
 
-    Parameters
-    ----------
-    name : ClusterName
-        The options.
-    memory : int, optional
-        Bytes that each worker may use.
-    settings : mapping
-        Settings of Dask for the workers.
-
-    Raises
-    ------
-    ViewerError
-        If sbatch or dask-jobqueue is missing, or an option is invalid.
+    Raises ``ViewerError`` if sbatch or dask-jobqueue is missing, or an option is invalid.
     """
     if shutil.which("sbatch") is None:
         raise ViewerError(
@@ -118,14 +106,7 @@ class SlurmJobs:
 
     Jobs end at their time limit, are preempted, or fail with their node.
 
-    Parameters
-    ----------
-    cluster : SLURMCluster
-        From ``slurm_cluster``.
-    n_workers : int
-        Number of workers, in as many jobs as needed.
-    note : callable
-        Called with messages for the user.
+    ``cluster``: from ``slurm_cluster``.
     """
 
     def __init__(self, cluster: Any, n_workers: int, note: Callable[[str], None]) -> None:
@@ -139,15 +120,7 @@ class SlurmJobs:
     def check(self, workers: Iterable[str]) -> None:
         """Replace jobs that have ended.
 
-        Parameters
-        ----------
-        workers : iterable of str
-            Names of the workers that are connected now.
-
-        Raises
-        ------
-        ViewerError
-            If sbatch refuses all jobs, or jobs end before their workers connect.
+        Raises ``ViewerError`` if sbatch refuses all jobs, or jobs end before their workers connect.
         """
         names = [*workers]
         jobs = dict(self._cluster.workers)

@@ -69,11 +69,8 @@ _CONFIG = {
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     """Run items on a cluster.
 
-    Raises
-    ------
-    ViewerError
-        If Dask is missing, the cluster can't be reached or started, or a worker lacks this version
-        of the viewer.
+    Raises ``ViewerError`` if Dask is missing, the cluster can't be reached or started, or a worker
+    lacks this version of the viewer.
     """
     try:
         import distributed  # noqa: F401
@@ -346,13 +343,7 @@ Check = Callable[[Iterable[str]], None]
 
 @contextmanager
 def _connected(name: ClusterName, limits: Limits) -> Iterator[tuple[Client, Check]]:
-    """Connect to a cluster; shut it down at the end if it was started here.
-
-    Raises
-    ------
-    ViewerError
-        If no scheduler answers, or the cluster can't be started.
-    """
+    """Connect to a cluster; shut it down at the end if it was started here."""
     import dask
     from distributed import Client
     from distributed.utils import silence_logging_cmgr
@@ -410,13 +401,7 @@ def _local_cluster(limits: Limits, folder: str) -> Any:
 
 
 class WorkerChecks:
-    """Checks of the replies of workers.
-
-    Parameters
-    ----------
-    note : callable
-        Called with messages for the user.
-    """
+    """Checks of the replies of workers."""
 
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
@@ -427,10 +412,8 @@ class WorkerChecks:
     def accepted(self, reply: Reply | OtherVersion | NoFolder) -> Reply:
         """Return the reply of a suitable worker.
 
-        Raises
-        ------
-        ViewerError
-            If the worker has another version, or cannot read the files of the batch.
+        Raises ``ViewerError`` if the worker has another version, or cannot read the files of the
+        batch.
         """
         if isinstance(reply, OtherVersion):
             raise ViewerError(

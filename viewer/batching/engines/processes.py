@@ -46,10 +46,8 @@ _RETRIED = ("crashed", "timeout", "memory")
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     """Run items in worker processes.
 
-    Raises
-    ------
-    ViewerError
-        If pebble is missing, the job cannot be pickled, or the workers do not start.
+    Raises ``ViewerError`` if pebble is missing, the job cannot be pickled, or the workers do not
+    start.
     """
     try:
         import pebble  # noqa: F401

@@ -32,32 +32,22 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Numbering:
-    """Numbering of the frames of motions.
-
-    Attributes
-    ----------
-    first : int
-        Number of the first frame.
-    count : int
-        Number of frames up to the end of the motions.
-    start, end : float
-        The earliest start and the latest end, in seconds.
-    rate : float
-        Frames per second of the numbering.
-    runs_on : bool
-        Whether frames beyond the last one exist: keyframed clips extrapolate, captures do not.
-    holds : bool
-        Whether the first and last pose are held outside the motions, as keys of glTF and FBX files
-        are.
-    """
+    """Numbering of the frames of motions."""
 
     first: int
+    """Number of the first frame."""
     count: int
+    """Number of frames up to the end of the motions."""
     start: float
     end: float
+    """The earliest start and the latest end, in seconds."""
     rate: float
+    """Frames per second of the numbering."""
     runs_on: bool
+    """Whether frames beyond the last one exist: keyframed clips extrapolate, captures do not."""
     holds: bool = False
+    """Whether the first and last pose are held outside the motions, as keys of glTF and FBX files
+    are."""
 
     @property
     def last(self) -> int:

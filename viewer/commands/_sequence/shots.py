@@ -33,61 +33,41 @@ class Turntable:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Requested output, checked as thoroughly as possible before anything is opened.
-
-    Attributes
-    ----------
-    kind : "pictures", "video", "sheet" or "onion"
-        One file per frame, one video file, or one image of all frames: in cells or superimposed.
-    output : Path
-        The given path; includes ``{frame}`` for images.
-    range : Range or None
-        Range of frames; None for the whole motion.
-    turntable : Turntable or None
-        Rotation of the camera; None if it does not rotate.
-    is_certain : bool
-        False for a GIF, which is a still image if nothing moves.
-    """
+    """Requested output, checked as thoroughly as possible before anything is opened."""
 
     kind: str
+    """One of "pictures", "video", "sheet" or "onion". One file per frame, one video file, or one
+    image of all frames: in cells or superimposed."""
     output: Path
+    """The given path; includes ``{frame}`` for images."""
     range: Range | None
+    """Range of frames; None for the whole motion."""
     turntable: Turntable | None
+    """Rotation of the camera; None if it does not rotate."""
     is_certain: bool = True
+    """False for a GIF, which is a still image if nothing moves."""
 
 
 @dataclass(slots=True, eq=False)
 class Shots:
-    """Frames to draw.
-
-    Attributes
-    ----------
-    times : (F,)
-        Scene times in seconds.
-    numbers : list of F int
-        Frame numbers in file names and contact sheets.
-    rate : float
-        Frames per second of the result.
-    moves : bool
-        Whether the figures are posed by motions.
-    turntable : float
-        Rotation of the camera over all frames, in degrees.
-    seconds : float
-        Duration of all frames.
-    remark : str
-        Note about the frame rate, or an empty string.
-    notes : list of str
-        Messages about unexpected results.
-    """
+    """Frames to draw."""
 
     times: Floats
+    """(F,). Scene times in seconds."""
     numbers: list[int]
+    """Frame numbers in file names and contact sheets."""
     rate: float
+    """Frames per second of the result."""
     moves: bool
+    """Whether the figures are posed by motions."""
     turntable: float
+    """Rotation of the camera over all frames, in degrees."""
     seconds: float
+    """Duration of all frames."""
     remark: str = ""
+    """Note about the frame rate, or an empty string."""
     notes: list[str] = field(default_factory=list)
+    """Messages about unexpected results."""
 
 
 def parse_turntable(text: str) -> Turntable:

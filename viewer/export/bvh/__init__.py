@@ -56,28 +56,11 @@ def export_animation(
     A file contains no mesh. The reported vertex error is the distance between the figure's mesh and
     the same mesh, in the shape of the bones, skinned with the file's joints; both use LBS.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        A figure in many poses.
-    path : Path
-        The file; ``gaps="split"`` writes ``name-1.bvh``, ``name-2.bvh`` … if there are gaps.
-    options : MotionOptions
-        Unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest frame,
-        digits.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, the largest errors if any, and the data that the format cannot
-        hold.
-
-    Raises
-    ------
-    RigError
-        If no frame is present, numbers are not finite, or an option is unknown.
-    OutputError
-        If a file cannot be written.
+    ``path``: the file; ``gaps="split"`` writes ``name-1.bvh``, ``name-2.bvh`` … if there are gaps.
+    ``options``: unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest
+    frame, digits. Returns notes: the written files, the largest errors if any, and the data that
+    the format cannot hold. Raises ``RigError`` if no frame is present, numbers are not finite, or
+    an option is unknown. Raises ``OutputError`` if a file cannot be written.
     """
     check_options(options)
     if not animation.frames.present.any():

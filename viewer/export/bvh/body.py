@@ -90,12 +90,7 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
 class Conversion:
     """Conversion of a figure's frames to channels, block by block.
 
-    Parameters
-    ----------
-    figure, reference, order, space
-        As for ``body_of``.
-    frames : Frames
-        All frames, or some frames that have the scales and shapes of all.
+    ``figure``, ``reference``, ``order``, ``space``: as for ``body_of``.
     """
 
     def __init__(

@@ -59,24 +59,8 @@ def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[D
     The parts are read once, or twice if joints with a parent are translated, since a file has
     position channels only for joints that move.
 
-    Parameters
-    ----------
-    animation : Parts
-        The motion.
-    path : Path
-        The file; a regular one.
-    options : MotionOptions
-        As for ``export_animation``.
-
-    Returns
-    -------
-    list of Diagnostic
-        As for ``export_animation``.
-
-    Raises
-    ------
-    RigError, OutputError
-        As for ``export_animation``.
+    ``options``: as for ``export_animation``. Raises ``RigError, OutputError``: as for
+    ``export_animation``.
     """
     check_options(options)
     stream = _Stream(animation, options)

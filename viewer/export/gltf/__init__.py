@@ -161,26 +161,10 @@ def export_animation(
 
     A changing shape that must be baked into the mesh is taken from the first present frame.
 
-    Parameters
-    ----------
-    animation : SampledAnimation
-        A figure in many poses.
-    path : Path
-        The file; ``gaps="split"`` writes ``name-1.glb``, ``name-2.glb`` … if there are gaps.
-    options : MotionOptions
-        Handling of gaps, skinning, and up axis of the world.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the data that the format cannot store, with errors.
-
-    Raises
-    ------
-    RigError
-        If no frame is present, numbers are not finite, or an option is unknown.
-    OutputError
-        If a file cannot be written.
+    ``path``: the file; ``gaps="split"`` writes ``name-1.glb``, ``name-2.glb`` … if there are gaps.
+    Returns notes: the written files, then the data that the format cannot store, with errors.
+    Raises ``RigError`` if no frame is present, numbers are not finite, or an option is unknown.
+    Raises ``OutputError`` if a file cannot be written.
     """
     sampled = sampled_of(animation, options)
     present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
@@ -225,29 +209,10 @@ def export_animations(
 
     Frames of different figures keep their relative times; the earliest frame is at 0.
 
-    Parameters
-    ----------
-    motions : sequence of (Actor, SampledAnimation, str)
-        The moving figures, and what ``animation_for`` returns for each: frames, at least one of
-        which is present, and their up axis.
-    path : Path
-        The file.
-    options : MotionOptions
-        Skinning, and handling of gaps except ``split``.
-    scene : Scene
-        Provides the up axis of the placements, and cameras.
-    still : sequence of Actor
-        Further figures, written in their current pose.
-
-    Returns
-    -------
-    list of Diagnostic
-        As for ``export_animation``, each with its figure.
-
-    Raises
-    ------
-    RigError, OutputError
-        As for ``export_animation``.
+    ``motions``: the moving figures, and what ``animation_for`` returns for each: frames, at least
+    one of which is present, and their up axis. ``options``: skinning, and handling of gaps except
+    ``split``. Returns as for ``export_animation``, each with its figure. Raises ``RigError,
+    OutputError``: as for ``export_animation``.
     """
     parts = [PlacedMotion(placed_actor(scene, who), each, up) for who, each, up in motions]
     others = [placed_actor(scene, actor) for actor in still]

@@ -35,14 +35,9 @@ class Document:
 
     ``name``: name in error messages.
 
-    Attributes
-    ----------
-    root : dict
-        The JSON.
-    extras : list of (str, Any)
-        Name and application data of each figure whose file has some.
-    n_omitted : int
-        Number of infinite and NaN values of the original files that ``glb`` or ``pair`` omitted.
+    ``extras``: list of (str, Any), name and application data of each figure whose file has some.
+    ``n_omitted``: number of infinite and NaN values of the original files that ``glb`` or ``pair``
+    omitted.
     """
 
     def __init__(self, name: str) -> None:

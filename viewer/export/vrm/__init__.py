@@ -58,25 +58,9 @@ def export(
 ) -> list[Diagnostic]:
     """Write a figure in its rest pose; see ``viewer.export.export``.
 
-    Parameters
-    ----------
-    actor : Actor
-        Figure; its pose is not written.
-    path : Path
-        The file.
-    skinning : Skinning
-        Selects influences.
-    optimizes : bool
-        Whether vertex attributes are quantised.
-    meta : VrmMeta, optional
-        Name, authors and licence; those of the file if omitted or empty.
-
-    Raises
-    ------
-    RigError
-        If the figure lacks a required bone, or its authors or licence are unknown.
-    OutputError
-        If the file cannot be written.
+    ``meta``: name, authors and licence; those of the file if omitted or empty. Raises ``RigError``
+    if the figure lacks a required bone, or its authors or licence are unknown. Raises
+    ``OutputError`` if the file cannot be written.
     """
     figure, given = actor.figure, meta or VrmMeta()
     bones = human_bones(figure)

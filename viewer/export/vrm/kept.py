@@ -268,11 +268,6 @@ class Maps:
 
     ``record``: extensions of the original file.
     ``document``, ``built``: the written file, to which textures are added on demand.
-
-    Attributes
-    ----------
-    lost : Counter
-        Number of lost references, by kind.
     """
 
     def __init__(self, record: VrmRecord, document: Document, built: Built) -> None:

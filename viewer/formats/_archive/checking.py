@@ -40,29 +40,11 @@ def finite(
 ) -> Floats:
     """Return numbers as float64, all finite in double and single precision.
 
-    Parameters
-    ----------
-    archive : Archive
-        Archive that contains the numbers.
-    key : str
-        Key of the numbers in the archive.
-    values : (N, ...)
-        Numbers to check.
-    part : str
-        Part of the figure or motion, see ``Diagnostic``.
-    places : (N,), optional
-        Vertex or joint of each row; the index of the row if omitted.
-
-    Returns
-    -------
-    (N, ...)
-        Neutral values in place of invalid ones, unless the file is refused: NaN for positions, the
-        identity for bind matrices, otherwise 0.
-
-    Raises
-    ------
-    FormatError
-        If a number is not finite; the message states the key and the number.
+    ``values``: (N, ...), numbers to check. ``part``: part of the figure or motion, see
+    ``Diagnostic``. ``places``: (N,), vertex or joint of each row; the index of the row if omitted.
+    Returns (N, ...), neutral values in place of invalid ones, unless the file is refused: NaN for
+    positions, the identity for bind matrices, otherwise 0. Raises ``FormatError`` if a number is
+    not finite; the message states the key and the number.
     """
     numbers, bad = _invalid(values)
     if bad is None:
@@ -158,22 +140,8 @@ def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
 def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int) -> Ints:
     """Return triangles with valid vertex indices: (T, 3) int32.
 
-    Parameters
-    ----------
-    archive : Archive
-        Archive that contains the numbers.
-    key : str
-        Key of the numbers in the archive.
-    values : (T, 3)
-        Vertex indices.
-    n_vertices : int
-        Number of vertices, V.
-
-    Raises
-    ------
-    FormatError
-        If an index is not between 0 and V - 1; if the file is not refused, another corner of the
-        triangle replaces it.
+    ``values``: (T, 3), vertex indices. Raises ``FormatError`` if an index is not between 0 and V -
+    1; if the file is not refused, another corner of the triangle replaces it.
     """
     if are_indices(values, n_vertices):
         return values.astype(np.int32)

@@ -73,15 +73,9 @@ def open_npz(
 ) -> Archive:
     """Open an ``.npz`` file; errors as of ``open_archive``.
 
-    Parameters
-    ----------
-    directory : ZipDirectory
-        Its zip archive.
-    opened : callable, optional
-        Opens an array of objects, given its key and its pickle, as a nested archive; None if the
-        objects have no names. It is called only for arrays whose contents are requested.
-    listed : callable, optional
-        Returns the objects as a list, given the same; None if there is only one.
+    ``opened``: opens an array of objects, given its key and its pickle, as a nested archive; None
+    if the objects have no names. It is called only for arrays whose contents are requested.
+    ``listed``: returns the objects as a list, given the same; None if there is only one.
     """
     directory.check(_key)
     members, storage = {_key(member): member for member in directory.members}, directory.storage
@@ -107,13 +101,8 @@ def open_npy(
 ) -> Archive:
     """Open an ``.npy`` file as an archive with the single key "arr_0".
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-    opened : callable, optional
-        Opens an array of objects, given the offset of its pickle; None if the objects have no
-        names.
+    ``opened``: opens an array of objects, given the offset of its pickle; None if the objects have
+    no names.
     """
     key = "arr_0"
     storage = StoredFile(source)

@@ -111,16 +111,9 @@ def _is_compressed(head: bytes) -> bool:
 def open_archive(source: Source) -> Archive:
     """Open a pickle, ``.npz``, ``.npy``, torch or JSON file, detected by its first bytes.
 
-    Parameters
-    ----------
-    source : Source
-        The file. Harmless errors are added to its warnings. Its ``max_size`` also limits the total
-        unpacked size of compressed files.
-
-    Raises
-    ------
-    FormatError
-        If the file is none of these, is damaged, or contains anything other than data.
+    ``source``: the file. Harmless errors are added to its warnings. Its ``max_size`` also limits
+    the total unpacked size of compressed files. Raises ``FormatError`` if the file is none of
+    these, is damaged, or contains anything other than data.
     """
     # Imported late, so that readers of other formats do not import them.
     from viewer.formats._archive.npz import open_npy, open_npz
@@ -228,10 +221,8 @@ def _open_objects(source: Source, offset: int) -> Archive | None:
 def unpacked(source: Source) -> bytes:
     """Return the pickle in a compressed file.
 
-    Raises
-    ------
-    FormatError
-        If the data are damaged, not a pickle, packed by an unsupported method, or too large.
+    Raises ``FormatError`` if the data are damaged, not a pickle, packed by an unsupported method,
+    or too large.
     """
     head = source.peek(64)
     for name, kind in _UNSUPPORTED.items():

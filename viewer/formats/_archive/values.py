@@ -37,43 +37,30 @@ _LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes with
 
 @dataclass(frozen=True, slots=True)
 class Opaque:
-    """A value that was not evaluated because that could run code, or because it is not needed.
-
-    Attributes
-    ----------
-    what : Phrase
-        Description for messages: ``chumpy.ch_ops.add expression``, ``object array``.
-    """
+    """A value that was not evaluated because that could run code, or because it is not needed."""
 
     what: Phrase
+    """Description for messages: ``chumpy.ch_ops.add expression``, ``object array``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sparse:
     """A checked sparse matrix in compressed columns ("csc"), rows ("csr") or as entries ("coo").
 
-    Attributes
-    ----------
-    shape : (2,)
-        Rows and columns as declared by the file, to be checked before a dense matrix is created.
-    data, indices : (N,)
-        Stored values, and the row (csc, coo) or column (csr) of each.
-    indptr : (columns + 1,), (rows + 1,) or (N,)
-        Start of each column (csc) or row (csr) in ``data``; the column of each value (coo).
-    layout : str
-        ``"csc"``, ``"csr"`` or ``"coo"``.
-
-    Raises
-    ------
-    InvalidValueError
-        If the parts are inconsistent.
+    Raises ``InvalidValueError`` if the parts are inconsistent.
     """
 
     shape: tuple[int, int]
+    """(2,). Rows and columns as declared by the file, to be checked before a dense matrix is
+    created."""
     data: NDArray[Any]
     indices: NDArray[Any]
+    """(N,). Stored values, and the row (csc, coo) or column (csr) of each."""
     indptr: NDArray[Any]
+    """(columns + 1,), (rows + 1,) or (N,). Start of each column (csc) or row (csr) in ``data``; the
+    column of each value (coo)."""
     layout: str
+    """``"csc"``, ``"csr"`` or ``"coo"``."""
 
     def __post_init__(self) -> None:
         parts = (self.data, self.indices, self.indptr)
@@ -121,10 +108,8 @@ class Sparse:
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
         """Return row, column and value of every stored entry.
 
-        Returns
-        -------
-        rows, columns, values : (N,)
-            Entries in the order of the file. A pair may occur twice; such entries are summed.
+        Returns (N,), entries in the order of the file. A pair may occur twice; such entries are
+        summed.
 
         >>> eye = Sparse((2, 2), np.ones(2), np.arange(2), np.arange(3), "csc")
         >>> [part.tolist() for part in eye.entries()]
@@ -153,27 +138,10 @@ Axes: TypeAlias = Sequence[int | str | None]
 class Archive:
     """The named values of one file, each read on demand.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-    kind : str
-        ``"pickle"``, ``"npz"`` or ``"npy"``.
-    keys : tuple of str
-        Keys in the order of the file.
-    load : callable
-        Returns the value of a key; called once for each.
-    branch : callable, optional
-        Returns the archive of a key whose value is a dict or a list of dicts, None for others.
-    label : str
-        Path of the names in the file, for messages: ``"people.3."``.
-    objects : callable, optional
-        Returns the objects of an array of objects as a list, which ``get`` does not evaluate; None
-        for other values.
-    is_list : bool
-        Whether the values are the items of a list, called "0", "1" …
-    path : tuple of str and int
-        Keys and indices that lead to it, from which errors in JSON files find their line.
+    ``kind``: ``"pickle"``, ``"npz"`` or ``"npy"``. ``branch``: returns the archive of a key whose
+    value is a dict or a list of dicts, None for others. ``label``: path of the names in the file,
+    for messages: ``"people.3."``. ``objects``: returns the objects of an array of objects as a
+    list, which ``get`` does not evaluate; None for other values.
     """
 
     def __init__(
@@ -205,10 +173,7 @@ class Archive:
         Containers are new lists, tuples and dicts. Values that would run code, or are nested
         infinitely, are ``Opaque``. Arrays are read-only, in C order and native byte order.
 
-        Raises
-        ------
-        FormatError
-            If there is no such key, or its value is inconsistent.
+        Raises ``FormatError`` if there is no such key, or its value is inconsistent.
         """
         if key not in self._values:
             if key not in self.keys:
@@ -238,20 +203,11 @@ class Archive:
     def array(self, key: str, shape: Axes | None = None, kinds: str = "biuf") -> Deferred:
         """Return an array of the given shape and kinds of values.
 
-        Parameters
-        ----------
-        key : str
-            Name in the file. Numbers or arrays in nested lists, or in an array of objects, are
-            treated as an array, with NaN in place of None and of empty items.
-        shape : sequence, optional
-            For each axis a size, None for any, or a letter: axes with the same letter are equal.
-        kinds : str
-            Accepted letters of ``numpy.dtype.kind``.
-
-        Raises
-        ------
-        FormatError
-            ``KEY: expected V x 3 numbers, found 800 x 4 numbers``.
+        ``key``: name in the file. Numbers or arrays in nested lists, or in an array of objects, are
+        treated as an array, with NaN in place of None and of empty items. ``shape``: for each axis
+        a size, None for any, or a letter: axes with the same letter are equal. ``kinds``: accepted
+        letters of ``numpy.dtype.kind``. Raises ``FormatError``: ``KEY: expected V x 3 numbers,
+        found 800 x 4 numbers``.
         """
         value = self.get(key)
         if not isinstance(value, Deferred):
@@ -277,17 +233,8 @@ class Archive:
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
         """Return a matrix in sparse form, whether it is stored sparse or dense.
 
-        Parameters
-        ----------
-        key : str
-            Name in the file.
-        shape : sequence of two, optional
-            As for ``array``; checked before memory of that size is allocated.
-
-        Raises
-        ------
-        FormatError
-            If it is not a matrix of numbers of this shape, or is inconsistent.
+        ``shape``: as for ``array``; checked before memory of that size is allocated. Raises
+        ``FormatError`` if it is not a matrix of numbers of this shape, or is inconsistent.
         """
         value = self.get(key)
         if isinstance(value, Sparse):
@@ -304,10 +251,7 @@ class Archive:
     def text(self, key: str) -> str:
         """Return a single string, stored as a string, bytes, or an array of one of them.
 
-        Raises
-        ------
-        FormatError
-            If the value is none of these.
+        Raises ``FormatError`` if the value is none of these.
         """
         found = texts_in(self.objects(key))
         if len(found) != 1:
@@ -507,10 +451,7 @@ def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
 def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDArray[Any]:
     """Return flat values in their shape, C order and native byte order; copied if needed.
 
-    Raises
-    ------
-    InvalidValueError
-        If an element of a string array is not a valid character.
+    Raises ``InvalidValueError`` if an element of a string array is not a valid character.
     """
     if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
         # numpy accepts any byte as bool, and then computes wrong results.

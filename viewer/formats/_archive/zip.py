@@ -47,33 +47,22 @@ _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
 
 @dataclass(frozen=True, slots=True)
 class ZipDirectory:
-    """A zip archive that is open for reading.
-
-    Attributes
-    ----------
-    source : Source
-        The archive, for messages.
-    storage : StoredFile
-        Its file, which is opened again whenever a member is read later.
-    archive : ZipFile
-        The open archive.
-    members : list of ZipInfo
-        Its members, whose sizes have been checked by ``check``.
-    """
+    """A zip archive that is open for reading."""
 
     source: Source
+    """The archive, for messages."""
     storage: StoredFile
+    """Its file, which is opened again whenever a member is read later."""
     archive: zipfile.ZipFile
+    """The open archive."""
     members: list[zipfile.ZipInfo]
+    """Its members, whose sizes have been checked by ``check``."""
 
     def check(self, key_of: Callable[[zipfile.ZipInfo], str]) -> None:
         """Refuse unreadable or oversized members before anything is unpacked.
 
-        Raises
-        ------
-        FormatError
-            If two members have the same key, or one is encrypted, packed by an unsupported method,
-            or too large.
+        Raises ``FormatError`` if two members have the same key, or one is encrypted, packed by an
+        unsupported method, or too large.
         """
         source, size = self.source, self.storage.size
         for name, count in Counter(map(key_of, self.members)).items():
@@ -98,10 +87,7 @@ class ZipDirectory:
 def open_directory(source: Source) -> Iterator[ZipDirectory]:
     """Open a zip archive; damage found while it is open is an error of the source.
 
-    Raises
-    ------
-    FormatError
-        If the archive is damaged.
+    Raises ``FormatError`` if the archive is damaged.
     """
     storage = StoredFile(source)
     try:
@@ -178,13 +164,7 @@ def _reason(problem: Exception) -> object:
 
 
 class FileWindow:
-    """A file with the interface of bytes that the pickle machine uses.
-
-    Parameters
-    ----------
-    storage : StoredFile
-        The file; a change between two reads is reported as an error.
-    """
+    """A file with the interface of bytes that the pickle machine uses."""
 
     def __init__(self, storage: StoredFile) -> None:
         self._storage = storage

@@ -33,21 +33,10 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
     larger polygon becomes a fan if all corners are visible from the first, otherwise its ears are
     clipped one by one (Meisters 1975), in the plane of its area vector (Newell).
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Figure units.
-    corners : (C,)
-        Vertices of all polygons, one polygon after the other.
-    counts : (F,)
-        Corners of each polygon, 3 or more.
-
-    Returns
-    -------
-    picks : (T, 3)
-        Indices into ``corners``, which also select other attributes of the corners.
-    faces : (T,)
-        Polygon of each triangle, in ascending order.
+    ``positions``: (V, 3), figure units. ``corners``: (C,), vertices of all polygons, one polygon
+    after the other. ``counts``: (F,), corners of each polygon, 3 or more. Returns ``picks``: (T,
+    3), indices into ``corners``, which also select other attributes of the corners; ``faces``:
+    (T,), polygon of each triangle, in ascending order.
     """
     owners = np.repeat(np.arange(len(counts), dtype=np.int32), counts - 2)
     if (counts == 3).all():
@@ -163,17 +152,9 @@ def picked(corners: Picks, picks: Picks) -> Picks:
 def triangles_of(counts: Picks, faces: Picks) -> Picks:
     """Return the triangles that ``triangulate`` creates from some polygons.
 
-    Parameters
-    ----------
-    counts : (F,)
-        Corners of each polygon, as for ``triangulate``; fewer than 3 give no triangle.
-    faces : (N,)
-        Indices of polygons, in any order.
-
-    Returns
-    -------
-    (T,)
-        Indices of triangles, ascending.
+    ``counts``: (F,), corners of each polygon, as for ``triangulate``; fewer than 3 give no
+    triangle. ``faces``: (N,), indices of polygons, in any order. Returns (T,), indices of
+    triangles, ascending.
     """
     sizes = np.maximum(counts - 2, 0)
     faces = np.unique(faces)
@@ -185,14 +166,8 @@ def triangles_of(counts: Picks, faces: Picks) -> Picks:
 def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
     """Return corners with negative ones replaced by the first valid corner of the polygon, or 0.
 
-    Parameters
-    ----------
-    corners : (C,)
-        Vertices of all polygons.
-    counts : (F,)
-        Corners of each polygon.
-    owners : (C,)
-        Polygon of each corner.
+    ``corners``: (C,), vertices of all polygons. ``counts``: (F,), corners of each polygon.
+    ``owners``: (C,), polygon of each corner.
     """
     known = np.flatnonzero(corners >= 0)
     first = np.zeros(len(counts), dtype=np.int64)
@@ -206,14 +181,8 @@ def filled_normals(
 ) -> Floats:
     """Return a normal for every vertex, from the file or computed.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records warnings about zero-length normals.
-    normals : (V, 3) or None
-        Normals of the file; NaN if there is none.
-    positions, triangles : (V, 3), (T, 3)
-        The mesh.
+    ``normals``: (V, 3) or None, normals of the file; NaN if there is none. ``positions``,
+    ``triangles``: (V, 3), (T, 3), the mesh.
     """
     if normals is None:
         return vertex_normals(positions, triangles)

@@ -13,19 +13,9 @@ from viewer.rig.arrays import Bytes
 def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | None:
     """Return a texture's pixels, or None with a warning that states its resolved path.
 
-    Parameters
-    ----------
-    source : Source
-        File that references the image.
-    name : str
-        Name of the image, which must lie below that file's folder, see ``referenced_path``.
-    offset : int or str, optional
-        Offset of the name in the file, or a JSON pointer, if known.
-
-    Returns
-    -------
-    (H, W, 4) uint8 or None
-        sRGB with alpha, first row at the top.
+    ``name``: name of the image, which must lie below that file's folder, see ``referenced_path``.
+    ``offset``: offset of the name in the file, or a JSON pointer, if known. Returns (H, W, 4) uint8
+    or None, sRGB with alpha, first row at the top.
     """
     path = referenced_path(source.path.parent, name)
     if path is None:
@@ -42,9 +32,6 @@ def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | N
 def read_picture(source: Source) -> Bytes:
     """Return the pixels of an image file: (H, W, 4) uint8, first row at the top.
 
-    Raises
-    ------
-    FormatError
-        If the file is not a readable image.
+    Raises ``FormatError`` if the file is not a readable image.
     """
     return decode_picture(source.path, source.data)

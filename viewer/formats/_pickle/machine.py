@@ -34,23 +34,9 @@ _INTEGER = re.compile(rb"[+-]?[0-9]+")
 class Machine:
     """A pickle being read.
 
-    Attributes
-    ----------
-    data : bytes or FileWindow
-        The file.
-    at : int
-        Offset of the next byte.
-    stack : list
-        Values; those below the last mark are currently inaccessible.
-    memo : dict
-        Values by index; a dict, so that a large index takes no memory.
-    end : int
-        Offset of the end of the pickle's bytes.
-    depth : int
-        Number of pickles that contain this one.
-    persistent, load_bytes : callable or None
-        Functions that return the value of a persistent id, and the value of torch's storages saved
-        as bytes; None if the file must not contain these.
+    ``at``: offset of the next byte. ``end``: offset of the end of the pickle's bytes.
+    ``persistent``, ``load_bytes``: functions that return the value of a persistent id, and the
+    value of torch's storages saved as bytes; None if the file must not contain these.
     """
 
     def __init__(
@@ -92,10 +78,7 @@ class Machine:
     def nested(self, data: Data, start: int, end: int) -> Machine:
         """Return a machine for a pickle inside this one; it continues with the same budget.
 
-        Raises
-        ------
-        FormatError
-            If pickles are nested too deeply.
+        Raises ``FormatError`` if pickles are nested too deeply.
         """
         if self.depth >= _DEEPEST:
             raise self.fail(Phrase("pickle-nested", most=_DEEPEST))
@@ -234,10 +217,7 @@ _ODD_ESCAPE = re.compile(rb"\\(?!x[0-9a-fA-F]{2}|[nrt'\"])")
 def run(machine: Machine) -> object:
     """Execute all opcodes up to STOP, and return the remaining value.
 
-    Raises
-    ------
-    FormatError
-        At the first opcode that is damaged or refused.
+    Raises ``FormatError``: at the first opcode that is damaged or refused.
     """
     code = machine.next_step()
     while code != _STOP:
@@ -510,24 +490,7 @@ def _frame(machine: Machine) -> None:
 
 
 def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], object]) -> object:
-    """Return the array behind a wrapper, and skip its bytes.
-
-    Parameters
-    ----------
-    machine : Machine
-        At the end of the wrapper.
-    wrapper : Instance
-        The wrapper, with its state.
-    run : callable
-        Executes a nested pickle.
-
-    Raises
-    ------
-    InvalidValueError
-        If the wrapper is not one that joblib writes.
-    FormatError
-        If the file has fewer bytes than the wrapper declares.
-    """
+    """Return the array behind a wrapper, and skip its bytes."""
     state = wrapper.state or {}
     shape, dtype, order = state.get("shape"), state.get("dtype"), state.get("order")
     kind, padding = state.get("subclass"), state.get("numpy_array_alignment_bytes")

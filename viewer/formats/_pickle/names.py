@@ -82,10 +82,7 @@ _WRONG = object()  # returned for a call with unusual arguments
 def find(module: str, name: str) -> StandIn:
     """Return a new stand-in for a name.
 
-    Raises
-    ------
-    InvalidValueError
-        If the pair is not in the table.
+    Raises ``InvalidValueError`` if the pair is not in the table.
     """
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
     role = _ROLES.get((module, name))
@@ -99,12 +96,7 @@ def find(module: str, name: str) -> StandIn:
 def call(function: object, arguments: object) -> tuple[object, int]:
     """Return the result of a function call, and the number of copied items.
 
-    Parameters
-    ----------
-    function : object
-        A ``StandIn``; anything else is refused.
-    arguments : object
-        A tuple; anything else is refused.
+    ``function``: a ``StandIn``; anything else is refused.
     """
     if not isinstance(function, StandIn) or function.role not in (*_CALLS, *TORCH_CALLS):
         raise InvalidValueError(Phrase("pickle-call", found=noun(function)))
@@ -150,11 +142,9 @@ def build(target: object, state: object) -> None:
 def as_key(value: object) -> str | bytes | int:
     """Return a value as the key of a dict: a string, bytes, or a number that hashes to itself.
 
-    Raises
-    ------
-    InvalidValueError
-        If it has another type. Objects are refused so that their hashes are never computed; large
-        numbers are refused because they could be chosen so that all hashes collide.
+    Raises ``InvalidValueError`` if it has another type. Objects are refused so that their hashes
+    are never computed; large numbers are refused because they could be chosen so that all hashes
+    collide.
     """
     if isinstance(value, str | bytes):
         return value

@@ -49,21 +49,9 @@ def warn_of_rest(machine: Machine) -> None:
 def named_archive(source: Source, kind: str, size: int, whole: object) -> Archive:
     """Return the values that a pickle builds, as an archive.
 
-    Parameters
-    ----------
-    source : Source
-        Its file, whose bytes stay in memory as long as any of the arrays exists.
-    kind : str
-        As for ``Archive``.
-    size : int
-        Bytes from which the values were read, which limit their number.
-    whole : object
-        The value on the machine's stack.
-
-    Raises
-    ------
-    FormatError
-        If it is neither a dict with string keys, nor a list or dict of dicts.
+    ``source``: its file, whose bytes stay in memory as long as any of the arrays exists. ``kind``:
+    as for ``Archive``. Raises ``FormatError`` if it is neither a dict with string keys, nor a list
+    or dict of dicts.
     """
     found = _objects(whole)
     is_list = not isinstance(found, dict)
@@ -198,21 +186,9 @@ class _EndlessError(Exception):
 def resolve(path: Path, size: int, key: str, value: object) -> Value:
     """Return a value of the pickle as specified by ``Archive.get``.
 
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    size : int
-        Length of the file in bytes; without shared values, no value can have more items.
-    key : str
-        The name of the value, for messages.
-    value : object
-        Value built by the machine.
-
-    Raises
-    ------
-    FormatError
-        If an array, matrix or expression is inconsistent, or a string cannot be decoded.
+    ``size``: length of the file in bytes; without shared values, no value can have more items.
+    Raises ``FormatError`` if an array, matrix or expression is inconsistent, or a string cannot be
+    decoded.
     """
     try:
         return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)

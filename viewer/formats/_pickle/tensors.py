@@ -23,8 +23,6 @@ from viewer.formats._pickle.values import Span, StandIn, is_sizes
 from viewer.formats._source import InvalidValueError
 from viewer.rig.arrays import Deferred
 
-__all__ = ["CALLS", "ROLES", "Storage", "Tensor", "storage_of"]
-
 _STORAGES = {
     "FloatStorage": "f4",
     "DoubleStorage": "f8",
@@ -48,24 +46,16 @@ _LONGEST_KEY = 200
 
 @dataclass(slots=True, eq=False)
 class Storage:
-    """A flat array in a file, read at most once, regardless of how many tensors use it.
-
-    Attributes
-    ----------
-    code : str
-        Element type: a numpy code without byte order, or ``"bfloat16"``.
-    count : int
-        Number of elements.
-    load : callable or None
-        Returns exactly its bytes; None until the file has been found to contain them.
-    order : "<" or ">"
-        Byte order.
-    """
+    """A flat array in a file, read at most once, regardless of how many tensors use it."""
 
     code: str
+    """Element type: a numpy code without byte order, or ``"bfloat16"``."""
     count: int
+    """Number of elements."""
     load: Callable[[], bytes | memoryview] | None = None
+    """Returns exactly its bytes; None until the file has been found to contain them."""
     order: Literal["<", ">"] = "<"
+    """Either "<" or ">". Byte order."""
     _bytes: NDArray[np.uint8] | None = None
 
     @property

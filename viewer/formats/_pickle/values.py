@@ -23,8 +23,6 @@ from viewer.formats._archive.zip import Data
 from viewer.formats._source import InvalidValueError
 from viewer.rig.arrays import Deferred
 
-__all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
-
 _MOST_AXES = 32
 _PIECE = 1 << 20  # number of bytes converted at a time
 _LONGEST_SIDE = 1 << 62  # maximum length of an axis, so that products of sizes can be printed
@@ -33,14 +31,9 @@ _LONGEST_SIDE = 1 << 62  # maximum length of an axis, so that products of sizes 
 class Span:
     """Bytes or a string in the file, copied only on demand.
 
-    Parameters
-    ----------
-    data : bytes or FileWindow
-        The file, or bytes decoded from it.
-    start, stop : int
-        The range of the bytes.
-    coding : str, optional
-        Encoding of a string. ``"latin-1"`` marks a string of Python 2, which may be text or bytes.
+    ``data``: the file, or bytes decoded from it. ``start``, ``stop``: the range of the bytes.
+    ``coding``: encoding of a string. ``"latin-1"`` marks a string of Python 2, which may be text or
+    bytes.
     """
 
     __slots__ = ("_packed", "_text", "coding", "data", "start", "stop")
@@ -66,10 +59,7 @@ class Span:
     def text(self) -> str:
         """Return the string, which is decoded only once.
 
-        Raises
-        ------
-        ValueError
-            If the bytes cannot be decoded.
+        Raises ``ValueError`` if the bytes cannot be decoded.
         """
         if self._text is None:
             self._text = self._decoded()
@@ -78,10 +68,7 @@ class Span:
     def packed(self) -> Span:
         """Return the bytes of an array, which Python 3 may write as characters 0 to 255.
 
-        Raises
-        ------
-        ValueError
-            If there are other characters.
+        Raises ``ValueError`` if there are other characters.
         """
         if self.coding in (None, "latin-1"):
             return self
@@ -140,35 +127,24 @@ class Dtype:
 
 @dataclass(slots=True, eq=False)
 class Array:
-    """A numpy array whose values stay in the file until they are needed.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Shape of the stored values.
-    dtype : dtype or None
-        Element type; None if the array is not evaluated, with the reason in ``what``.
-    axes : tuple of int, optional
-        Order of the stored axes in the array.
-    items : list, optional
-        Objects of an object array, which is not evaluated otherwise.
-    """
+    """A numpy array whose values stay in the file until they are needed."""
 
     shape: tuple[int, ...] = ()
+    """Shape of the stored values."""
     dtype: np.dtype[Any] | None = None
+    """Element type; None if the array is not evaluated, with the reason in ``what``."""
     payload: Span | None = None
     is_fortran: bool = False
     axes: tuple[int, ...] | None = None
+    """Order of the stored axes in the array."""
     items: list[object] | None = None
+    """Objects of an object array, which is not evaluated otherwise."""
     what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
         """Set shape and values, whose sizes in bytes must agree.
 
-        Raises
-        ------
-        InvalidValueError
-            If the sizes differ.
+        Raises ``InvalidValueError`` if the sizes differ.
         """
         found = dtype.dtype()
         if found is None:
@@ -196,10 +172,7 @@ class Array:
     def values(self) -> NDArray[Any]:
         """Return the values, as a view of the file if byte and memory order allow it.
 
-        Raises
-        ------
-        InvalidValueError
-            If a string contains invalid code points.
+        Raises ``InvalidValueError`` if a string contains invalid code points.
         """
         if self.payload is None or self.dtype is None:
             raise InvalidValueError(Phrase("array-not-numbers", found=self.what))

@@ -50,19 +50,8 @@ class Bindings:
 def bind_skins(joints: Joints, worlds: Floats, skins: dict[int, NodeSkin]) -> Bindings:
     """Bind the skins of a figure; the first one determines the binding space.
 
-    Parameters
-    ----------
-    joints : Joints
-        Auxiliary joints are appended if skins disagree.
-    worlds : (J, 4, 4)
-        From ``rest_worlds``.
-    skins : dict of NodeSkin
-        By index in the file, in order of precedence.
-
-    Returns
-    -------
-    Bindings
-        Bindings of the skins.
+    ``joints``: auxiliary joints are appended if skins disagree. ``worlds``: (J, 4, 4), from
+    ``rest_worlds``.
     """
     bindings = Bindings(joints, worlds)
     for index, skin in skins.items():
@@ -105,12 +94,9 @@ def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
 def _rest_space(rests: Floats) -> Floats:
     """Return the matrix with which the topmost joints of the first skin place its meshes at rest.
 
-    Parameters
-    ----------
-    rests : (M, 4, 4)
-        Skinning matrices in the rest pose, of parents before those of their children. They are
-        all the same if the rest pose is the bind pose; otherwise the first that is equal to another
-        one is returned, as helpers above the hips may have any matrix.
+    ``rests``: (M, 4, 4), skinning matrices in the rest pose, of parents before those of their
+    children. They are all the same if the rest pose is the bind pose; otherwise the first that is
+    equal to another one is returned, as helpers above the hips may have any matrix.
     """
     regular = rests[_is_regular(rests)]
     if not len(regular):
@@ -143,15 +129,7 @@ def _quotient(known: Floats, wanted: Floats) -> Floats | None:
 
 
 def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
-    """Bind the meshes attached to nodes, in binding space if the matrices can be inverted.
-
-    Parameters
-    ----------
-    bindings : Bindings
-        Bindings of the nodes are added.
-    nodes : list of int
-        Nodes with such a mesh.
-    """
+    """Bind the meshes attached to nodes, in binding space if the matrices can be inverted."""
     if not nodes:
         return
     above = _bound_ancestors(bindings)

@@ -175,15 +175,9 @@ Moved: TypeAlias = tuple[NDArray[np.intp], Floats]
 class MorphTargets:
     """Offsets of the positions or normals of V vertices for each of S morph targets.
 
-    Parameters
-    ----------
-    n_vertices : int
-        V.
-    offsets : iterable of S (V, 3) or None
-        As in the file, of any floating-point type, possibly parts of the file's bytes; None for a
-        target that moves nothing. They are converted when they are first used.
-    rows : (V,) int, optional
-        Vertices of the offsets that are used; all if omitted.
+    ``offsets``: iterable of S (V, 3) or None, as in the file, of any floating-point type, possibly
+    parts of the file's bytes; None for a target that moves nothing. They are converted when they
+    are first used. ``rows``: (V,) int, vertices of the offsets that are used; all if omitted.
     """
 
     __slots__ = ("_parts", "_rows", "n_vertices")

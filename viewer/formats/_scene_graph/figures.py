@@ -59,17 +59,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     Figure space is the space of the file's scene. Every relevant node is a ball joint about its
     rest pose; see ``group_nodes`` for the division into figures.
 
-    Parameters
-    ----------
-    file : NodeFile
-        The contents, as read.
-    source : Source
-        Records notes.
-
-    Raises
-    ------
-    FormatError
-        If the file has nothing to show, or more vertices than fit into memory.
+    Raises ``FormatError`` if the file has nothing to show, or more vertices than fit into memory.
     """
     groups = group_nodes(file)
     if not groups:

@@ -49,15 +49,7 @@ def group_nodes(file: NodeFile) -> list[Members]:
     joint; the others form one figure per root tree, or a single figure if the file has no skins.
     A file without meshes and skins is one figure of its animated nodes, or of all its nodes.
 
-    Parameters
-    ----------
-    file : NodeFile
-        The contents, as read.
-
-    Returns
-    -------
-    list of Members
-        Empty if there is nothing to show.
+    Returns empty if there is nothing to show.
     """
     return _Grouping(file).result()
 

@@ -67,17 +67,7 @@ def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
 
     A matrix that shears, M = U S V^T, becomes two joints: T R(U) S(S), and R(V^T) below it.
 
-    Parameters
-    ----------
-    tree : NodeTree
-        All nodes of the file.
-    nodes : list of int
-        Nodes that become joints, parents first.
-
-    Returns
-    -------
-    Joints
-        One joint per node, and auxiliary joints of nodes that shear.
+    Returns one joint per node, and auxiliary joints of nodes that shear.
     """
     joints = Joints()
     parents = tree.parents.tolist()
@@ -110,15 +100,8 @@ def _add_sheared(joints: Joints, node: int, name: str, parent: int, matrix: Floa
 def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
     """Return rotations U, V^T and factors S with U S V^T = M; reflections have a negative factor.
 
-    Parameters
-    ----------
-    linear : (3, 3)
-        M.
-
-    Returns
-    -------
-    left, scales, right : (3, 3), (3,), (3, 3)
-        The matrix U, the diagonal of S, and the matrix V^T.
+    ``linear``: (3, 3), m. Returns (3, 3), (3,), (3, 3), the matrix U, the diagonal of S, and the
+    matrix V^T.
     """
     left, scales, right = np.linalg.svd(linear)
     if np.linalg.det(left) < 0.0:
@@ -148,22 +131,11 @@ def skeleton_of(
 ) -> Skeleton:
     """Return the skeleton: every joint of the file is a ball joint about its rest pose.
 
-    Parameters
-    ----------
-    joints : Joints
-        Joints of the figure.
-    humanoid : mapping of str to int, optional
-        Node of each human bone; nodes that are not joints of this figure are ignored.
-    constraints : iterable of Constraint
-        Constraints between nodes; constraints of other figures are ignored.
-    springs : Springs, optional
-        Spring nodes; those of other figures are ignored.
-
-    Returns
-    -------
-    Skeleton
-        Skeleton of J joints. Auxiliary joints have no DOFs, constrained joints have locked DOFs,
-        and all other DOFs have no limits.
+    ``humanoid``: node of each human bone; nodes that are not joints of this figure are ignored.
+    ``constraints``: constraints between nodes; constraints of other figures are ignored.
+    ``springs``: spring nodes; those of other figures are ignored. Returns skeleton of J joints.
+    Auxiliary joints have no DOFs, constrained joints have locked DOFs, and all other DOFs have no
+    limits.
     """
     is_auxiliary = np.array(joints.nodes) < 0
     balls = np.flatnonzero(~is_auxiliary).astype(np.int32)

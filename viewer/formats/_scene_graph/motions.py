@@ -47,18 +47,9 @@ def animations_of(
 ) -> tuple[Animation, ...]:
     """Return the animations that move a joint or blend shape of a figure, in file order.
 
-    Parameters
-    ----------
-    animations : tuple of NodeAnimation
-        The file's animations.
-    readers : list of callable
-        From ``read_once``; shared by all figures.
-    joints : mapping of int
-        Joint of each node.
-    columns : mapping of (S,) int32
-        Blend shapes of each node's morph targets.
-    beside : set of int
-        Nodes of cameras that move while the figure plays an animation, even one without channels.
+    ``readers``: from ``read_once``; shared by all figures. ``columns``: mapping of (S,) int32,
+    blend shapes of each node's morph targets. ``beside``: nodes of cameras that move while the
+    figure plays an animation, even one without channels.
     """
     return tuple(
         Animation(

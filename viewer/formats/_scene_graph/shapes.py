@@ -31,19 +31,7 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     same default weights, and the same keys in all animations. Only animations of such nodes
     are read.
 
-    Parameters
-    ----------
-    file : NodeFile
-        Its meshes.
-    nodes : list of int
-        Nodes with a mesh.
-    readers : list of callable
-        Functions that return the channels of each animation.
-
-    Returns
-    -------
-    dict of (S,) int32
-        Blend shapes by node, for nodes with morph targets.
+    Returns dict of (S,) int32.
     """
     shaped = [node for node in nodes if _mesh(file, node).target_names]
     looks = {node: _look(file, node) for node in shaped}
@@ -102,14 +90,8 @@ def blend_shapes_of(
 ) -> BlendShapes | None:
     """Return the blend shapes of a figure; offsets are assembled on first use.
 
-    Parameters
-    ----------
-    file : NodeFile
-        Its meshes.
-    columns : dict of (S,) int32
-        From ``shape_columns``.
-    pieces : list of Piece
-        The primitives, whose targets are transformed to binding space.
+    ``columns``: dict of (S,) int32, from ``shape_columns``. ``pieces``: the primitives, whose
+    targets are transformed to binding space.
     """
     slots = {material: slot for slot, material in enumerate(used_materials(pieces))}
     if not columns and not any(_binds_of(each, slots) for each in file.expressions):

@@ -82,17 +82,7 @@ vertices, (T, 3); unit normals, (R, 3); whether vertices were split between face
 
 
 def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piece]:
-    """Return the primitives of a figure, part by part.
-
-    Parameters
-    ----------
-    file : NodeFile
-        Its meshes and skins.
-    nodes : list of int
-        Nodes with a mesh; each is a part.
-    bindings : Bindings
-        Bindings of all their skins, and of nodes whose mesh no skin moves.
-    """
+    """Return the primitives of a figure, part by part."""
     pieces: list[Piece] = []
     shadings: dict[int, _Shading] = {}  # by identity of the primitive, which many nodes may share
     for part, node in enumerate(nodes):
@@ -210,17 +200,7 @@ def _of_rows(influences: Influences, rows: Ints) -> Influences:
 
 
 def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
-    """Return the mesh of a figure; primitives without an attribute get neutral values.
-
-    Parameters
-    ----------
-    file : NodeFile
-        Its meshes and materials.
-    nodes : list of int
-        Nodes with a mesh, one per part.
-    pieces : list of Piece
-        Their primitives.
-    """
+    """Return the mesh of a figure; primitives without an attribute get neutral values."""
     firsts = np.cumsum([0, *(piece.n_vertices for piece in pieces)])
     starts = zip(pieces, firsts, strict=False)
     triangles = np.concatenate([piece.triangles + first for piece, first in starts])

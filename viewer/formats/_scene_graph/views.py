@@ -72,25 +72,8 @@ def views_of(
 ) -> tuple[tuple[CameraView, ...], list[str]]:
     """Return the perspective cameras of a scene.
 
-    Parameters
-    ----------
-    tree : NodeTree
-        All nodes.
-    order : list of int
-        Nodes of the scene, parents first.
-    cameras : tuple of NodeCamera
-        The file's cameras.
-    carriers : sequence of Carrier
-        The figures of the file.
-    animations : callable
-        Returns the animations of some joints.
-
-    Returns
-    -------
-    views : tuple of CameraView
-        Cameras in the space of the scene.
-    left_out : list of str
-        Names of the orthographic cameras.
+    Returns ``views``: cameras in the space of the scene; ``left_out``: names of the orthographic
+    cameras.
     """
     chosen = [node for node in order if tree.cameras[node] >= 0]
     if not chosen:

@@ -16,12 +16,7 @@ class GrowingTable:
     Many small arrays would fill memory that the joined table cannot use. A large array instead
     grows without being copied, because its pages are moved.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Shape of a row.
-    kind : dtype
-        Type of the numbers; the table takes a wider type if rows have one.
+    ``kind``: type of the numbers; the table takes a wider type if rows have one.
     """
 
     def __init__(self, shape: tuple[int, ...] = (), kind: DTypeLike = np.int64) -> None:

@@ -41,28 +41,20 @@ _MANTISSA = np.uint64((1 << 52) - 1)
 
 @dataclass(slots=True, eq=False)
 class Digits:
-    """Decimal digits of numbers.
-
-    Attributes
-    ----------
-    minus : (N,) bool
-        Whether a minus sign precedes the number.
-    whole, fraction : (N,)
-        Digits before and after the point, as integers.
-    decimals : (N,)
-        Number of digits after the point; 0 for a number without a point.
-    tails : (N,) or None
-        Four characters after the digits in the upper half of a little-endian word, or 0.
-    odd : dict of int to bytes
-        Texts of numbers whose digits are unknown; their digits are 0.
-    """
+    """Decimal digits of numbers."""
 
     minus: Bools
+    """(N,) bool. Whether a minus sign precedes the number."""
     whole: Words
     fraction: Words
+    """(N,). Digits before and after the point, as integers."""
     decimals: Indices
+    """(N,). Number of digits after the point; 0 for a number without a point."""
     tails: Words | None = None
+    """(N,) or None. Four characters after the digits in the upper half of a little-endian word, or
+    0."""
     odd: dict[int, bytes] = field(default_factory=dict)
+    """Texts of numbers whose digits are unknown; their digits are 0."""
 
     def put(self, other: Digits, places: Indices) -> None:
         """Replace the digits of the numbers at some indices by the digits of other numbers."""
@@ -223,16 +215,8 @@ def row_texts(
 ) -> Iterator[bytes]:
     """Yield the text of a table in parts.
 
-    Parameters
-    ----------
-    rows : (N, C)
-        Numbers.
-    digits_of : callable
-        Returns the digits of numbers, (n,): ``fixed``, ``shortest``, ``significant``, ``integers``.
-    between : bytes, or C - 1 of them
-        Separators of the numbers in a row.
-    end, start : bytes
-        Text after and before each row.
+    ``rows``: (N, C), numbers. ``digits_of``: returns the digits of numbers, (n,): ``fixed``,
+    ``shortest``, ``significant``, ``integers``.
     """
     width = rows.shape[1]
     separators = [between] if isinstance(between, bytes) else [*between]
@@ -249,14 +233,7 @@ def row_texts(
 def joined(digits: Digits, separators: Sequence[bytes], which: NDArray[np.uint8]) -> bytes:
     """Return the text of numbers, each followed by a separator.
 
-    Parameters
-    ----------
-    digits : Digits
-        The N numbers.
-    separators : sequence of bytes
-        Texts of any length.
-    which : (N,)
-        Index of the separator after each number.
+    ``which``: (N,), index of the separator after each number.
     """
     sizes = np.array([len(text) for text in separators], dtype=np.intp).take(which)
     n_whole = _count_digits(digits.whole)

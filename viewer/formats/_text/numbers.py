@@ -95,21 +95,9 @@ def is_too_large(word: bytes) -> bool:
 def parse_numbers(data: bytes, start: int, end: int, is_kept: bool = True) -> tuple[Floats, int]:
     """Parse white-space-separated numbers.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    start, end : int
-        The part of the data to parse.
-    is_kept : bool
-        Whether the numbers are kept in the user's cache, if all are valid.
-
-    Returns
-    -------
-    values : (N,)
-        The numbers before the first word that is not a number.
-    bad : int
-        Index of that word, -1 if all are numbers.
+    ``is_kept``: whether the numbers are kept in the user's cache, if all are valid. Returns
+    ``values``: (N,), the numbers before the first word that is not a number; ``bad``: index of that
+    word, -1 if all are numbers.
 
     >>> parse_numbers(b"1 -2.5  1e3", 0, 11)[0].tolist()
     [1.0, -2.5, 1000.0]
@@ -138,17 +126,7 @@ def parse_few(text: bytes) -> tuple[Floats, int]:
 def parse_words(data: bytes, start: int, end: int) -> Floats:
     """Parse white-space-separated words, which need not be numbers.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    start, end : int
-        The part of the data to parse.
-
-    Returns
-    -------
-    (N,)
-        NaN for every word that is not a number.
+    Returns (N,), NaN for every word that is not a number.
 
     >>> parse_words(b"1 up 1e3", 0, 8).tolist()
     [1.0, nan, 1000.0]
@@ -298,21 +276,9 @@ def _parse_short(
 ) -> tuple[Floats, Bools]:
     """Parse unsigned words of at most 8 characters; results for longer ones must be replaced.
 
-    Parameters
-    ----------
-    aligned : (N,)
-        A padded text as 64-bit words.
-    ends, lengths : (W,)
-        Offset after each word, and its number of characters.
-    has_dots : bool
-        Whether any word can have a decimal point.
-
-    Returns
-    -------
-    values : (W,)
-        Their values.
-    odd : (W,) bool
-        Words that are not such numbers.
+    ``aligned``: (N,), a padded text as 64-bit words. ``ends``, ``lengths``: (W,), offset after each
+    word, and its number of characters. Returns ``values``: (W,), their values; ``odd``: (W,) bool,
+    words that are not such numbers.
     """
     words = digits_only(words_before(aligned, ends, 1)[0], np.minimum(lengths, 8))
     if not has_dots:
@@ -330,19 +296,9 @@ def _parse_decimals(
 ) -> tuple[Floats, Bools]:
     """Parse unsigned words of any length, without exponents.
 
-    Parameters
-    ----------
-    letters, aligned : (N,), (N / 8,)
-        A padded text as characters, and as 64-bit words.
-    starts, ends : (W,)
-        Offsets of the words.
-
-    Returns
-    -------
-    values : (W,)
-        Their values.
-    odd : (W,) bool
-        Words that are not such numbers, or whose values are unknown.
+    ``letters``, ``aligned``: (N,), (N / 8,), a padded text as characters, and as 64-bit words.
+    ``starts``, ``ends``: (W,), offsets of the words. Returns ``values``: (W,), their values;
+    ``odd``: (W,) bool, words that are not such numbers, or whose values are unknown.
     """
     mantissas, decimals, odd = _mantissas(letters, aligned, starts, ends)
     return _scaled(mantissas, -decimals, odd)

@@ -36,14 +36,7 @@ def padded(text: bytes) -> bytes:
 def words_before(aligned: Words, ends: Indices, count: int) -> list[Words]:
     """Return the eight characters before each offset, the eight before these, and so on.
 
-    Parameters
-    ----------
-    aligned : (N,)
-        A padded text as 64-bit words.
-    ends : (W,)
-        Offsets in characters.
-    count : int
-        Number of words to return, 1 to 3.
+    ``aligned``: (N,), a padded text as 64-bit words. ``ends``: (W,), offsets in characters.
     """
     # Gathering aligned words and shifting them is faster than gathering unaligned words.
     first = (ends - 8) >> 3
@@ -128,12 +121,8 @@ def times_power(
 ) -> tuple[Floats, Floats]:
     """Return (values + rests) * 10^exponents as a sum of two floats, the second below half an ulp.
 
-    Parameters
-    ----------
-    values, rests : (N,)
-        Numbers up to 2^64; rests are below half an ulp of the values, or None for 0.
-    exponents : (N,) int
-        From -FARTHEST to FARTHEST.
+    ``values``, ``rests``: (N,), numbers up to 2^64; rests are below half an ulp of the values, or
+    None for 0. ``exponents``: (N,) int, from -FARTHEST to FARTHEST.
     """
     power, low, upper, lower = (table.take(exponents + FARTHEST) for table in _tables())
     product = values * power

@@ -21,26 +21,11 @@ def read_table(
 ) -> tuple[Floats, Callable[[int], int]]:
     """Read a table of numbers.
 
-    Parameters
-    ----------
-    source : Source
-        The file; blank lines are skipped.
-    columns : int
-        Numbers in every row.
-    part : str
-        Part of the figure that the rows describe, see ``Diagnostic``.
-
-    Returns
-    -------
-    rows : (N, columns)
-        Values as written; NaN in invalid rows, unless the file is refused because of them.
-    offset_of : callable
-        Returns the offset of a row in the file; slow, for errors only.
-
-    Raises
-    ------
-    FormatError
-        If a row has more or fewer numbers, or a word is not a number; the error has the line.
+    ``part``: part of the figure that the rows describe, see ``Diagnostic``. Returns ``rows``: (N,
+    columns), values as written; NaN in invalid rows, unless the file is refused because of them;
+    ``offset_of``: returns the offset of a row in the file; slow, for errors only. Raises
+    ``FormatError`` if a row has more or fewer numbers, or a word is not a number; the error has the
+    line.
     """
     rows = _regular_rows(source, columns)
     if rows is not None:
@@ -70,10 +55,7 @@ def _regular_rows(source: Source, columns: int) -> Floats | None:
 def read_numbers(source: Source) -> Floats:
     """Read all numbers of a text, regardless of line breaks: (N,).
 
-    Raises
-    ------
-    FormatError
-        If a word is not a number; the error has the line.
+    Raises ``FormatError`` if a word is not a number; the error has the line.
     """
     data = source.data
     values, bad = parse_numbers(data, 0, len(data))

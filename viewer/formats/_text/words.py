@@ -21,24 +21,16 @@ _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Words:
-    """Words of a text that should be numbers.
-
-    Attributes
-    ----------
-    data : bytes
-        The file.
-    values : (N,)
-        Values; NaN for a word that is not a number.
-    offsets : (N,)
-        Position of each word in the file, in bytes.
-    lines : (N,)
-        Index of each word's line: equal for words on the same line, otherwise increasing.
-    """
+    """Words of a text that should be numbers."""
 
     data: bytes
+    """The file."""
     values: Floats
+    """(N,). Values; NaN for a word that is not a number."""
     offsets: Places
+    """(N,). Position of each word in the file, in bytes."""
     lines: Places
+    """(N,). Index of each word's line: equal for words on the same line, otherwise increasing."""
 
     @property
     def bad(self) -> Places:
@@ -75,20 +67,8 @@ def refuse_words(
 ) -> None:
     """Record infinite numbers as one error, and words that are not numbers as another.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-    words : Words
-        Words of the file.
-    bad : (N,)
-        Indices of the invalid words.
-    named : callable
-        Returns the item of the file to which the word with a given index belongs.
-    part : str
-        Part of the figure, see ``Diagnostic``.
-    places : (N,)
-        Index of the vertex, triangle, joint or frame to which each word belongs.
+    ``bad``: (N,), indices of the invalid words. ``part``: part of the figure, see ``Diagnostic``.
+    ``places``: (N,), index of the vertex, triangle, joint or frame to which each word belongs.
     """
     infinite = [is_infinite(words.word(index)) for index in bad.tolist()]
     for is_chosen in (True, False):

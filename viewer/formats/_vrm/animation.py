@@ -38,18 +38,8 @@ _MOST_FRAMES = 1_000_000
 def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     """Return the first animation of a file of motions, sampled at the rate of its keys.
 
-    Parameters
-    ----------
-    file : NodeFile
-        A file that has the extension.
-    source : Source
-        Records messages about invalid bones and unused contents.
-
-    Raises
-    ------
-    FormatError
-        If no human bone is animated, or the animation has invalid keys or more than a million
-        frames.
+    Raises ``FormatError`` if no human bone is animated, or the animation has invalid keys or more
+    than a million frames.
     """
     pointer = f"/extensions/{EXTENSION}"
     told = file.extensions[EXTENSION]

@@ -18,18 +18,7 @@ def read_humanoid(
 ) -> dict[str, int]:
     """Return the node of each human bone, by its name in VRM 1.0.
 
-    Parameters
-    ----------
-    source : Source
-        Records messages about invalid bones, which are ignored.
-    file : NodeFile
-        The file, with its nodes.
-    told : mapping
-        The extension with the humanoid.
-    version : int
-        0 or 1.
-    pointer : str
-        JSON pointer to the extension.
+    ``source``: records messages about invalid bones, which are ignored.
     """
     found: dict[str, int] = {}
     for _, bone, node in given_bones(told, version):

@@ -33,17 +33,7 @@ def read_constraints(tree: NodeTree, source: Source) -> tuple[Constraint, ...]:
 
     Invalid constraints are ignored with a warning.
 
-    Parameters
-    ----------
-    tree : NodeTree
-        Nodes with their extensions.
-    source : Source
-        Records messages.
-
-    Raises
-    ------
-    FormatError
-        If constraints depend on each other.
+    Raises ``FormatError`` if constraints depend on each other.
     """
     found: dict[int, Constraint] = {}
     for node, extensions in tree.extensions.items():

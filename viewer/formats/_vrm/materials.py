@@ -91,12 +91,8 @@ _WRITES_DEPTH = 3  # value of _BlendMode
 def old_binds(told: Any, materials: list[Any]) -> tuple[list[_Bind], list[str]]:
     """Return the changes by an expression of version 0.x, and labels of changes without effect.
 
-    Parameters
-    ----------
-    told : Any
-        A member of ``blendShapeGroups``, as parsed from JSON.
-    materials : list
-        ``materialProperties``, whose names the expression uses.
+    ``told``: a member of ``blendShapeGroups``, as parsed from JSON. ``materials``:
+    ``materialProperties``, whose names the expression uses.
     """
     found: list[_Bind] = []
     moves: dict[int, Floats] = {}

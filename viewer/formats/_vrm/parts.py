@@ -12,13 +12,6 @@ from viewer.rig.arrays import Floats
 def part(told: Any, *names: str) -> Any:
     """Return a nested property; None if it is missing or an outer value is not an object.
 
-    Parameters
-    ----------
-    told : Any
-        Parsed JSON.
-    *names : str
-        Keys from the outside to the inside.
-
     >>> part({"a": {"b": 1}}, "a", "b"), part({"a": []}, "a", "b")
     (1, None)
     """

@@ -65,17 +65,7 @@ _LONGEST = 200  # maximum number of characters of a property
 def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     """Return a file with the humanoid, expressions and constraints of its VRM extensions, if any.
 
-    Parameters
-    ----------
-    file : NodeFile
-        As read by the glTF reader.
-    source : Source
-        Records messages.
-
-    Raises
-    ------
-    FormatError
-        If constraints of nodes depend on each other.
+    Raises ``FormatError`` if constraints of nodes depend on each other.
     """
     file = replace(
         file,

@@ -71,12 +71,7 @@ class _Shape:
 def read_springs(file: NodeFile, source: Source) -> Springs | None:
     """Return the spring joints of a file as node indices; None if there are none.
 
-    Parameters
-    ----------
-    file : NodeFile
-        The file, with its extensions.
-    source : Source
-        Records messages about invalid chains and colliders, which are ignored.
+    ``source``: records messages about invalid chains and colliders, which are ignored.
     """
     told = file.extensions.get(_EXTENSION)
     old = part(file.extensions, "VRM", "secondaryAnimation")

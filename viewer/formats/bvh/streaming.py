@@ -49,25 +49,17 @@ class Irregular(Exception):  # noqa: N818 - it is not an error
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BvhStream:
-    """A regular file whose frames are read on demand.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    table : Table
-        Its joints.
-    start : int
-        Offset of the first frame in the file.
-    motion : SkeletonMotion
-        The skeleton, with the few frames that the estimates need. The timing of its clip has all
-        frames, each of which refers to the row of one of these few.
-    """
+    """A regular file whose frames are read on demand."""
 
     path: Path
+    """The file."""
     table: Table
+    """Its joints."""
     start: int
+    """Offset of the first frame in the file."""
     motion: SkeletonMotion
+    """The skeleton, with the few frames that the estimates need. The timing of its clip has all
+    frames, each of which refers to the row of one of these few."""
 
     @property
     def n_frames(self) -> int:
@@ -106,11 +98,8 @@ class BvhStream:
 def open_stream(source: Source) -> BvhStream | None:
     """Return a long file as a stream, or None if it must be read as a whole.
 
-    Parameters
-    ----------
-    source : Source
-        The file, recognised as a ``.bvh``; warnings about its hierarchy are added, unless the
-        result is None.
+    ``source``: the file, recognised as a ``.bvh``; warnings about its hierarchy are added, unless
+    the result is None.
     """
     with source.path.open("rb") as file:
         data = file.read(_HEAD)

@@ -39,20 +39,8 @@ _LEVELS = 3  # number of folders that may contain the cameras, from the folder o
 def read(source: Source) -> Capture:
     """Open a recording with default options.
 
-    Parameters
-    ----------
-    source : Source
-        Output folder of EasyMocap, one of its subfolders, or a single frame file.
-
-    Returns
-    -------
-    Capture
-        Recording of which only the first people have been read.
-
-    Raises
-    ------
-    FormatError
-        If there are no frames, or no person in any frame.
+    Returns recording of which only the first people have been read. Raises ``FormatError`` if there
+    are no frames, or no person in any frame.
     """
     return open_capture(source)
 
@@ -68,36 +56,15 @@ def open_capture(
 ) -> Capture:
     """Open a recording.
 
-    Parameters
-    ----------
-    source : Source
-        Output folder of EasyMocap, one of its subfolders, or a single frame file.
-    frame_rate : float
-        Frames per second.
-    flat_hands : bool, optional
-        Whether hand components exclude the mean hand; by default, they do for SMPL-X and MANO, but
-        not for SMPL+H.
-    up : "y", "z", "-y", "-z" or ""
-        Up axis of the world; empty to estimate it from the people.
-    legacy_expression : bool
-        Use the expression as shape components 10 to 19, as EasyMocap does for models with 300
-        shapes.
-    layout : str
-        Layout of keypoints, see ``keypoint_layout``, to choose between layouts with the same
-        number of points: ``"h36m"``, ``"panoptic"``.
-    images : Path, optional
-        Folder of the cameras' image folders; by default ``images`` next to the recording.
-
-    Returns
-    -------
-    Capture
-        Recording of which only the first people have been read. Errors that concern
-        the files as a whole are in the source's warnings.
-
-    Raises
-    ------
-    FormatError
-        If there are no frames, no person in any frame, or no camera in the given folder.
+    ``frame_rate``: frames per second. ``flat_hands``: whether hand components exclude the mean
+    hand; by default, they do for SMPL-X and MANO, but not for SMPL+H. ``up``: one of "y", "z",
+    "-y", "-z" or "", up axis of the world; empty to estimate it from the people. ``layout``: layout
+    of keypoints, see ``keypoint_layout``, to choose between layouts with the same number of points:
+    ``"h36m"``, ``"panoptic"``. ``images``: folder of the cameras' image folders; by default
+    ``images`` next to the recording. Returns recording of which only the first people have been
+    read. Errors that concern the files as a whole are in the source's warnings. Raises
+    ``FormatError`` if there are no frames, no person in any frame, or no camera in the given
+    folder.
     """
     files = find_frames(source)
     options = Options(

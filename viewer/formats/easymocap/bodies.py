@@ -47,33 +47,22 @@ _LOOKED_AT = 8  # number of frames that determine the usual numbers of values
 
 @dataclass(frozen=True, slots=True)
 class BodyLayout:
-    """Assignment of the values in ``poses`` to joints.
-
-    Attributes
-    ----------
-    model : str
-        Member of the SMPL family.
-    names : tuple of K str
-        Joints that are rotated, the root first.
-    columns : tuple of (int, int)
-        Ranges of ``poses`` for all joints except the root, in the order of ``names``.
-    root : int
-        Number of values at the beginning that rotate the root: 3 or 0.
-    hands : tuple of (str, int, int)
-        Side, and the range of ``poses`` with its components.
-    is_flat : bool
-        Whether the mean hand is excluded by default.
-    widths : tuple of (str, int)
-        Keys of a record that are read, with their number of values.
-    """
+    """Assignment of the values in ``poses`` to joints."""
 
     model: str
+    """Member of the SMPL family."""
     names: tuple[str, ...]
+    """Joints that are rotated, the root first."""
     columns: tuple[tuple[int, int], ...]
+    """Ranges of ``poses`` for all joints except the root, in the order of ``names``."""
     root: int = 3
+    """Number of values at the beginning that rotate the root: 3 or 0."""
     hands: tuple[tuple[str, int, int], ...] = ()
+    """Side, and the range of ``poses`` with its components."""
     is_flat: bool = True
+    """Whether the mean hand is excluded by default."""
     widths: tuple[tuple[str, int], ...] = ()
+    """Keys of a record that are read, with their number of values."""
 
 
 _LAYOUTS = {
@@ -100,18 +89,9 @@ _LAYOUTS = {
 def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) -> BodyLayout:
     """Return the layout of a record, as determined by the length of its ``poses``.
 
-    Parameters
-    ----------
-    record : dict
-        Body parameters of a person in one frame.
-    usual : mapping of str to int, optional
-        Numbers of values in the recording, see ``usual_widths``.
-
-    Raises
-    ------
-    RecordError
-        If no layout has this length, the length is unusual, or the record is invalid and therefore
-        cannot determine the layout of others.
+    ``usual``: numbers of values in the recording, see ``usual_widths``. Raises ``RecordError`` if
+    no layout has this length, the length is unusual, or the record is invalid and therefore cannot
+    determine the layout of others.
     """
     usual = usual or {}
     count = len(row_of(record, "poses"))
@@ -149,10 +129,7 @@ def with_coefficients(
 
     ``usual`` are the numbers of values in the recording, see ``usual_widths``.
 
-    Raises
-    ------
-    RecordError
-        If the coefficients are not finite numbers.
+    Raises ``RecordError`` if the coefficients are not finite numbers.
     """
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
@@ -166,17 +143,8 @@ def usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
     They are those of a few frames spread over the recording. The first record alone must not decide
     for all others, because it may be unusual.
 
-    Parameters
-    ----------
-    files : FrameFiles
-        Files of the recording.
-    max_size : int
-        Maximum size of a file in bytes.
-
-    Returns
-    -------
-    mapping of str to int
-        Number of values of a record by key; empty if there are no valid bodies.
+    ``max_size``: maximum size of a file in bytes. Returns number of values of a record by key;
+    empty if there are no valid bodies.
     """
     found = [dict(layout.widths) for layout in _layouts(files, max_size)]
     if not found:
@@ -247,25 +215,18 @@ class Rows:
 
 @dataclass(slots=True, kw_only=True)
 class BodyRows(Rows):
-    """Body parameters of one person.
-
-    Attributes
-    ----------
-    layout : BodyLayout
-        Layout of all records.
-    known : mapping of str to (C,), or None
-        The person's last coefficients before these rows, which ``values`` updates; None for people
-        without an identity, whose rows are independent of each other.
-    buffers : list of array
-        Values of the layout's keys, record after record.
-    remarks : list of Remark
-        Remarks that ``values`` adds.
-    """
+    """Body parameters of one person."""
 
     layout: BodyLayout
+    """Layout of all records."""
     known: dict[str, Floats] | None = None
+    """mapping of str to (C,), or None. The person's last coefficients before these rows, which
+    ``values`` updates; None for people without an identity, whose rows are independent of each
+    other."""
     buffers: list[array[float]] = field(default_factory=list)
+    """Values of the layout's keys, record after record."""
     remarks: list[_Remark] = field(default_factory=list)
+    """Remarks that ``values`` adds."""
     _lacking: dict[str, list[int]] = field(default_factory=dict)
     _plan: list[tuple[str, int, Callable[[list[Any]], None]]] = field(default_factory=list)
 
@@ -283,10 +244,7 @@ class BodyRows(Rows):
     def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
         """Add one record.
 
-        Raises
-        ------
-        RecordError
-            If a value is missing, or its length has changed.
+        Raises ``RecordError`` if a value is missing, or its length has changed.
         """
         try:
             for key, count, put in self._plan:
@@ -340,14 +298,8 @@ class BodyRows(Rows):
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
         """Return the values by key, a mask of valid rows, and the errors in invalid rows.
 
-        Returns
-        -------
-        values : mapping of str to (N, C)
-            Values of the valid rows.
-        keep : (rows,) bool
-            True for valid rows.
-        faults : list of RowFault
-            Error in each invalid row.
+        Returns ``values``: mapping of str to (N, C); ``keep``: true for valid rows; ``faults``:
+        error in each invalid row.
         """
         keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
         values: dict[str, Floats] = {}
@@ -453,19 +405,10 @@ def _constant(rows: Floats | None) -> Floats | None:
 def hold(rows: Floats, is_given: Bools, known: Floats | None) -> Floats:
     """Return rows with each missing row replaced by the last valid row before it.
 
-    Parameters
-    ----------
-    rows : (N, C)
-        Rows in time order; the content of missing rows is ignored.
-    is_given : (N,) bool
-        True for rows in the file. Non-finite rows are preserved, but not repeated.
-    known : (C,) or None
-        The last valid row before all of these; None means 0.
-
-    Returns
-    -------
-    (N, C)
-        ``rows`` itself if no row is missing.
+    ``rows``: (N, C), rows in time order; the content of missing rows is ignored. ``is_given``: (N,)
+    bool, true for rows in the file. Non-finite rows are preserved, but not repeated. ``known``:
+    (C,) or None, the last valid row before all of these; None means 0. Returns (N, C), ``rows``
+    itself if no row is missing.
     """
     if is_given.all():
         return rows

@@ -53,21 +53,14 @@ Value = Floats | list[str] | str
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Storage:
-    """Content of a FileStorage file.
-
-    Attributes
-    ----------
-    source : Source
-        The file.
-    values : dict
-        Matrices, lists of strings and single strings by name.
-    lines : dict of str to int
-        Line of each key.
-    """
+    """Content of a FileStorage file."""
 
     source: Source
+    """The file."""
     values: dict[str, Value] = field(default_factory=dict)
+    """Matrices, lists of strings and single strings by name."""
     lines: dict[str, int] = field(default_factory=dict)
+    """Line of each key."""
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
         """Return an error at the line of an item or, if it is missing, of the cameras' names."""
@@ -85,19 +78,8 @@ def find_cameras(
 ) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
     """Return the cameras of the first folder with calibration files.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Folders to search, in this order.
-    max_size : int
-        Larger files, in bytes, are refused.
-
-    Returns
-    -------
-    views : tuple of CameraView
-        Cameras in the order of the files; empty if there are no files or they are invalid.
-    notes : list of Diagnostic
-        Errors in the files.
+    ``max_size``: larger files, in bytes, are refused. Returns ``views``: cameras in the order of
+    the files; empty if there are no files or they are invalid; ``notes``: errors in the files.
     """
     for folder in folders:
         there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]
@@ -218,15 +200,7 @@ class _Matrix:
 def read_storage(source: Source) -> Storage:
     """Return the content of a FileStorage file.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-
-    Raises
-    ------
-    FormatError
-        If a line is not supported; the error has the line.
+    Raises ``FormatError`` if a line is not supported; the error has the line.
     """
     file = Storage(source)
     values = file.values

@@ -28,56 +28,35 @@ _NUMBERED = re.compile(r"(.*?)([0-9]+)(\D*)")
 
 @dataclass(slots=True)
 class FrameFolder:
-    """The frame files of one folder.
-
-    Attributes
-    ----------
-    path : Path
-        The folder.
-    has_bodies, has_points : bool
-        Data to read from its files.
-    names : dict of int to str
-        File names by frame, counted from the first frame of the recording.
-    """
+    """The frame files of one folder."""
 
     path: Path
+    """The folder."""
     has_bodies: bool = True
     has_points: bool = True
+    """Data to read from its files."""
     names: dict[int, str] = field(default_factory=dict)
+    """File names by frame, counted from the first frame of the recording."""
 
 
 @dataclass(slots=True)
 class FrameFiles:
-    """All frame files of a recording.
-
-    Attributes
-    ----------
-    folders : list of FrameFolder
-        Folders, which are read in this order for each frame.
-    frames : list of int
-        Frames with a file, ascending.
-    n_frames, first_frame : int
-        Length of the timeline, and the file number of its first frame.
-    """
+    """All frame files of a recording."""
 
     folders: list[FrameFolder]
+    """Folders, which are read in this order for each frame."""
     frames: list[int] = field(default_factory=list)
+    """Frames with a file, ascending."""
     n_frames: int = 0
     first_frame: int = 0
+    """Length of the timeline, and the file number of its first frame."""
 
 
 def find_frames(source: Source) -> FrameFiles:
     """Find the frame files of an EasyMocap output folder, one of its subfolders, or a single file.
 
-    Parameters
-    ----------
-    source : Source
-        The folder or file; ignored files are added to its warnings.
-
-    Raises
-    ------
-    FormatError
-        If there are no frame files, or a folder cannot be listed.
+    ``source``: the folder or file; ignored files are added to its warnings. Raises ``FormatError``
+    if there are no frame files, or a folder cannot be listed.
     """
     if not source.is_folder:
         folder = FrameFolder(source.path.parent)

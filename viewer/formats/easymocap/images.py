@@ -22,14 +22,7 @@ _MOST_NAMED = 5  # maximum number of missing frames listed in a message
 class ImageFolders:
     """Images in folders; the last image shown for each camera is cached.
 
-    Parameters
-    ----------
-    folders : mapping of str to Path
-        Folder of each camera.
-    frame_rate : float
-        Frames per second.
-    frames : range
-        Numbers of the capture's frames.
+    ``frame_rate``: frames per second.
     """
 
     def __init__(self, folders: dict[str, Path], frame_rate: float, frames: range) -> None:
@@ -99,23 +92,9 @@ def find_images(
 ) -> ImageFolders | None:
     """Return the images of calibrated cameras; None if there are none.
 
-    Parameters
-    ----------
-    parents : sequence of Path
-        Folders whose subfolder ``images`` is searched, in this order.
-    views : sequence of CameraView
-        The cameras, which have the same names as the folders.
-    frame_rate : float
-        Frames per second.
-    frames : range
-        Numbers of the capture's frames.
-    given : Path, optional
-        Folder to use instead; for a single camera, it may contain the images themselves.
-
-    Raises
-    ------
-    FormatError
-        If the given folder has no images of any camera.
+    ``parents``: folders whose subfolder ``images`` is searched, in this order. ``frame_rate``:
+    frames per second. ``given``: folder to use instead; for a single camera, it may contain the
+    images themselves. Raises ``FormatError`` if the given folder has no images of any camera.
     """
     for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
         folders = {view.name: parent / view.name for view in views if _is_name(view.name)}

@@ -38,12 +38,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
 class RecordError(InvalidValueError):
     """A person's record, or a part of it, that is invalid.
 
-    Attributes
-    ----------
-    key : str
-        Key of the invalid value; empty for the record itself.
-    code : str
-        A key of ``CODES``.
+    ``key``: key of the invalid value; empty for the record itself. ``code``: a key of ``CODES``.
     """
 
     def __init__(self, key: str, problem: Phrase, code: str = "F002") -> None:
@@ -71,17 +66,8 @@ _decode = json.JSONDecoder(object_pairs_hook=_unique).decode
 def load_people(path: str, max_size: int) -> list[Any]:
     """Return the people in a frame file, unchecked; NaN and infinities are accepted.
 
-    Parameters
-    ----------
-    path : str
-        A regular file.
-    max_size : int
-        Larger files, in bytes, are refused before they are read.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be read, or is not JSON with a list of people.
+    ``max_size``: larger files, in bytes, are refused before they are read. Raises ``FormatError``
+    if the file cannot be read, or is not JSON with a list of people.
     """
     text = _text(path, max_size)
     try:
@@ -115,14 +101,7 @@ def _fault(key: str, path: str, line: int | None, **values: Any) -> FormatError:
 def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
     """Return the line of a person's record, or of a key in it, in a frame file; for errors only.
 
-    Parameters
-    ----------
-    path, max_size
-        As for ``load_people``, which has read the file.
-    place : int
-        Index of the person in the list.
-    key : str
-        Empty for the record itself.
+    ``path``, ``max_size``: as for ``load_people``, which has read the file.
     """
     try:
         text = _text(path, max_size)
@@ -170,10 +149,7 @@ def person_of(record: Any, place: int) -> int | str:
 
     A number as text is a number; other text is the name of a person.
 
-    Raises
-    ------
-    RecordError
-        If the value is not a record, or its identity is invalid.
+    Raises ``RecordError`` if the value is not a record, or its identity is invalid.
     """
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
@@ -203,10 +179,7 @@ def has_numbers(record: Record, key: str) -> bool:
 def row_of(record: Record, key: str) -> list[Any]:
     """Return a key's numbers, which may be stored as a one-row matrix.
 
-    Raises
-    ------
-    RecordError
-        If the value is not a list.
+    Raises ``RecordError`` if the value is not a list.
     """
     values = record.get(key)
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
@@ -225,18 +198,8 @@ def limit_of(key: str) -> float:
 def width_of(record: Record, key: str, count: int | None = None) -> int:
     """Return the number of values of a key, all finite, as the reference for other records.
 
-    Parameters
-    ----------
-    record, key
-        Record and key.
-    count : int, optional
-        Expected number of values; any number if omitted.
-
-    Raises
-    ------
-    RecordError
-        If the value is not a list, has more or fewer values, or contains anything other than finite
-        numbers.
+    ``count``: expected number of values; any number if omitted. Raises ``RecordError`` if the value
+    is not a list, has more or fewer values, or contains anything other than finite numbers.
     """
     count = len(row_of(record, key)) if count is None else count
     numbers = array("d")
@@ -251,10 +214,7 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
 def take_row(record: Record, key: str, count: int, put: Any) -> None:
     """Pass a key's numbers to ``put``, the ``fromlist`` of an ``array("d")``.
 
-    Raises
-    ------
-    RecordError
-        If there are more or fewer values, or any is not a number.
+    Raises ``RecordError`` if there are more or fewer values, or any is not a number.
     """
     try:
         values = record[key]

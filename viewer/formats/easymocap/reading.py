@@ -82,26 +82,18 @@ class _Part:
 
 @dataclass(slots=True, eq=False)
 class Reading:
-    """A single pass over the files, with its state and warnings.
-
-    Attributes
-    ----------
-    files : FrameFiles
-        Files to read.
-    options : Options
-        Settings that are not in the files.
-    body_layout, point_layout : layouts or None
-        Layout of the first usual record; other records must agree, but may have fewer coefficients,
-        or be the first with coefficients.
-    first_fault : Diagnostic or None
-        First error.
-    """
+    """A single pass over the files, with its state and warnings."""
 
     files: FrameFiles
+    """Files to read."""
     options: Options
+    """Settings that are not in the files."""
     body_layout: BodyLayout | None = None
     point_layout: tuple[PointLayout, _Parts] | None = None
+    """Layout of the first usual record; other records must agree, but may have fewer coefficients,
+    or be the first with coefficients."""
     first_fault: Diagnostic | None = None
+    """First error."""
     _numbers: set[int] = field(default_factory=set)
     _names: dict[str, int] = field(default_factory=dict)
     _prefixes: list[str] = field(default_factory=list)
@@ -174,13 +166,7 @@ class Reading:
             self.note("F007.record-ids", path)
 
     def _number_of(self, person: int | str) -> int:
-        """Return the number of a person; those with names get unused numbers.
-
-        Raises
-        ------
-        RecordError
-            If a number has already been given to a person with a name.
-        """
+        """Return the number of a person; those with names get unused numbers."""
         if isinstance(person, int):
             if person in self._names.values():
                 raise RecordError("id", Phrase("record-id-named", found=person))
@@ -348,30 +334,17 @@ def _lacks(record: dict[str, Any], folder: FrameFolder) -> Phrase:
 
 @dataclass(slots=True, kw_only=True)
 class _PointRows(Rows):
-    """Keypoints of one person.
-
-    Attributes
-    ----------
-    layout : PointLayout
-        Layout of all records.
-    parts : tuple of (str, int)
-        Keys of a record, with their number of points.
-    buffer : array
-        x, y, z, confidence of all points, record after record.
-    """
+    """Keypoints of one person."""
 
     layout: PointLayout
+    """Layout of all records."""
     parts: _Parts
+    """Keys of a record, with their number of points."""
     buffer: array[float] = field(default_factory=lambda: array("d"))
+    """x, y, z, confidence of all points, record after record."""
 
     def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
-        """Add one record.
-
-        Raises
-        ------
-        RecordError
-            If a key is missing, or its number of points has changed.
-        """
+        """Add one record."""
         before = len(self.buffer)
         try:
             for key, count in self.parts:
@@ -382,13 +355,7 @@ class _PointRows(Rows):
         self.keep_origin(frame, path, place)
 
     def check_any(self) -> None:
-        """Refuse rows without a valid keypoint, which must not determine the layout of others.
-
-        Raises
-        ------
-        RecordError
-            If every keypoint is invalid.
-        """
+        """Refuse rows without a valid keypoint, which must not determine the layout of others."""
         if _is_odd(self._rows()).all():
             raise RecordError(_POINTS, Phrase("record-no-rows"))
 
@@ -438,17 +405,7 @@ def _is_odd(points: Floats) -> Bools:
 def _point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, _Parts]:
     """Return the layout of a record's keypoints, and its keys with their numbers of points.
 
-    Parameters
-    ----------
-    record : dict
-        Record of one person.
-    title : str
-        Name of the layout, used if ``keypoints3d`` has its number of points.
-
-    Raises
-    ------
-    RecordError
-        If the value of a key is not a list of rows.
+    ``title``: name of the layout, used if ``keypoints3d`` has its number of points.
     """
     parts = [(key, _count(record, key)) for key in (_POINTS, *_BESIDE) if key in record]
     counts = [count for _, count in parts]

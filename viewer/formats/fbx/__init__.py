@@ -20,20 +20,9 @@ if TYPE_CHECKING:
 def read(source: Source) -> FigureGroup:
     """Read the figures of a file; the keys of its animations are read when they are first needed.
 
-    Parameters
-    ----------
-    source : Source
-        The file; a warning lists elements without equivalent.
-
-    Returns
-    -------
-    FigureGroup
-        Figures in the file's unit and axes, unless converted as described above.
-
-    Raises
-    ------
-    FormatError
-        If ufbx is not installed, cannot read the file, crashes, or takes too long.
+    ``source``: the file; a warning lists elements without equivalent. Returns figures in the file's
+    unit and axes, unless converted as described above. Raises ``FormatError`` if ufbx is not
+    installed, cannot read the file, crashes, or takes too long.
     """
     # The child process imports this package, too, and needs neither module.
     from viewer.formats._scene_graph.figures import figure_group

@@ -400,17 +400,7 @@ def target_weights(weights: Floats, targets: list[float]) -> Floats:
     The channel interpolates between the two targets around its weight, and between the mesh
     itself, at 0, and the first target. Beyond the last target, it extrapolates.
 
-    Parameters
-    ----------
-    weights : (N,)
-        Weights of the channel.
-    targets : list of K float
-        Weights of the channel at which a target is fully on.
-
-    Returns
-    -------
-    (N, K)
-        Weights of the targets.
+    ``weights``: (N,), weights of the channel. Returns (N, K).
 
     >>> target_weights(np.array([0.25, 0.75, 1.25]), [0.5, 1.0]).tolist()
     [[0.5, 0.0], [0.5, 0.5], [-0.5, 1.5]]

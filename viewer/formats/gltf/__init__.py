@@ -58,21 +58,10 @@ _MOTION = "VRMC_vrm_animation"
 def read(source: Source) -> FigureGroup | SkeletonMotion:
     """Read the figures and cameras of a file, or the motion of a ``.vrma`` file.
 
-    Parameters
-    ----------
-    source : Source
-        A ``.gltf``, ``.glb``, ``.vrm`` or ``.vrma`` file.
-
-    Returns
-    -------
-    FigureGroup or SkeletonMotion
-        Figures with skeletons of ball joints, blend shapes and animations, in metres; or a
-        skeleton with its motion.
-
-    Raises
-    ------
-    FormatError
-        If the file is invalid, requires an unsupported extension, or has nothing to show.
+    ``source``: a ``.gltf``, ``.glb``, ``.vrm`` or ``.vrma`` file. Returns figures with skeletons of
+    ball joints, blend shapes and animations, in metres; or a skeleton with its motion. Raises
+    ``FormatError`` if the file is invalid, requires an unsupported extension, or has nothing to
+    show.
     """
     file = read_nodes(source)
     if isinstance(file.extensions.get(_MOTION), dict):
@@ -85,16 +74,9 @@ def read(source: Source) -> FigureGroup | SkeletonMotion:
 def read_nodes(source: Source) -> NodeFile:
     """Return the contents of a glTF file; the keys of animations are read when they are played.
 
-    Parameters
-    ----------
-    source : Source
-        A ``.gltf``, ``.glb`` or ``.vrm`` file.
-
-    Raises
-    ------
-    FormatError
-        If the file is invalid, refers to data outside its folder, or requires an unsupported
-        extension. Errors without visible effect are warnings.
+    ``source``: a ``.gltf``, ``.glb`` or ``.vrm`` file. Raises ``FormatError`` if the file is
+    invalid, refers to data outside its folder, or requires an unsupported extension. Errors without
+    visible effect are warnings.
     """
     document = open_document(source)
     check_extensions(document)

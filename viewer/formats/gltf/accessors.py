@@ -78,14 +78,7 @@ class _Layout:
 class Accessors:
     """Arrays of a document.
 
-    Parameters
-    ----------
-    table : Table
-        The document's accessors.
-    buffers : Buffers
-        Their data.
-    spend : callable
-        Counts bytes that are about to be decoded; see ``Document.spend``.
+    ``spend``: counts bytes that are about to be decoded; see ``Document.spend``.
     """
 
     def __init__(self, table: Table, buffers: Buffers, spend: Callable[[int, str], None]) -> None:
@@ -112,28 +105,11 @@ class Accessors:
     ) -> Floats:
         """Return an accessor as numbers; normalised integers become fractions.
 
-        Parameters
-        ----------
-        index : int
-            A valid index.
-        kinds : sequence of str
-            Expected element types, such as ``"VEC3"``.
-        user : str
-            JSON pointer to the member that refers to the accessor.
-        rows : (M,) int32, optional
-            Elements to return; all if omitted.
-        decoded : (N, C), optional
-            Components that are already decoded, used instead of the buffer view.
-
-        Returns
-        -------
-        (N, C) or (M, C)
-            Values, possibly infinite or NaN. The components of a matrix are in column order.
-
-        Raises
-        ------
-        FormatError
-            If the accessor is invalid or has a different type, or its data is missing.
+        ``kinds``: expected element types, such as ``"VEC3"``. ``rows``: (M,) int32, elements to
+        return; all if omitted. ``decoded``: (N, C), components that are already decoded, used
+        instead of the buffer view. Returns (N, C) or (M, C), values, possibly infinite or NaN. The
+        components of a matrix are in column order. Raises ``FormatError`` if the accessor is
+        invalid or has a different type, or its data is missing.
         """
         layout = self._layout(index, kinds, user)
         values = self._picked(layout, rows, decoded)
@@ -198,10 +174,7 @@ class Accessors:
         not store them, they are not counted as decoded data, although they must fit within the
         limit.
 
-        Raises
-        ------
-        FormatError
-            If it is invalid, or its data is missing.
+        Raises ``FormatError`` if it is invalid, or its data is missing.
         """
         if not self._table[index].has("bufferView") and not self._table[index].has("sparse"):
             return None
@@ -216,14 +189,7 @@ class Accessors:
     def matrices(self, index: int, user: str) -> Floats:
         """Return an accessor of MAT4 as matrices with the translation in the last column.
 
-        Returns
-        -------
-        (N, 4, 4)
-
-        Raises
-        ------
-        FormatError
-            As for ``floats``.
+        Returns (N, 4, 4). Raises ``FormatError``: as for ``floats``.
         """
         columns = self.floats(index, ("MAT4",), user).reshape(-1, 4, 4)
         return np.ascontiguousarray(columns.transpose(0, 2, 1))

@@ -56,15 +56,7 @@ class _Moved:
 
 
 class Targets:
-    """Nodes that channels can animate.
-
-    Parameters
-    ----------
-    tree : NodeTree
-        All nodes.
-    meshes : tuple of NodeMesh
-        All meshes, whose morph targets have weights.
-    """
+    """Nodes that channels can animate."""
 
     def __init__(self, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
         self._tree, self._meshes = tree, meshes
@@ -99,10 +91,7 @@ class Targets:
     def of(self, channel: Element) -> _Moved:
         """Return the target of a channel.
 
-        Raises
-        ------
-        FormatError
-            If the channel has no target, or refers to a missing node.
+        Raises ``FormatError`` if the channel has no target, or refers to a missing node.
         """
         target = channel.part("target")
         if target is None:

@@ -58,14 +58,7 @@ def _located(buffer: Element, length: int) -> bytes:
 class Buffers:
     """Bytes of a document.
 
-    Parameters
-    ----------
-    root : Element
-        Root object of the document.
-    binary : memoryview or None
-        Binary chunk of a GLB.
-    spend : callable
-        Counts bytes that are about to be decoded; see ``Document.spend``.
+    ``spend``: counts bytes that are about to be decoded; see ``Document.spend``.
     """
 
     def __init__(
@@ -92,10 +85,7 @@ class Buffers:
     def data(self, index: int) -> Bytes:
         """Return the bytes of a buffer: (N,) uint8, read-only; N may differ from ``byteLength``.
 
-        Raises
-        ------
-        FormatError
-            If the buffer has no data, or the data cannot be read.
+        Raises ``FormatError`` if the buffer has no data, or the data cannot be read.
         """
         if index not in self._data:
             self._data[index] = self._read(index)
@@ -104,10 +94,8 @@ class Buffers:
     def view(self, index: int) -> View:
         """Return a buffer view, decompressed if it is compressed.
 
-        Raises
-        ------
-        FormatError
-            If the view is invalid or exceeds its data, or the data cannot be read.
+        Raises ``FormatError`` if the view is invalid or exceeds its data, or the data cannot be
+        read.
         """
         view = self._views[index]
         compressed = meshopt_of(view)
@@ -121,10 +109,7 @@ class Buffers:
     def image(self, index: int) -> EncodedImage:
         """Return an image, still encoded.
 
-        Raises
-        ------
-        FormatError
-            If the image's data is missing, unreadable, or outside the folder.
+        Raises ``FormatError`` if the image's data is missing, unreadable, or outside the folder.
         """
         image = self._images[index]
         name = image.text("name")
@@ -180,18 +165,7 @@ def _is_data_uri(uri: str) -> bool:
 def _uri_bytes(element: Element, most: int | None = None) -> bytes:
     """Return the data to which the ``uri`` of a buffer or image refers.
 
-    Parameters
-    ----------
-    element : Element
-        The buffer or image.
-    most : int, optional
-        Maximum number of bytes to decode from a data URI.
-
-    Raises
-    ------
-    FormatError
-        If the URI is invalid, leads out of the folder or to the network, or its file cannot be
-        read.
+    ``most``: maximum number of bytes to decode from a data URI.
     """
     uri = element.text("uri")
     if _is_data_uri(uri):
@@ -202,13 +176,7 @@ def _uri_bytes(element: Element, most: int | None = None) -> bytes:
 
 
 def _uri_path(element: Element) -> Path:
-    """Return the file to which the ``uri`` of a buffer or image refers; it need not exist.
-
-    Raises
-    ------
-    FormatError
-        If the URI is invalid, or leads out of the folder or to the network.
-    """
+    """Return the file to which the ``uri`` of a buffer or image refers; it need not exist."""
     uri = element.text("uri")
     if _SCHEME.match(uri):
         raise element.fault("F002.gltf-scheme", "uri", found=uri[:_SHOWN])
@@ -231,13 +199,7 @@ def _is_file(path: Path) -> bool:
 
 
 def _data_uri_bytes(element: Element, most: int | None = None) -> bytes:
-    """Return the data of a data URI (RFC 2397), with or without base64.
-
-    Raises
-    ------
-    FormatError
-        If the URI is malformed.
-    """
+    """Return the data of a data URI (RFC 2397), with or without base64."""
     uri = element.text("uri")
     comma = uri.find(",")
     if comma < 0:

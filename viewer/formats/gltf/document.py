@@ -70,10 +70,8 @@ class Document:
     def spend(self, n_bytes: int, pointer: str) -> None:
         """Count bytes that are about to be decoded; negative numbers are bytes that were released.
 
-        Raises
-        ------
-        FormatError
-            If the decoded data are much larger than the file, which may declare huge arrays.
+        Raises ``FormatError`` if the decoded data are much larger than the file, which may declare
+        huge arrays.
         """
         size = self._decoded + n_bytes
         most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
@@ -84,10 +82,7 @@ class Document:
     def kept(self, read: Callable[[], _Content], neutral: _Content) -> _Content:
         """Return the result of a function, or a neutral value if its error is only recorded.
 
-        Raises
-        ------
-        FormatError
-            The function's error, unless the source continues after errors.
+        Raises ``FormatError``: the function's error, unless the source continues after errors.
         """
         try:
             return read()
@@ -101,10 +96,7 @@ class Document:
 def open_document(source: Source) -> Document:
     """Open a ``.gltf``, ``.glb`` or ``.vrm`` file; its buffers are read on first use.
 
-    Raises
-    ------
-    FormatError
-        If its container or its JSON is invalid, or it has another version.
+    Raises ``FormatError`` if its container or its JSON is invalid, or it has another version.
     """
     root, binary = _contents(source)
     # In glTF 1.0, the tables are objects instead of lists, so the version is checked first.
@@ -204,19 +196,7 @@ def _title(kind: bytes) -> str:
 def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     """Return the parsed root object.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records diagnostics.
-    data : bytes
-        UTF-8 text, possibly padded.
-    has_lines : bool
-        Whether the text is the whole file, so that errors have a line number.
-
-    Raises
-    ------
-    FormatError
-        If the text is not a valid JSON object.
+    Raises ``FormatError`` if the text is not a valid JSON object.
     """
     if len(data) > _MOST_BYTES:
         raise source.fault("F001.gltf-text", most=_MOST_BYTES, size=len(data))

@@ -33,10 +33,8 @@ def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitiv
 
     If a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
 
-    Raises
-    ------
-    FormatError
-        If the extension or the data are malformed, or DracoPy is needed but not installed.
+    Raises ``FormatError`` if the extension or the data are malformed, or DracoPy is needed but not
+    installed.
     """
     extension = primitive.extension(_NAME) if primitive.has("extensions") else None
     if extension is None:

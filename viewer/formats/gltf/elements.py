@@ -39,17 +39,7 @@ def _pointer_to(base: str, *keys: str | int) -> str:
 
 
 class Element:
-    """An object of the document; missing members have the default that the caller gives.
-
-    Parameters
-    ----------
-    source : Source
-        The file, which records diagnostics.
-    values : dict
-        Parsed JSON of the object.
-    pointer : str
-        JSON pointer to it.
-    """
+    """An object of the document; missing members have the default that the caller gives."""
 
     __slots__ = ("pointer", "source", "values")
 
@@ -81,10 +71,7 @@ class Element:
     def whole(self, name: str, default: int | None = None) -> int:
         """Return a member that is a whole number of at least 0.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value, or is missing and has no default.
+        Raises ``FormatError`` if the member has any other value, or is missing and has no default.
         """
         value = self.values.get(name)
         if value is None and default is not None and name not in self.values:
@@ -98,19 +85,8 @@ class Element:
     def index(self, name: str, count: int, what: str) -> int:
         """Return a member that is an index below ``count``; -1 if it is missing.
 
-        Parameters
-        ----------
-        name : str
-            Name of the member.
-        count : int
-            Number of elements to which it can refer.
-        what : str
-            Name of these elements in the root: ``"nodes"``.
-
-        Raises
-        ------
-        FormatError
-            If the member has any other value.
+        ``what``: name of these elements in the root: ``"nodes"``. Raises ``FormatError`` if the
+        member has any other value.
         """
         if name not in self.values:
             return -1
@@ -132,10 +108,7 @@ class Element:
     def number(self, name: str, default: float | None = None) -> float:
         """Return a member that is a finite number.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value, or is missing and has no default.
+        Raises ``FormatError`` if the member has any other value, or is missing and has no default.
         """
         if name not in self.values and default is not None:
             return default
@@ -147,17 +120,7 @@ class Element:
     def numbers(self, name: str, count: int | None = None) -> Floats | None:
         """Return a member that is a list of finite numbers, (N,); None if it is missing.
 
-        Parameters
-        ----------
-        name : str
-            Name of the member.
-        count : int, optional
-            Expected number of items.
-
-        Raises
-        ------
-        FormatError
-            If the member has any other value.
+        Raises ``FormatError`` if the member has any other value.
         """
         if name not in self.values:
             return None
@@ -179,10 +142,7 @@ class Element:
     ) -> _Choice:
         """Return a member that is one of several values.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value, or is missing and has no default.
+        Raises ``FormatError`` if the member has any other value, or is missing and has no default.
         """
         if name not in self.values and default is not None:
             return default
@@ -194,10 +154,7 @@ class Element:
     def text(self, name: str, default: str = "") -> str:
         """Return a member that is a string.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value.
+        Raises ``FormatError`` if the member has any other value.
         """
         value = self.values.get(name, default)
         if type(value) is not str:
@@ -207,10 +164,7 @@ class Element:
     def flag(self, name: str, default: bool = False) -> bool:
         """Return a member that is true or false.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value.
+        Raises ``FormatError`` if the member has any other value.
         """
         value = self.values.get(name, default)
         if type(value) is not bool:
@@ -220,10 +174,7 @@ class Element:
     def part(self, name: str) -> Element | None:
         """Return a member that is an object; None if it is missing.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value.
+        Raises ``FormatError`` if the member has any other value.
         """
         if name not in self.values:
             return None
@@ -235,10 +186,8 @@ class Element:
     def table(self, name: str) -> Table:
         """Return a member that is a list of objects; an empty one if it is missing.
 
-        Raises
-        ------
-        FormatError
-            If the member is not a list; its items are checked when they are used.
+        Raises ``FormatError`` if the member is not a list; its items are checked when they are
+        used.
         """
         items = self.values.get(name, [])
         if type(items) is not list:
@@ -248,10 +197,7 @@ class Element:
     def indices(self, name: str, count: int, what: str) -> list[int]:
         """Return a member that is a list of indices below ``count``; empty if it is missing.
 
-        Raises
-        ------
-        FormatError
-            If the member has any other value; see ``index``.
+        Raises ``FormatError`` if the member has any other value; see ``index``.
         """
         items = self.values.get(name, [])
         if type(items) is not list:
@@ -272,27 +218,14 @@ class Element:
     def extension(self, name: str) -> Element | None:
         """Return an extension of this object; None if there is none.
 
-        Raises
-        ------
-        FormatError
-            If the extension or the member ``extensions`` is not an object.
+        Raises ``FormatError`` if the extension or the member ``extensions`` is not an object.
         """
         extensions = self.part("extensions")
         return None if extensions is None else extensions.part(name)
 
 
 class Table:
-    """A list of objects, each of which is checked when it is used.
-
-    Parameters
-    ----------
-    source : Source
-        The file.
-    items : list
-        Parsed JSON.
-    pointer : str
-        JSON pointer to the list.
-    """
+    """A list of objects, each of which is checked when it is used."""
 
     __slots__ = ("items", "pointer", "source")
 
@@ -322,26 +255,9 @@ _NUMBERS = ({int}, {float}, {int, float})
 def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
     """Return the objects that have a member, and the member's numbers.
 
-    Parameters
-    ----------
-    table : Table
-        Table that contains only objects.
-    name : str
-        Name of the member.
-    width : int
-        Numbers per object.
-
-    Returns
-    -------
-    places : (N,) int32
-        Indices of the objects.
-    rows : (N, width)
-        Finite numbers.
-
-    Raises
-    ------
-    FormatError
-        If a member is anything other than ``width`` finite numbers.
+    ``table``: table that contains only objects. Returns ``places``: (N,) int32, indices of the
+    objects; ``rows``: (N, width), finite numbers. Raises ``FormatError`` if a member is anything
+    other than ``width`` finite numbers.
     """
     places = [place for place, values in enumerate(table.items) if name in values]
     items = [table.items[place][name] for place in places]
@@ -369,10 +285,7 @@ def _array(items: list[Any], width: int) -> Floats | None:
 def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
     """Return an index below ``count`` from a member of each object, -1 if it is missing: (N,).
 
-    Raises
-    ------
-    FormatError
-        If a member is not such an index; see ``Element.index``.
+    Raises ``FormatError`` if a member is not such an index; see ``Element.index``.
     """
     result = np.full(len(table), -1, dtype=np.int32)
     for place, values in enumerate(table.items):

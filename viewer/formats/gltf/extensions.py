@@ -58,10 +58,7 @@ _READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\
 def check_extensions(document: Document) -> None:
     """Refuse a document that needs an unknown extension; report other unknown ones once.
 
-    Raises
-    ------
-    FormatError
-        If an unknown extension is required that may change surfaces or motions.
+    Raises ``FormatError`` if an unknown extension is required that may change surfaces or motions.
     """
     required = [name for name in _names(document, "extensionsRequired") if name not in _KNOWN]
     unknown = [name for name in required if not _changes_only_look(name)]
@@ -115,11 +112,6 @@ def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
 
 def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
     """Return the members that are not written back, each once, such as ``images.extras``.
-
-    Parameters
-    ----------
-    root : dict
-        The document, as parsed from JSON.
 
     >>> images = [{"extras": 1}, {"extras": 2}]
     >>> attributes = {"POSITION": 0, "_SPEED": 1}

@@ -100,16 +100,8 @@ class Glossiness:
 def reading_materials(document: Document) -> Iterator[Callable[[], tuple[Material, ...]]]:
     """Read all materials; their images are decoded while the body of the ``with`` statement runs.
 
-    Parameters
-    ----------
-    document : Document
-        The opened file, which records warnings about everything that is invalid or not drawn.
-
-    Yields
-    ------
-    callable
-        Waits for the images, and returns the materials in file order. Textures that share an image
-        share its pixels.
+    Yields waits for the images, and returns the materials in file order. Textures that share an
+    image share its pixels.
     """
     table = document.table("materials")
     neutral = Element(document.source, {})

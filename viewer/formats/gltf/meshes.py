@@ -49,10 +49,8 @@ class _Reading:
 def read_meshes(document: Document) -> tuple[NodeMesh, ...]:
     """Return all meshes.
 
-    Raises
-    ------
-    FormatError
-        If a mesh is malformed, refers to missing vertices or data, or has non-finite positions.
+    Raises ``FormatError`` if a mesh is malformed, refers to missing vertices or data, or has
+    non-finite positions.
     """
     table = document.table("meshes")
     reading = _Reading(document, _users(table))
@@ -171,13 +169,7 @@ class _Attributes:
         return self.n_vertices if self.rows is None else len(self.rows)
 
     def accessor(self, name: str) -> int:
-        """Return the index of an attribute's accessor, -1 if the attribute is missing.
-
-        Raises
-        ------
-        FormatError
-            If there is no such accessor, or it has a different number of elements.
-        """
+        """Return the index of an attribute's accessor, -1 if the attribute is missing."""
         accessors = self.document.accessors
         index = self.element.index(name, len(accessors), "accessors")
         if index < 0:

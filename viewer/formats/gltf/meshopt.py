@@ -71,19 +71,9 @@ def meshopt_of(view: Element) -> Element | None:
 def decoded_view(compressed: Element, data: Bytes, spend: Callable[[int, str], None]) -> Bytes:
     """Return the contents of a compressed buffer view: (N,) uint8, read-only.
 
-    Parameters
-    ----------
-    compressed : Element
-        The extension, as ``meshopt_of`` returns it.
-    data : (M,) uint8
-        The compressed data.
-    spend : callable
-        Counts bytes that are about to be decoded; see ``Document.spend``.
-
-    Raises
-    ------
-    FormatError
-        If the extension is malformed or the data are damaged.
+    ``compressed``: the extension, as ``meshopt_of`` returns it. ``data``: (M,) uint8, the
+    compressed data. ``spend``: counts bytes that are about to be decoded; see ``Document.spend``.
+    Raises ``FormatError`` if the extension is malformed or the data are damaged.
     """
     mode = compressed.choice("mode", _MODES)
     kind = compressed.choice("filter", _FILTERS, "NONE")
@@ -129,17 +119,8 @@ class _Groups:
 def decoded_attributes(data: Bytes, count: int, stride: int) -> Bytes | None:
     """Return the decoded elements, stored consecutively: (count * stride,) uint8.
 
-    Parameters
-    ----------
-    data : (M,) uint8
-        The stream.
-    count, stride : int
-        Number of elements, and bytes per element, a multiple of 4.
-
-    Returns
-    -------
-    (count * stride,) or None
-        None if the stream is damaged.
+    ``data``: (M,) uint8, the stream. ``count``, ``stride``: number of elements, and bytes per
+    element, a multiple of 4. Returns (count * stride,) or None, none if the stream is damaged.
     """
     version = int(data[0]) - 0xA0 if len(data) else -1
     tail = stride + (stride // 4 if version == 1 else 0)
@@ -326,17 +307,8 @@ class _Numbers:
 def decoded_triangles(data: Bytes, count: int, stride: int) -> Bytes | None:
     """Return the decoded vertex indices of triangles: (count * stride,) uint8.
 
-    Parameters
-    ----------
-    data : (M,) uint8
-        The stream.
-    count, stride : int
-        Number of indices, and bytes per index, 2 or 4.
-
-    Returns
-    -------
-    (count * stride,) or None
-        None if the stream is damaged.
+    ``data``: (M,) uint8, the stream. ``count``, ``stride``: number of indices, and bytes per index,
+    2 or 4. Returns (count * stride,) or None, none if the stream is damaged.
     """
     n_triangles, rest = divmod(count, 3)
     if rest or len(data) < 1 + n_triangles + _TABLE or data[0] != _TRIANGLES:

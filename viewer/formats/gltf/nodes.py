@@ -52,10 +52,7 @@ _EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
 def read_tree(document: Document) -> NodeTree:
     """Return all nodes of a document.
 
-    Raises
-    ------
-    FormatError
-        If a node is invalid, has two parents, or is its own ancestor.
+    Raises ``FormatError`` if a node is invalid, has two parents, or is its own ancestor.
     """
     table = document.table("nodes")
     for place in range(len(table)):
@@ -232,10 +229,7 @@ def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
 def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
     """Return the root nodes of the default scene or the first one; all if there are no scenes.
 
-    Raises
-    ------
-    FormatError
-        If the scene does not exist, or its list of nodes is malformed.
+    Raises ``FormatError`` if the scene does not exist, or its list of nodes is malformed.
     """
     scenes = document.table("scenes")
     default = document.root.index("scene", len(scenes), "scenes")
@@ -313,10 +307,8 @@ def _positive(lens: Element, name: str) -> float | None:
 def read_skins(document: Document) -> tuple[NodeSkin, ...]:
     """Return all skins.
 
-    Raises
-    ------
-    FormatError
-        If a skin is malformed, refers to missing nodes, or has too few or invalid matrices.
+    Raises ``FormatError`` if a skin is malformed, refers to missing nodes, or has too few or
+    invalid matrices.
     """
     table = document.table("skins")
     skins = (partial(_skin, document, table, index) for index in range(len(table)))
@@ -373,11 +365,8 @@ def checked_bindings(
 ) -> tuple[NodeMesh, ...]:
     """Return the meshes after checking their joint indices against all skins in use.
 
-    Raises
-    ------
-    FormatError
-        If a vertex refers to a joint that the skin does not have. If errors are only recorded, the
-        weight of such an influence is set to 0.
+    Raises ``FormatError`` if a vertex refers to a joint that the skin does not have. If errors are
+    only recorded, the weight of such an influence is set to 0.
     """
     limits: dict[int, tuple[int, int]] = {}
     for node in np.nonzero((tree.meshes >= 0) & (tree.skins >= 0))[0].tolist():

@@ -58,14 +58,7 @@ class Slot:
 def read_slot(document: Document, parent: Element, name: str) -> Slot | None:
     """Return the texture to which a member of a material refers; None if there is none.
 
-    Parameters
-    ----------
-    document : Document
-        The opened file, which records warnings about invalid references.
-    parent : Element
-        The material, or a part of it.
-    name : str
-        Name of the member, such as ``"normalTexture"``.
+    ``name``: name of the member, such as ``"normalTexture"``.
     """
     source = document.source
     info = lenient(source, lambda: parent.part(name), None)
@@ -149,17 +142,8 @@ def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     F flips v: glTF puts v = 0 at the first row of the image. The transform follows
     KHR_texture_transform, whose rotation is counter-clockwise as seen on the image.
 
-    Parameters
-    ----------
-    offset, scale : (2,)
-        Offset and scale of texture coordinates from 0 to 1.
-    angle : float
-        Radians.
-
-    Returns
-    -------
-    (2, 3)
-        Maps (u, v, 1) to texture coordinates of the image.
+    ``offset``, ``scale``: (2,), offset and scale of texture coordinates from 0 to 1. Returns (2,
+    3), maps (u, v, 1) to texture coordinates of the image.
 
     >>> transform_matrix(np.array([0.5, 0.0]), 0.0, np.array([1.0, 0.5])).tolist()
     [[1.0, 0.0, 0.5], [0.0, 0.5, 0.5]]
@@ -193,17 +177,7 @@ def decoding_images(
 ) -> Iterator[Callable[[], dict[int, DecodedImage]]]:
     """Decode images of a document while the body of the ``with`` statement runs.
 
-    Parameters
-    ----------
-    document : Document
-        The opened file.
-    indices : iterable of int
-        Valid indices of images; may repeat.
-
-    Yields
-    ------
-    callable
-        Waits, and returns the images by index; images that cannot be read cause a warning.
+    Yields waits, and returns the images by index; images that cannot be read cause a warning.
     """
     found = {index: _encoded(document, index) for index in sorted(set(indices))}
     images = {index: image for index, image in found.items() if image is not None}

@@ -70,15 +70,7 @@ class Toon:
 
 
 def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
-    """Return the shading of materials that VRM declares toon-shaded or unlit, by index.
-
-    Parameters
-    ----------
-    document : Document
-        The opened file, which records a note.
-    elements : list of Element
-        Its materials.
-    """
+    """Return the shading of materials that VRM declares toon-shaded or unlit, by index."""
     found: dict[int, Toon] = {}
     omitted: dict[str, None] = {}
     listed = part(document.root.values, "extensions", "VRM", "materialProperties")

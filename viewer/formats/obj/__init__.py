@@ -74,37 +74,26 @@ _NO_FACES = FaceRows(np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros
 
 @dataclass(slots=True)
 class _ObjParts:
-    """Content of the file.
-
-    Attributes
-    ----------
-    positions, normals : (V, 3), (N, 3)
-        Vectors as listed in the file.
-    uvs : (U, 2)
-        Texture coordinates as listed, v = 0 at the bottom row.
-    colors : (V, 4) or None
-        Linear colours and opacity of the vertices; white for those without a colour.
-    counts : (F,)
-        Corners of each face.
-    corners : (C, 3)
-        Vertex, texture coordinate and normal of each corner; -1 if missing.
-    offsets : (F,)
-        Offset of each face in the file.
-    runs : dict of bytes to list of (int, str)
-        For ``usemtl``, ``g`` and ``o``: the names, and the index of the first face after each.
-    libraries : list of (bytes, int)
-        Text after each ``mtllib``, and its offset.
-    """
+    """Content of the file."""
 
     positions: Floats
     normals: Floats
+    """(V, 3), (N, 3). Vectors as listed in the file."""
     uvs: Floats
+    """(U, 2). Texture coordinates as listed, v = 0 at the bottom row."""
     colors: Floats | None
+    """(V, 4) or None. Linear colours and opacity of the vertices; white for those without a colour.
+    (V, 4) or None. Linear colours and opacity of the vertices; white for those without a colour."""
     counts: NDArray[np.integer]
+    """(F,). Corners of each face."""
     corners: NDArray[np.integer]
+    """(C, 3). Vertex, texture coordinate and normal of each corner; -1 if missing."""
     offsets: Places
+    """(F,). Offset of each face in the file."""
     runs: dict[bytes, list[tuple[int, str]]]
+    """For ``usemtl``, ``g`` and ``o``: the names, and the index of the first face after each."""
     libraries: list[tuple[bytes, int]]
+    """Text after each ``mtllib``, and its offset."""
 
 
 @dataclass(slots=True)
@@ -140,21 +129,10 @@ class _Gathered:
 def read(source: Source) -> Figure:
     """Read a mesh.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors and ignored data are added to its warnings.
-
-    Returns
-    -------
-    Figure
-        Mesh without skeleton and skin; y up and without a unit, unless a comment written by this
-        program states them.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar; the error has the file and line.
+    ``source``: the file; recoverable errors and ignored data are added to its warnings. Returns
+    mesh without skeleton and skin; y up and without a unit, unless a comment written by this
+    program states them. Raises ``FormatError`` if the text violates the grammar; the error has the
+    file and line.
     """
     parts = _read_parts(source)
     source.release()
@@ -203,15 +181,7 @@ def read(source: Source) -> Figure:
 def _read_parts(source: Source) -> _ObjParts:
     """Read a whole file.
 
-    Parameters
-    ----------
-    source : Source
-        The file; ignored data is added to its warnings.
-
-    Raises
-    ------
-    FormatError
-        If a line violates the grammar or has an index out of range.
+    ``source``: the file; ignored data is added to its warnings.
     """
     gathered = _Gathered()
     for lines in pieces(source):

@@ -26,56 +26,35 @@ _Corners = NDArray[np.integer]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CornerFault:
-    """Invalid corners with the same error.
-
-    Attributes
-    ----------
-    key, offset, values : str, int, dict
-        The first error, as arguments of ``Source.refuse``.
-    faces : (n,)
-        Face of each corner.
-    """
+    """Invalid corners with the same error."""
 
     key: str
     offset: int
     values: dict[str, Any]
+    """The first error, as arguments of ``Source.refuse``."""
     faces: Places
+    """(n,). Face of each corner."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaceRows:
-    """The corners of some faces, face after face.
-
-    Attributes
-    ----------
-    counts : (F,)
-        Corners of each face, 3 or more.
-    corners : (C, 3)
-        0-based vertex, texture coordinate and normal of each corner; -1 if missing. The range can
-        be checked only when the whole file has been read.
-    offsets : (F,)
-        Offset of each face in the file.
-    faults : tuple of CornerFault
-        Errors to record when the triangles of the faces are known.
-    """
+    """The corners of some faces, face after face."""
 
     counts: NDArray[np.integer]
+    """(F,). Corners of each face, 3 or more."""
     corners: _Corners
+    """(C, 3). 0-based vertex, texture coordinate and normal of each corner; -1 if missing. The
+    range can be checked only when the whole file has been read."""
     offsets: Places
+    """(F,). Offset of each face in the file."""
     faults: tuple[CornerFault, ...] = ()
+    """Errors to record when the triangles of the faces are known."""
 
 
 def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
     """Read the faces of some lines; None if any is invalid.
 
     Negative indices count back from the last ``v``, ``vt`` or ``vn`` before the face.
-
-    Parameters
-    ----------
-    lines : Lines
-        Some lines of a file.
-    before : dict of str to int
-        Number of earlier lines with each keyword.
     """
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
@@ -150,21 +129,9 @@ def _in_columns(values: Floats, columns: list[int], count: int) -> _Corners | No
 def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
     """Classify corners by their slashes.
 
-    Parameters
-    ----------
-    rows : Rows
-        Rows of faces.
-    begins : (C,)
-        Start of each corner in the body of the rows.
-
-    Returns
-    -------
-    fits : (C,) bool
-        True for v, v/vt, v//vn and v/vt/vn; the numbers are not checked.
-    n_numbers : (C,)
-        Number of values of each corner.
-    has_gap : (C,) bool
-        True for v//vn.
+    ``begins``: (C,), start of each corner in the body of the rows. Returns ``fits``: (C,) bool,
+    true for v, v/vt, v//vn and v/vt/vn; the numbers are not checked; ``n_numbers``: (C,), number of
+    values of each corner; ``has_gap``: (C,) bool, true for v//vn.
     """
     number_begins = _number_begins(rows)
     slashes = np.flatnonzero(rows.letters == _SLASH)
@@ -210,19 +177,8 @@ def _whole(values: Floats) -> _Corners | None:
 def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
     """Read the faces of some lines; see ``read_faces``.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors of omitted faces.
-    lines : Lines
-        Lines of the file.
-    before : dict of str to int
-        Number of earlier lines with each keyword.
-
-    Returns
-    -------
-    FaceRows
-        Faces, with the errors to record when their triangles are known.
+    ``source``: the file, which records the errors of omitted faces. Returns faces, with the errors
+    to record when their triangles are known.
     """
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
@@ -289,21 +245,7 @@ def checked_corners(
 ) -> NDArray[np.integer]:
     """Return the corners of all faces, with invalid corners replaced by others of their face.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors.
-    faces : FaceRows
-        All faces of the file; their corners are changed.
-    faults : list of CornerFault
-        Errors in these faces, which the caller records.
-    ends : dict of str to int
-        Number of lines with each keyword.
-
-    Returns
-    -------
-    (C, 3)
-        Corners; -1 for invalid indices of texture coordinates and normals.
+    Returns (C, 3), corners; -1 for invalid indices of texture coordinates and normals.
     """
     corners, counts = faces.corners, faces.counts
     limits = np.array([ends[keyword] for keyword in _CORNER_KINDS])

@@ -34,31 +34,21 @@ Letters = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Some lines of a file.
-
-    Attributes
-    ----------
-    base : int
-        Offset of the first line in the file.
-    data : bytes
-        Text of the lines; continued lines are joined with spaces.
-    letters : (N,) uint8
-        ``data`` as an array.
-    starts, ends : (L,)
-        First non-blank character of each line, and the offset after its end.
-    of : dict of str to (n,)
-        Indices of the lines with each of ``KEYWORDS``.
-    others : (n,)
-        Indices of all other lines, without comments and empty lines.
-    """
+    """Some lines of a file."""
 
     base: int
+    """Offset of the first line in the file."""
     data: bytes
+    """Text of the lines; continued lines are joined with spaces."""
     letters: Letters
+    """(N,) uint8. ``data`` as an array."""
     starts: Places
     ends: Places
+    """(L,). First non-blank character of each line, and the offset after its end."""
     of: dict[str, Places]
+    """Indices of the lines with each of ``KEYWORDS``."""
     others: Places
+    """(n,). Indices of all other lines, without comments and empty lines."""
 
     def text(self, line: int) -> bytes:
         """Return one line without surrounding white space."""
@@ -67,24 +57,16 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """The text after the keyword of all lines with the same keyword.
-
-    Attributes
-    ----------
-    body : bytes
-        One line after the other.
-    letters : (N,) uint8
-        ``body`` as an array.
-    starts : (n + 1,)
-        Start of each line in ``body``.
-    origins : (n,)
-        Start of each line in the file.
-    """
+    """The text after the keyword of all lines with the same keyword."""
 
     body: bytes
+    """One line after the other."""
     letters: Letters
+    """(N,) uint8. ``body`` as an array."""
     starts: Places
+    """(n + 1,). Start of each line in ``body``."""
     origins: Places
+    """(n,). Start of each line in the file."""
 
     def offset(self, place: int) -> int:
         """Return the offset in the file of a position in the body."""
@@ -152,25 +134,9 @@ def _is_blank(letters: Letters) -> Bools:
 def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     """Parse the numbers after a keyword.
 
-    Parameters
-    ----------
-    lines : Lines
-        Some lines of a file.
-    keyword : str
-        v, vt or vn.
-    width : int
-        Minimum number of values in a line.
-
-    Returns
-    -------
-    table : (n, width)
-        The first numbers of each line.
-    counts : (n,)
-        Number of values in each line.
-    values : (N,)
-        All values, one line after the other.
-    rows : Rows
-        The text from which they were parsed.
+    Returns ``table``: (n, width), the first numbers of each line; ``counts``: (n,), number of
+    values in each line; ``values``: (N,), all values, one line after the other; ``rows``: the text
+    from which they were parsed.
 
     None is returned instead if a line has too few numbers, or a word is not a number.
     """
@@ -191,24 +157,8 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
 def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
     """Parse the numbers after a keyword; see ``number_rows``.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors.
-    lines : Lines
-        Lines of the file.
-    keyword : str
-        v, vt or vn.
-    width : int
-        Minimum number of values in a line.
-    first : int
-        Number of earlier lines with this keyword.
-
-    Returns
-    -------
-    table, counts, values, rows
-        As for ``number_rows``, with NaN for words that are not numbers and in rows that are too
-        short.
+    Returns as for ``number_rows``, with NaN for words that are not numbers and in rows that are too
+    short.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)

@@ -78,28 +78,19 @@ _Load = Callable[[Source, str, int], Bytes | None]
 
 @dataclass(frozen=True, slots=True)
 class _MapOptions:
-    """A map's image and its placement.
-
-    Attributes
-    ----------
-    file : str
-        File name of the image; empty if there is none.
-    scale, offset : (u, v)
-        Image coordinates are texture coordinates times scale plus offset.
-    clamps : bool
-        Whether the image is clamped at its edges rather than repeated.
-    channel : int
-        Column of the pixels for single-channel maps.
-    strength : float
-        Multiplier for bumps.
-    """
+    """A map's image and its placement."""
 
     file: str
+    """File name of the image; empty if there is none."""
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
+    """(u, v). Image coordinates are texture coordinates times scale plus offset."""
     clamps: bool = False
+    """Whether the image is clamped at its edges rather than repeated."""
     channel: int = 0
+    """Column of the pixels for single-channel maps."""
     strength: float = 1.0
+    """Multiplier for bumps."""
 
 
 @dataclass(slots=True)
@@ -120,14 +111,8 @@ def read_libraries(
 ) -> tuple[Material, ...]:
     """Return materials by name, with their images if these can be read.
 
-    Parameters
-    ----------
-    source : Source
-        The ``.obj``; warnings about missing libraries, materials and images are added to it.
-    libraries : list of (bytes, int)
-        Text after each ``mtllib``, and its offset.
-    names : list of str
-        The materials that faces use.
+    ``source``: the ``.obj``; warnings about missing libraries, materials and images are added to
+    it. ``libraries``: text after each ``mtllib``, and its offset.
     """
     known: dict[str, _Statements] = {}
     loaded: dict[tuple[Source, str], Bytes | None] = {}
@@ -176,13 +161,6 @@ def _name_here(folder: Path, written: str) -> str | None:
 
     The name without quotes and its last component are tried in turn, ignoring case as Windows does,
     since many programs write the path that the file had when it was exported.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the library.
-    written : str
-        Name as written, possibly with backslashes.
     """
     name = written.strip("\"'").replace("\\", "/")
     for tried in (name, name.rsplit("/", 1)[-1]):

@@ -53,22 +53,10 @@ _TEXTURE = "texturefile"
 def read(source: Source) -> Figure:
     """Read a mesh.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors and ignored data are added to its warnings.
-
-    Returns
-    -------
-    Figure
-        Mesh without skeleton and skin; y up and without a unit, unless a comment written by this
-        program states them.
-
-    Raises
-    ------
-    FormatError
-        If the file is invalid; the error has the file and line, or the number of the vertex or
-        face.
+    ``source``: the file; recoverable errors and ignored data are added to its warnings. Returns
+    mesh without skeleton and skin; y up and without a unit, unless a comment written by this
+    program states them. Raises ``FormatError`` if the file is invalid; the error has the file and
+    line, or the number of the vertex or face.
     """
     header = read_header(source)
     tables = read_tables(source, header)

@@ -47,33 +47,22 @@ class Element:
 
 @dataclass(slots=True)
 class Header:
-    """Contents of a file.
-
-    Attributes
-    ----------
-    order : "", "<" or ">"
-        Byte order; empty for text.
-    elements : list of Element
-        In file order.
-    comments : list of (str, int)
-        Comment strings and their offsets.
-    end : int
-        Offset of the data.
-    """
+    """Contents of a file."""
 
     order: str = ""
+    """One of "", "<" or ">". Byte order; empty for text."""
     elements: list[Element] = field(default_factory=list)
+    """In file order."""
     comments: list[tuple[str, int]] = field(default_factory=list)
+    """Comment strings and their offsets."""
     end: int = 0
+    """Offset of the data."""
 
 
 def read_header(source: Source) -> Header:
     """Read the lines up to ``end_header``.
 
-    Raises
-    ------
-    FormatError
-        If a line is invalid; the error has the line.
+    Raises ``FormatError`` if a line is invalid; the error has the line.
     """
     header = Header()
     position, number, has_format = 0, 0, False

@@ -42,27 +42,19 @@ all values."""
 
 @dataclass(slots=True)
 class Table:
-    """One element's rows.
-
-    Attributes
-    ----------
-    element : Element
-        Declaration of the element in the header.
-    columns : dict of str to (N,)
-        Properties of the element that are not lists.
-    lists : dict of str to ((N,), (M,))
-        List properties: the number of values of each row, and the values of all rows.
-    offset_of : callable or None
-        Returns the offset of a row; slow, for errors only. None in a binary file.
-    is_first : bool
-        Whether it is the first element with its name; later ones are read and discarded.
-    """
+    """One element's rows."""
 
     element: Element
+    """Declaration of the element in the header."""
     columns: dict[str, _Numbers] = field(default_factory=dict)
+    """dict of str to (N,). Properties of the element that are not lists."""
     lists: dict[str, tuple[_Places, _Numbers]] = field(default_factory=dict)
+    """dict of str to ((N,), (M,)). List properties: the number of values of each row, and the
+    values of all rows."""
     offset_of: Callable[[int], int] | None = None
+    """Returns the offset of a row; slow, for errors only. None in a binary file."""
     is_first: bool = True
+    """Whether it is the first element with its name; later ones are read and discarded."""
 
     def offset(self, row: int) -> int | None:
         """Return the offset of a row in the file; None in a binary file, which has no lines."""
@@ -72,10 +64,8 @@ class Table:
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
     """Read all elements and return them by name.
 
-    Raises
-    ------
-    FormatError
-        If there are fewer numbers than the header declares, or words that are not numbers.
+    Raises ``FormatError`` if there are fewer numbers than the header declares, or words that are
+    not numbers.
     """
     body: _TextRows | _BinaryRows
     body = _BinaryRows(source, header) if header.order else _TextRows(source, header)
@@ -512,21 +502,14 @@ def _list_places(starts: _Places, counts: _Places, step: int) -> _Places:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LineSizes:
-    """Non-blank lines of a text.
-
-    Attributes
-    ----------
-    data : bytes
-        The text.
-    words : (L,)
-        Number of words in each line.
-    marks : list of (int, int)
-        Offset of each piece of the text, and the number of lines before it.
-    """
+    """Non-blank lines of a text."""
 
     data: bytes
+    """The text."""
     words: NDArray[np.int32]
+    """(L,). Number of words in each line."""
     marks: list[tuple[int, int]]
+    """Offset of each piece of the text, and the number of lines before it."""
 
     def offset(self, line: int) -> int:
         """Return an offset between the words of a line and the words of the previous line.

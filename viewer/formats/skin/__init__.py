@@ -55,21 +55,9 @@ _SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length 
 def read(source: Source) -> Figure:
     """Read a mesh with its weights and bindings.
 
-    Parameters
-    ----------
-    source : Source
-        The file; recoverable errors are added to its warnings.
-
-    Returns
-    -------
-    Figure
-        Figure without skeleton, and without skin if the file has neither weights nor bindings.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar or its sections do not match; the error has the file and
-        line.
+    Returns figure without skeleton, and without skin if the file has neither weights nor bindings.
+    Raises ``FormatError`` if the text violates the grammar or its sections do not match; the error
+    has the file and line.
     """
     sections = read_sections(source)
     mesh = _mesh(source, sections)
@@ -178,24 +166,11 @@ def _unbound_skin(sections: Sections) -> Skin:
 def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     """Write a figure's mesh, weights and bindings, and any of its texture images that are missing.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh. Without a skin, weights and bindings are omitted.
-    path : str or Path
-        Replaced only when the whole text has been written.
-
-    Returns
-    -------
-    list of Diagnostic
-        Notes about properties of materials that are omitted, and about vertices that were split.
-
-    Raises
-    ------
-    UnsupportedFormatError
-        If there is no mesh, or a name or number does not conform to the grammar.
-    OutputError
-        If a file cannot be written.
+    ``figure``: figure with a mesh. Without a skin, weights and bindings are omitted. ``path``:
+    replaced only when the whole text has been written. Returns notes about properties of materials
+    that are omitted, and about vertices that were split. Raises ``UnsupportedFormatError`` if there
+    is no mesh, or a name or number does not conform to the grammar. Raises ``OutputError`` if a
+    file cannot be written.
     """
     from viewer.formats.skin.weights import weights_lines
 

@@ -36,21 +36,14 @@ _Word = re.Match[bytes]
 
 @dataclass(frozen=True, slots=True)
 class _TriangleRun:
-    """One triangles section.
-
-    Attributes
-    ----------
-    triangles : (M, 3)
-        Vertex indices.
-    material : int
-        Index of the preceding material, -1 for none.
-    offset_of : callable
-        Returns the offset of a triangle.
-    """
+    """One triangles section."""
 
     triangles: Ints
+    """(M, 3). Vertex indices."""
     material: int
+    """Index of the preceding material, -1 for none."""
     offset_of: OffsetOf
+    """Returns the offset of a triangle."""
 
 
 @dataclass(slots=True)
@@ -80,15 +73,7 @@ class Sections:
 def read_sections(source: Source) -> Sections:
     """Split a file into its sections and parse their numbers.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-
-    Raises
-    ------
-    FormatError
-        If the text violates the grammar; the error has the file and line.
+    Raises ``FormatError`` if the text violates the grammar; the error has the file and line.
     """
     sections = Sections()
     extra_braces = 0
@@ -166,26 +151,8 @@ def _read_material(
 ) -> tuple[Material, int]:
     """Read one material.
 
-    Parameters
-    ----------
-    source : Source
-        The file.
-    header : Word
-        The word ``material``.
-    pictures : dict
-        Images loaded so far, by name; the image of this material is added.
-
-    Returns
-    -------
-    material : Material
-        Material with its image, if the image can be read.
-    end : int
-        Offset after the section.
-
-    Raises
-    ------
-    FormatError
-        If a brace is missing.
+    ``header``: the word ``material``. Returns ``material``: material with its image, if the image
+    can be read; ``end``: offset after the section.
     """
     name, brace = _material_name(source, header)
     texture: str | None = None

@@ -40,26 +40,18 @@ OffsetOf = Callable[[int], int]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Range of a section's numbers, from which the line of an error is determined.
-
-    Attributes
-    ----------
-    name : str
-        Keyword of the section.
-    header, count : int
-        Offsets of the keyword and of the number of entries.
-    start, end : int
-        Range of the numbers.
-    closed : bool
-        Whether a closing brace follows them.
-    """
+    """Range of a section's numbers, from which the line of an error is determined."""
 
     name: str
+    """Keyword of the section."""
     header: int
     count: int
+    """Offsets of the keyword and of the number of entries."""
     start: int
     end: int
+    """Range of the numbers."""
     closed: bool
+    """Whether a closing brace follows them."""
 
 
 def find_block(source: Source, name: str, header: _Word, position: int) -> Block:
@@ -107,32 +99,9 @@ def read_rows(
 ) -> tuple[Floats, OffsetOf]:
     """Parse a block of rows.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors.
-    block : Block
-        Range of the numbers.
-    count : int
-        Number of rows declared by the file; the actual number takes precedence.
-    width : int
-        Numbers per row.
-    first : int
-        Index of the first row, for messages.
-    item : str
-        Key of the phrase that names a row.
-
-    Returns
-    -------
-    rows : (N, width)
-        Values; NaN for words that are not numbers, and in rows with more or fewer numbers.
-    offset_of : callable
-        Returns the offset of a row.
-
-    Raises
-    ------
-    FormatError
-        If the start of the rows is unknown.
+    Returns ``rows``: (N, width), values; NaN for words that are not numbers, and in rows with more
+    or fewer numbers; ``offset_of``: returns the offset of a row. Raises ``FormatError`` if the
+    start of the rows is unknown.
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
@@ -219,10 +188,7 @@ def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -
 def words_of(source: Source, block: Block) -> Words:
     """Return the words of a block, which must not contain the keyword of another section.
 
-    Raises
-    ------
-    FormatError
-        If the block is not closed before another section begins.
+    Raises ``FormatError`` if the block is not closed before another section begins.
     """
     from viewer.formats._text.words import read_words
 
@@ -243,14 +209,8 @@ def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> 
 def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
     """Return triangles as integers, ``LOST`` for corners that are not integers: (T, 3).
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors.
-    rows, offset_of : (T, 3), callable
-        Results of ``read_rows``, which has recorded its errors.
-    first : int
-        Index of the first triangle, for messages.
+    ``rows``, ``offset_of``: (T, 3), callable, results of ``read_rows``, which has recorded its
+    errors.
     """
     known = ~np.isnan(rows)
     if known.all():

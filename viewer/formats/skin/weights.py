@@ -35,28 +35,9 @@ Influences = tuple[Ints, Ints, Floats, OffsetOf]
 def read_weights(source: Source, block: Block, count: int) -> Influences:
     """Parse the influences of all vertices.
 
-    Parameters
-    ----------
-    source : Source
-        The file, which records the errors.
-    block : Block
-        Range of the numbers.
-    count : int
-        Number of vertices declared by the file; the actual number takes precedence.
-
-    Returns
-    -------
-    starts : (N + 1,)
-        First influence of each vertex; an unreadable vertex has none.
-    joints, weights : (M,)
-        Both 0 if either is not a number.
-    offset_of : callable
-        Returns the offset of a vertex.
-
-    Raises
-    ------
-    FormatError
-        If the numbers cannot be assigned to vertices.
+    Returns ``starts``: (N + 1,), first influence of each vertex; an unreadable vertex has none;
+    ``joints``, ``weights``: (M,), both 0 if either is not a number; ``offset_of``: returns the
+    offset of a vertex. Raises ``FormatError`` if the numbers cannot be assigned to vertices.
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     heads = _find_heads(values, count) if bad < 0 else None

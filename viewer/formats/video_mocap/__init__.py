@@ -33,31 +33,13 @@ def open_results(
 ) -> Capture:
     """Open results of a tool.
 
-    Parameters
-    ----------
-    source : Source
-        File or folder of the tool.
-    frame_rate : float, optional
-        Frames per second; the tool's rate by default, or 30 if it has none.
-    space : "world", "camera" or ""
-        The space of the bodies; the world by default, if the file has it.
-    up : "y", "z", "-y", "-z" or ""
-        Up axis of the space; the tool's up axis by default.
-    average_shape : bool
-        Average each person's shape over time.
-    video_rate : float, optional
-        Frames per second of the video, for tools that do not store a rate.
-
-    Returns
-    -------
-    Capture
-        The people, and the camera if the file determines it.
-
-    Raises
-    ------
-    FormatError
-        If no tool's results are recognised, their arrays contradict each other, or they do not
-        have the requested space.
+    ``frame_rate``: frames per second; the tool's rate by default, or 30 if it has none. ``space``:
+    one of "world", "camera" or "", the space of the bodies; the world by default, if the file has
+    it. ``up``: one of "y", "z", "-y", "-z" or "", up axis of the space; the tool's up axis by
+    default. ``video_rate``: frames per second of the video, for tools that do not store a rate.
+    Returns the people, and the camera if the file determines it. Raises ``FormatError`` if no
+    tool's results are recognised, their arrays contradict each other, or they do not have the
+    requested space.
     """
     results = _folder(source) if source.is_folder else _file(source)
     return capture_of(source, results, Options(frame_rate, space, up, average_shape, video_rate))

@@ -42,10 +42,7 @@ class RowBudget:
     def spend(self, count: int) -> None:
         """Deduct a number of frames.
 
-        Raises
-        ------
-        FormatError
-            If there are more than in any plausible recording.
+        Raises ``FormatError`` if there are more than in any plausible recording.
         """
         self._left -= max(count, 1)
         if self._left < 0:
@@ -138,17 +135,7 @@ def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
 
 
 def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
-    """Return the form of an array; None if it does not have one of these numbers of joints.
-
-    Parameters
-    ----------
-    archive : Archive
-        Archive that contains the array.
-    key : str
-        Its key.
-    joints : tuple of int
-        Possible numbers of joints.
-    """
+    """Return the form of an array; None if it does not have one of these numbers of joints."""
     return shape_form(archive.shape(key), joints)
 
 

@@ -41,46 +41,32 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """One person in one space.
-
-    Attributes
-    ----------
-    frames : (N,) int
-        Frames of the video in which the person is present, without duplicates.
-    joint_names : tuple of K str
-        Joints that ``vectors`` rotate, the root first; empty if there are only points.
-    vectors : (N, K, 3)
-        Rotation vectors relative to the parent joint, radians.
-    translations : (N, 3)
-        Metres.
-    shape : (N, S), (1, S) or None
-        Shape coefficients.
-    hands : mapping of side to (N, C)
-        As for ``BodyMotion``; zeros mean the mean hand.
-    world_rotations : (N, 3) or None
-        As for ``BodyMotion``.
-    layout, points : PointLayout, (N, P, 4)
-        Captured points, instead of a body.
-    rig : tuple of (N, P), (N, S), (N, E), (N, 3), or None
-        Model parameters, identity, expression and position of the Momentum Human Rig.
-    places_root : bool
-        As for ``BodyMotion``.
-    gender : str
-        Gender of the body, as stated by the file; empty if it is unknown.
-    """
+    """One person in one space."""
 
     frames: np.ndarray[Any, np.dtype[np.int64]]
+    """(N,) int. Frames of the video in which the person is present, without duplicates."""
     joint_names: tuple[str, ...] = ()
+    """Joints that ``vectors`` rotate, the root first; empty if there are only points."""
     vectors: Floats | None = None
+    """(N, K, 3). Rotation vectors relative to the parent joint, radians."""
     translations: Floats | None = None
+    """(N, 3). Metres."""
     shape: Floats | None = None
+    """(N, S), (1, S) or None. Shape coefficients."""
     hands: dict[str, Floats] = field(default_factory=dict)
+    """mapping of side to (N, C). As for ``BodyMotion``; zeros mean the mean hand."""
     world_rotations: Floats | None = None
+    """(N, 3) or None. As for ``BodyMotion``."""
     layout: PointLayout | None = None
     points: Floats | None = None
+    """PointLayout, (N, P, 4). Captured points, instead of a body."""
     rig: tuple[Floats, Floats, Floats, Floats] | None = None
+    """tuple of (N, P), (N, S), (N, E), (N, 3), or None. Model parameters, identity, expression and
+    position of the Momentum Human Rig."""
     places_root: bool = False
+    """As for ``BodyMotion``."""
     gender: str = ""
+    """Gender of the body, as stated by the file; empty if it is unknown."""
 
     def selected(self, chosen: np.ndarray[Any, np.dtype[Any]]) -> Track:
         """Return some of the frames: indices of rows, or a mask (N,)."""
@@ -130,25 +116,18 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cameras:
-    """The camera of a video, in each of its frames: K (R X + T) in pixels, as for ``CameraView``.
-
-    Attributes
-    ----------
-    frames : (N,) int
-        Frames of the video.
-    intrinsics : (N, 3, 3) or (1, 3, 3)
-        K, pixels.
-    rotations, translations : (N, 3, 3), (N, 3), or (1, 3, 3), (1, 3)
-        R and T; a single row if the camera does not move.
-    size : (int, int) or None
-        Width and height of the video, pixels.
-    """
+    """The camera of a video in each frame: K (R X + T) in pixels, as for ``CameraView``."""
 
     frames: np.ndarray[Any, np.dtype[np.int64]]
+    """(N,) int. Frames of the video."""
     intrinsics: Floats
+    """(N, 3, 3) or (1, 3, 3). K, pixels."""
     rotations: Floats
     translations: Floats
+    """(N, 3, 3), (N, 3), or (1, 3, 3), (1, 3). R and T; a single row if the camera does not move.
+    (N, 3, 3), (N, 3), or (1, 3, 3), (1, 3). R and T; a single row if the camera does not move."""
     size: tuple[int, int] | None = None
+    """Width and height of the video, pixels."""
 
     @property
     def invalid(self) -> Bools:
@@ -161,52 +140,36 @@ class Cameras:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """People in a video, and its camera.
-
-    Attributes
-    ----------
-    tool : str
-        Title of the tool.
-    model : str
-        The member of the SMPL family, or ``"MHR"``; empty if there are no bodies.
-    people : mapping of space to {person: Track}
-        ``"world"`` and ``"camera"``, or only the space that the file has; the first is the default.
-    ups : mapping of space to axis
-        The axis that points up; empty if it is unknown.
-    cameras : mapping of space to Cameras
-        Cameras, if the file determines them.
-    cameras_of : callable or None
-        Returns the cameras in world space if they depend on a figure's rest joints.
-    frame_rate : float or None
-        Frames per second, if the tool always uses the same rate.
-    facts : tuple of (str, str)
-        Recognised and ignored contents, for ``viewer info``.
-    notes : tuple of Diagnostic
-        Messages about the file.
-    span : tuple of int
-        First and last frame of the video, if people may be missing in them.
-    """
+    """People in a video, and its camera."""
 
     tool: str
+    """Title of the tool."""
     model: str
+    """The member of the SMPL family, or ``"MHR"``; empty if there are no bodies."""
     people: Mapping[str, Mapping[int, Track]]
+    """``"world"`` and ``"camera"``, or only the space that the file has; the first is the default.
+    ``"world"`` and ``"camera"``, or only the space that the file has; the first is the default."""
     ups: Mapping[str, str]
+    """The axis that points up; empty if it is unknown."""
     cameras: Mapping[str, Cameras] = field(default_factory=dict)
+    """Cameras, if the file determines them."""
     cameras_of: Callable[[RestRoots], Cameras] | None = None
+    """Returns the cameras in world space if they depend on a figure's rest joints."""
     frame_rate: float | None = None
+    """Frames per second, if the tool always uses the same rate."""
     facts: tuple[tuple[str, str], ...] = ()
+    """Recognised and ignored contents, for ``viewer info``."""
     notes: tuple[Diagnostic, ...] = ()
+    """Messages about the file."""
     span: tuple[int, ...] = ()
+    """First and last frame of the video, if people may be missing in them."""
 
 
 def capture_of(source: Source, results: Results, options: Options) -> Capture:
     """Return the capture of results in the requested space.
 
-    Raises
-    ------
-    FormatError
-        If no person is present in any frame, the frame numbers are implausible, or the requested
-        space is missing.
+    Raises ``FormatError`` if no person is present in any frame, the frame numbers are implausible,
+    or the requested space is missing.
     """
     if not any(
         len(track.frames) for people in results.people.values() for track in people.values()
@@ -422,12 +385,8 @@ class _Capture:
 def moved(track: Track, rotations: Floats, translations: Floats) -> Track:
     """Return a person whose vertices v become R v + T, with an R and T for each row.
 
-    Parameters
-    ----------
-    track : Track
-        Bodies in the given space, N rows.
-    rotations, translations : (N, 3, 3), (N, 3)
-        R and T.
+    ``track``: bodies in the given space, N rows. ``rotations``, ``translations``: (N, 3, 3), (N,
+    3), R and T.
     """
     places = np.zeros((0, 3)) if track.translations is None else track.translations
     return replace(

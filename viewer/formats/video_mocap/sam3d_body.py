@@ -50,42 +50,27 @@ _SUFFIXES = (".npz", ".pkl")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """One person in N frames, in metres and in the axes of the rig: y up, z towards the camera.
-
-    Attributes
-    ----------
-    keypoints, joints, vertices : (N, K, 3), (N, J, 3), (N, V, 3)
-        Positions relative to the person; no points if the file has none.
-    rotations : (N, J, 3, 3) or None
-        Rotations of the joints, joint to world.
-    translations : (N, 3)
-        Position of the person in front of the camera, in the same axes.
-    parameters : dict of str to (N, C)
-        Parameters of the rig, by their keys in the file: ``mhr_model_params``, ``shape_params`` …
-    """
+    """One person in N frames, in metres and in the axes of the rig: y up, z towards the camera."""
 
     keypoints: Floats
     joints: Floats
     vertices: Floats
+    """(N, K, 3), (N, J, 3), (N, V, 3). Positions relative to the person; no points if the file has
+    none."""
     rotations: Floats | None
+    """(N, J, 3, 3) or None. Rotations of the joints, joint to world."""
     translations: Floats
+    """(N, 3). Position of the person in front of the camera, in the same axes."""
     parameters: dict[str, Floats]
+    """dict of str to (N, C). Parameters of the rig, by their keys in the file:
+    ``mhr_model_params``, ``shape_params`` …."""
 
 
 def read_person(archive: Archive, with_vertices: bool = True) -> _Person:
     """Read the arrays of one person.
 
-    Parameters
-    ----------
-    archive : Archive
-        An ``.npz``, or a dict within a pickle.
-    with_vertices : bool
-        Whether the vertices are needed.
-
-    Raises
-    ------
-    FormatError
-        If a shape differs from the tool's.
+    ``archive``: an ``.npz``, or a dict within a pickle. Raises ``FormatError`` if a shape differs
+    from the tool's.
     """
     place = archive.shape(_PLACE)
     lead, count = place[:1] if len(place) == 2 else (), _length(archive)
@@ -417,15 +402,7 @@ def _keypoint_limbs() -> list[tuple[int, int]]:
 
 
 def _point_layout(n_keypoints: int, n_joints: int, n_vertices: int) -> PointLayout:
-    """Return the layout of keypoints, joints and vertices, in this order.
-
-    Parameters
-    ----------
-    n_keypoints, n_joints : int
-        70 and 127, or 0; other numbers have no names and limbs.
-    n_vertices : int
-        Number of vertices, which have no limbs.
-    """
+    """Return the layout of keypoints, joints and vertices, in this order."""
     names, limbs = _named("keypoint", KEYPOINTS, n_keypoints), []
     if n_keypoints == len(KEYPOINTS):
         limbs += _keypoint_limbs()
@@ -458,11 +435,6 @@ def _frames_and_people(names: list[str]) -> dict[str, tuple[int, int]]:
 
     Names end with a person's number after a word ("img_subj00", "000012_person1"), or with two
     numbers, frame and person ("000012_1"); otherwise each file is a frame of one person.
-
-    Parameters
-    ----------
-    names : list of str
-        Names of files, with their suffixes.
 
     >>> _frames_and_people(["a_subj00.npz", "a_subj01.npz", "b_subj00.npz"])["a_subj01.npz"]
     (0, 1)

@@ -13,22 +13,15 @@ from viewer.formats._source import Source
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool, and the form of its results.
-
-    Attributes
-    ----------
-    title : str
-        Name of the tool.
-    files : str
-        Its files, for the manual.
-    has_folders : bool
-        Whether its results may be a folder; its module then has ``claims_folder(source, names)``
-        and ``read_folder(source, names)``.
-    """
+    """A tool, and the form of its results."""
 
     title: str
+    """Name of the tool."""
     files: str
+    """Its files, for the manual."""
     has_folders: bool = False
+    """Whether its results may be a folder; its module then has ``claims_folder(source, names)`` and
+    ``read_folder(source, names)``."""
 
 
 TOOLS = {
@@ -53,10 +46,8 @@ def module_of(tool: str) -> ModuleType:
 def tool_of(archive: Archive) -> str | None:
     """Return the key in ``TOOLS`` of an archive's tool, or None.
 
-    Raises
-    ------
-    FormatError
-        If no tool is recognised, and a nested pickle that was examined cannot be read.
+    Raises ``FormatError`` if no tool is recognised, and a nested pickle that was examined cannot be
+    read.
     """
     problem: FormatError | None = None
     for tool in TOOLS:

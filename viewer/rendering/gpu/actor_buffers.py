@@ -36,21 +36,7 @@ class _InstancedShapes:
 
 
 class ActorBuffers:
-    """All GPU buffers of figures and actors.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the skinning programs.
-    cube : moderngl.Buffer
-        Vertices of the cube that is instanced to draw boxes.
-    notes : list of str
-        Receives messages about limitations of the driver.
-    forget : callable
-        Called with a posed mesh that is about to be freed.
-    """
+    """All GPU buffers of figures and actors."""
 
     def __init__(
         self,

@@ -32,13 +32,7 @@ _LARGEST = 0.25
 
 
 class BackFaces:
-    """Visible back faces of one actor.
-
-    Parameters
-    ----------
-    mesh : MeshBuffers
-        The actor's mesh.
-    """
+    """Visible back faces of one actor."""
 
     def __init__(self, mesh: MeshBuffers) -> None:
         self._mesh = mesh
@@ -49,14 +43,7 @@ class BackFaces:
     def update(self, figure: Figure, pose: Pose | None, how: Skinning) -> None:
         """Update to a pose.
 
-        Parameters
-        ----------
-        figure : Figure
-            Figure with its shape applied.
-        pose : Pose or None
-            DOFs in lengths and radians; None for the bind pose.
-        how : Skinning
-            Method and influences.
+        ``pose``: DOFs in lengths and radians; None for the bind pose.
         """
         shell = self._mesh.shell
         self._spheres = None
@@ -91,14 +78,8 @@ class BackFaces:
     ) -> tuple[Region, ...] | None:
         """Return the regions of the image with visible back faces; None for the whole image.
 
-        Parameters
-        ----------
-        model_view : (4, 4)
-            Figure to camera space.
-        projection : (4, 4)
-            Camera to clip space.
-        viewport : (int, int, int, int)
-            Region of the framebuffer that is drawn to.
+        ``model_view``: (4, 4), figure to camera space. ``projection``: (4, 4), camera to clip
+        space.
         """
         spheres = self._spheres
         if spheres is None:

@@ -54,16 +54,9 @@ _TIP_WIDTH = 2.4  # width of the tip, in widths of the shaft
 class BoneBuffers:
     """A skeleton as octahedra, sticks or axes.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    skeleton : Skeleton
-        Skeleton in its rest pose, which determines directions and sizes of ends without a child.
-    style : str
-        ``"octahedra"``, ``"sticks"`` or ``"axes"``.
-    size : float
-        Size of the figure if all joints coincide, figure units.
+    ``skeleton``: skeleton in its rest pose, which determines directions and sizes of ends without a
+    child. ``style``: ``"octahedra"``, ``"sticks"`` or ``"axes"``. ``size``: size of the figure if
+    all joints coincide, figure units.
     """
 
     def __init__(
@@ -193,30 +186,22 @@ def _widths(links: _BoneLinks, count: int, sizes: tuple[float, float, float]) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BoneLinks:
-    """Bones of a skeleton at rest.
-
-    Attributes
-    ----------
-    joints : (K,) int32
-        Joints that are drawn.
-    ids : (N, 3) int32
-        Joint; its child, -1 for an end; the joint's axis that is most perpendicular to the bone.
-    ends : (N, 4)
-        For an end, its direction in joint space and its length in figure units; otherwise 0.
-    longest : (J,)
-        Length of the longest bone at each joint, figure units.
-    axis_lengths : (J,)
-        Length of the axes drawn at each joint, figure units.
-    size : float
-        Size from which widths are derived, figure units.
-    """
+    """Bones of a skeleton at rest."""
 
     joints: Ints
+    """(K,) int32. Joints that are drawn."""
     ids: Ints
+    """(N, 3) int32. Joint; its child, -1 for an end; the joint's axis that is most perpendicular to
+    the bone."""
     ends: Floats
+    """(N, 4). For an end, its direction in joint space and its length in figure units; otherwise 0.
+    (N, 4). For an end, its direction in joint space and its length in figure units; otherwise 0."""
     longest: Floats
+    """(J,). Length of the longest bone at each joint, figure units."""
     axis_lengths: Floats
+    """(J,). Length of the axes drawn at each joint, figure units."""
     size: float
+    """Size from which widths are derived, figure units."""
 
 
 def _bone_links(skeleton: Skeleton, size: float = 1.0) -> _BoneLinks:
@@ -226,12 +211,7 @@ def _bone_links(skeleton: Skeleton, size: float = 1.0) -> _BoneLinks:
     the direction of the previous bone if it can rotate, so that its rotation is visible. The bone
     reaches its far end if the file states that. Bones between coincident joints have length 0.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The skeleton; its rest pose is used.
-    size : float
-        Size of the figure if all joints coincide, figure units.
+    ``size``: size of the figure if all joints coincide, figure units.
     """
     worlds = world_matrices(skeleton, rest_pose(skeleton))
     points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
@@ -308,11 +288,8 @@ _Point: TypeAlias = tuple[float, float, float]
 def _octahedron() -> Floats:
     """Return a flat octahedron from a joint to its child, with a ridge on its first side.
 
-    Returns
-    -------
-    (N, 7)
-        Corners of triangles: x and z in half-widths, y in lengths; normals, 0 for flat triangles;
-        tint, 1 for the ridge, which shows the roll.
+    Returns (N, 7), corners of triangles: x and z in half-widths, y in lengths; normals, 0 for flat
+    triangles; tint, 1 for the ridge, which shows the roll.
     """
     ring = [(1.0, _WIDEST, 0.0), (0.0, _WIDEST, _FLATNESS)]
     ring += [(-1.0, _WIDEST, 0.0), (0.0, _WIDEST, -_FLATNESS)]

@@ -21,10 +21,7 @@ _MANY = 1000  # minimum number of boxes for which coincident boxes are searched
 def joint_colors(n_joints: int) -> Floats:
     """Return a colour for each joint: hues spaced by the golden ratio, so that neighbours differ.
 
-    Returns
-    -------
-    (J, 3)
-        Linear.
+    Returns (J, 3), linear.
     """
     hues = 0.58 + _GOLDEN * np.arange(n_joints)
     return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.42, 0.72) for hue in hues])
@@ -33,23 +30,9 @@ def joint_colors(n_joints: int) -> Floats:
 class BoxBuffers:
     """Boxes on the GPU, each with its own matrix.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    cube : moderngl.Buffer
-        Corners and normals of a cube from 0 to 1, shared by all boxes.
-    boxes : (N, 2, 3)
-        Lower and upper corner of each box.
-
-    Attributes
-    ----------
-    count : int
-        Number of boxes, N.
-    world : moderngl.Texture
-        The matrices, relative to ``center``.
-    center : (3,)
-        Figure space; it is part of the model matrix.
+    ``world``: the matrices, relative to ``center``. ``center``: (3,), figure space; it is part of
+    the model matrix. ``cube``: corners and normals of a cube from 0 to 1, shared by all boxes.
+    ``boxes``: (N, 2, 3), lower and upper corner of each box.
     """
 
     def __init__(self, context: moderngl.Context, cube: moderngl.Buffer, boxes: Floats) -> None:

@@ -43,15 +43,8 @@ class Graphics:
 
     In software, a context and its first image take ten times as long as the next image.
 
-    Parameters
-    ----------
-    device : int, optional
-        Index of the EGL device; if omitted, each one is tried in turn.
-
-    Raises
-    ------
-    RenderError
-        If there is no usable OpenGL, with the cause and a remedy.
+    ``device``: index of the EGL device; if omitted, each one is tried in turn. Raises
+    ``RenderError`` if there is no usable OpenGL, with the cause and a remedy.
     """
 
     def __init__(self, device: int | None = None) -> None:
@@ -88,10 +81,7 @@ class _OfThread:
 def thread_graphics(device: int | None = None) -> Graphics:
     """Return the graphics of this thread on a device, created on first use and never released.
 
-    Raises
-    ------
-    RenderError
-        If there is no usable OpenGL, with the cause and a remedy.
+    Raises ``RenderError`` if there is no usable OpenGL, with the cause and a remedy.
     """
     if not hasattr(_thread, "graphics"):
         _thread.graphics = _OfThread()
@@ -104,22 +94,10 @@ def thread_graphics(device: int | None = None) -> Graphics:
 def headless_context(device: int | None = None) -> moderngl.Context:
     """Return a context that needs neither display nor window.
 
-    Parameters
-    ----------
-    device : int, optional
-        Index of the EGL device; if omitted, each one is tried in turn.
-
-    Returns
-    -------
-    moderngl.Context
-        OpenGL 3.3 core or newer, current in this thread; the caller must release it.
-
-    Raises
-    ------
-    RenderError
-        If there is no usable OpenGL; the message gives the cause and a remedy.
-    ViewerError
-        If there are devices, but none with this index.
+    ``device``: index of the EGL device; if omitted, each one is tried in turn. Returns OpenGL 3.3
+    core or newer, current in this thread; the caller must release it. Raises ``RenderError`` if
+    there is no usable OpenGL; the message gives the cause and a remedy. Raises ``ViewerError`` if
+    there are devices, but none with this index.
     """
     if not sys.platform.startswith("linux"):
         return _create({})
@@ -156,10 +134,7 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
 def check_device(device: int) -> None:
     """Raise for an index without a device; any index is accepted if devices cannot be listed.
 
-    Raises
-    ------
-    ViewerError
-        If the index is invalid; the message gives the valid numbers.
+    Raises ``ViewerError`` if the index is invalid; the message gives the valid numbers.
     """
     count = device_count() if sys.platform.startswith("linux") else 0
     if device < 0 or (count and device >= count):
@@ -195,15 +170,7 @@ def is_software(context: moderngl.Context) -> bool:
 def explain_failure(text: str) -> str:
     """Return an explanation of a message from glcontext or GLFW, with a remedy.
 
-    Parameters
-    ----------
-    text : str
-        The library's message.
-
-    Returns
-    -------
-    str
-        One line: cause and remedy, and the library's message in brackets.
+    Returns one line: cause and remedy, and the library's message in brackets.
 
     >>> explain_failure("libEGL.so.1 not loaded").startswith("libEGL was not found")
     True
@@ -240,17 +207,7 @@ def explain_failure(text: str) -> str:
 def check_errors(context: moderngl.Context, doing: str) -> None:
     """Raise if OpenGL has recorded an error, since an oversized buffer or texture does not raise.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    doing : str
-        Name of the attempted operation, for the message.
-
-    Raises
-    ------
-    RenderError
-        If there is an error; the message gives the renderer's name.
+    Raises ``RenderError`` if there is an error; the message gives the renderer's name.
     """
     error = context.error
     if error == "GL_NO_ERROR":
@@ -273,10 +230,7 @@ class OpenGLOffer:
 def _headless_offer(options: Mapping[str, Any]) -> OpenGLOffer | None:
     """Return the OpenGL version that the machine offers without a window; None if it offers none.
 
-    Parameters
-    ----------
-    options : mapping
-        moderngl's settings ``backend``, ``device_index``, ``libegl`` and ``libgl``.
+    ``options``: moderngl's settings ``backend``, ``device_index``, ``libegl`` and ``libgl``.
     """
     chosen = options.get("backend")
     create = glcontext.get_backend_by_name(chosen) if chosen else glcontext.default_backend()
@@ -296,10 +250,7 @@ def _headless_offer(options: Mapping[str, Any]) -> OpenGLOffer | None:
 def offer_of(address: int) -> OpenGLOffer:
     """Return the version strings of the current context's driver.
 
-    Parameters
-    ----------
-    address : int
-        Address of the function ``glGetString``.
+    ``address``: address of the function ``glGetString``.
     """
     get_string = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_uint)(address)
     strings = [
@@ -310,15 +261,7 @@ def offer_of(address: int) -> OpenGLOffer:
 
 
 def offer_text(offer: OpenGLOffer, environment: Mapping[str, str] = os.environ) -> str:
-    """Return a message about the required and the offered version.
-
-    Parameters
-    ----------
-    offer : OpenGLOffer
-        Version strings of a context with an older version.
-    environment : mapping of str to str
-        Environment variables, which may limit the version offered by Mesa.
-    """
+    """Return a message about the required and the offered version."""
     asked = [f"{name}={environment[name]}" for name in _OVERRIDES if environment.get(name)]
     where = ", ".join([f"renderer {offer.renderer}", *(f"{one} is set" for one in asked)])
     version, language = _numbers(offer.version), _numbers(offer.language)

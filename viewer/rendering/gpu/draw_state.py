@@ -74,21 +74,7 @@ def sides(
     blended: bool,
     is_mirrored: bool = False,
 ) -> Iterator[tuple[str, ...]]:
-    """Cull faces for several draw calls: yield the culled side of each.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    culled : bool
-        Whether the back faces of all surfaces are culled.
-    double_sided : bool
-        Whether this surface has two sides.
-    blended : bool
-        Whether it is translucent: of the two sides, the farther one is drawn first.
-    is_mirrored : bool
-        Whether the surface is reflected: its front faces are then clockwise.
-    """
+    """Cull faces for several draw calls: yield the culled side of each."""
     both = double_sided and not culled
     if both and not blended:
         yield ("back",)

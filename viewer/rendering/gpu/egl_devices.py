@@ -18,21 +18,14 @@ _SOFTWARE = "EGL_MESA_device_software"
 
 @dataclass(frozen=True, slots=True)
 class EglDevice:
-    """A device that EGL lists.
-
-    Attributes
-    ----------
-    index : int
-        Index in EGL's list, as ``--gpu`` takes it.
-    cuda : int or None
-        CUDA index of the same graphics card; None for other vendors.
-    is_software : bool
-        Whether it renders on the CPU.
-    """
+    """A device that EGL lists."""
 
     index: int
+    """Index in EGL's list, as ``--gpu`` takes it."""
     cuda: int | None = None
+    """CUDA index of the same graphics card; None for other vendors."""
     is_software: bool = False
+    """Whether it renders on the CPU."""
 
 
 def egl_devices() -> list[EglDevice]:
@@ -80,19 +73,9 @@ def device_of_worker(
     The first device of ``CUDA_VISIBLE_DEVICES`` is used, which schedulers set for each job, but EGL
     ignores. If the variable is not set, graphics cards are assigned to workers in turn.
 
-    Parameters
-    ----------
-    rank : int
-        Number of the worker on its machine.
-    devices : sequence of EglDevice, optional
-        Devices; this machine's devices if omitted.
-    visible : str, optional
-        Value of ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted.
-
-    Returns
-    -------
-    int or None
-        Index of an EGL device; None if there is no graphics card.
+    ``devices``: devices; this machine's devices if omitted. ``visible``: value of
+    ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted. Returns index of an EGL device;
+    None if there is no graphics card.
     """
     cards = [one for one in (devices or egl_devices()) if not one.is_software]
     if visible is None:

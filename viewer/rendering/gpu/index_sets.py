@@ -44,21 +44,14 @@ class MeshRun:
 
 @dataclass(frozen=True, slots=True)
 class IndexSet:
-    """An index buffer and its runs; its creator releases the buffer.
-
-    Attributes
-    ----------
-    indices : moderngl.Buffer
-        Indices of split vertices.
-    runs : tuple of MeshRun
-        Drawn runs, in the order of the buffer.
-    order : (N,) int32
-        Index of the given triangle at each position of the buffer.
-    """
+    """An index buffer and its runs; its creator releases the buffer."""
 
     indices: moderngl.Buffer
+    """Indices of split vertices."""
     runs: tuple[MeshRun, ...]
+    """Drawn runs, in the order of the buffer."""
     order: Ints
+    """(N,) int32. Index of the given triangle at each position of the buffer."""
 
     @property
     def spans(self) -> tuple[tuple[int, int], ...]:
@@ -104,25 +97,10 @@ def index_set(
 ) -> IndexSet:
     """Upload triangles.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    triangles : (T, 3)
-        Indices of split vertices.
-    materials : (T,)
-        Index into ``surfaces`` of each triangle, -1 for none.
-    surfaces : list of Surface
-        Surface of each material.
-    order : (T,) int32, optional
-        Order of the triangles, see ``curve_order``; that of the file if omitted.
-    parts : (T,), optional
-        Part of each triangle, -1 for none.
-
-    Returns
-    -------
-    IndexSet
-        Contains a run for each material of each part, in the order of the file.
+    ``triangles``: (T, 3), indices of split vertices. ``materials``: (T,), index into ``surfaces``
+    of each triangle, -1 for none. ``order``: (T,) int32, order of the triangles, see
+    ``curve_order``; that of the file if omitted. ``parts``: (T,), part of each triangle, -1 for
+    none. Returns contains a run for each material of each part, in the order of the file.
     """
     parts = np.full(len(triangles), -1, dtype=np.int32) if parts is None else parts
     edges = _edges(materials, parts)
@@ -146,19 +124,9 @@ def _edges(materials: Ints, parts: Ints) -> Ints:
 def curve_order(triangles: Ints, materials: Ints, parts: Ints, positions: Floats) -> Ints:
     """Return the order of triangles along a space-filling curve within each run.
 
-    Parameters
-    ----------
-    triangles : (T, 3)
-        Indices of vertices.
-    materials, parts : (T,)
-        Material and part of each triangle, -1 for none.
-    positions : (R, 3)
-        Rest positions of the vertices.
-
-    Returns
-    -------
-    (T,) int32
-        Index of the triangle at each position.
+    ``triangles``: (T, 3), indices of vertices. ``materials``, ``parts``: (T,), material and part of
+    each triangle, -1 for none. ``positions``: (R, 3), rest positions of the vertices. Returns (T,)
+    int32, index of the triangle at each position.
     """
     if not len(triangles):
         return np.zeros(0, dtype=np.int32)
@@ -175,15 +143,8 @@ def curve_order(triangles: Ints, materials: Ints, parts: Ints, positions: Floats
 def curve_places(points: Floats) -> NDArray[np.int64]:
     """Return the positions of points on a Z-order curve through their box (Morton 1966).
 
-    Parameters
-    ----------
-    points : (N, 3)
-        At least one.
-
-    Returns
-    -------
-    (N,)
-        Morton codes: interleaved bits of x, y and z, with 1024 cells along the longest side.
+    ``points``: (N, 3), at least one. Returns (N,), morton codes: interleaved bits of x, y and z,
+    with 1024 cells along the longest side.
 
     >>> curve_places(np.array([[0.0, 0, 0], [1023, 0, 0], [0, 1, 0], [1, 1, 1]])).tolist()
     [0, 153391689, 2, 7]
@@ -200,14 +161,8 @@ def curve_places(points: Floats) -> NDArray[np.int64]:
 def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> Bools:
     """Return a mask of triangles with a corner outside the hidden body parts: (T,) bool.
 
-    Parameters
-    ----------
-    figure : Figure
-        The figure, with or without body parts.
-    hidden : tuple of int
-        Indices of the hidden body parts.
-    triangles : (T, 3)
-        Indices of the figure's vertices.
+    ``figure``: the figure, with or without body parts. ``triangles``: (T, 3), indices of the
+    figure's vertices.
     """
     if figure.body_parts is None or not hidden:
         return np.ones(len(triangles), dtype=bool)

@@ -42,27 +42,9 @@ class MeshBuffers:
     vertices. Positions are stored relative to the centre of the mesh, so that float32 keeps its
     precision even if the mesh is far from the origin.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use; ``release`` frees all buffers.
-    figure : Figure
-        Figure with a mesh.
-    notes : list of str
-        Receives messages about limitations of the driver.
-
-    Attributes
-    ----------
-    center : (3,)
-        The offset that was subtracted, figure space.
-    sources : (R,) int32
-        Vertex of the figure for each split vertex.
-    copies : (V,) int32
-        One split vertex for each vertex of the figure.
-    surfaces : list of Surface
-        Surface of each material.
-    has_materials : bool
-        Whether any surface has more than a base colour texture.
+    ``center``: (3,), the offset that was subtracted, figure space. ``sources``: (R,) int32, vertex
+    of the figure for each split vertex. ``copies``: (V,) int32, one split vertex for each vertex of
+    the figure. ``context``: the context in use; ``release`` frees all buffers.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
@@ -255,23 +237,10 @@ class MeshBuffers:
 class SkinBuffers:
     """Influences of a mesh's split vertices.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use; ``release`` frees all buffers.
-    skin : Skin or None
-        None for vertices without influences.
-    sources : (R,)
-        Vertex of the skin for each split vertex.
-
-    Attributes
-    ----------
-    bindings : moderngl.Buffer
-        One row per split vertex, see ``include/skinning.glsl``.
-    fractions : moderngl.Buffer
-        The skin's fraction of DQS at each split vertex.
-    joint_fractions : (J,)
-        Each joint's fraction of the sum of all weights, for the mean motion of the figure.
+    ``bindings``: one row per split vertex, see ``include/skinning.glsl``. ``joint_fractions``:
+    (J,), each joint's fraction of the sum of all weights, for the mean motion of the figure.
+    ``context``: the context in use; ``release`` frees all buffers. ``skin``: none for vertices
+    without influences. ``sources``: (R,), vertex of the skin for each split vertex.
     """
 
     def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:

@@ -33,14 +33,9 @@ _LANES = np.uint64(0x3FFF_3FFF_3FFF_3FFF)  # the bits of a step in each of four 
 def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = False) -> None:
     """Add all smaller levels to a texture.
 
-    Parameters
-    ----------
-    texture : moderngl.Texture
-        An RGBA texture, whose context must be current.
-    pixels : (H, W, 4) uint8
-        Contents of the texture, first row at v = 0.
-    is_linear : bool
-        Whether the pixels are linear data, not sRGB colours.
+    ``texture``: an RGBA texture, whose context must be current. ``pixels``: (H, W, 4) uint8,
+    contents of the texture, first row at v = 0. ``is_linear``: whether the pixels are linear data,
+    not sRGB colours.
     """
     is_small = texture.width * texture.height <= _MOST_PIXELS
     upload = _upload_function() if is_small and is_software(texture.ctx) else None
@@ -58,17 +53,9 @@ def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = Fals
 def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
     """Return the mipmap levels from half the size down to one pixel, averaged in linear light.
 
-    Parameters
-    ----------
-    pixels : (H, W, 4) uint8
-        Pixels in sRGB unless ``is_linear``; alpha is treated like a colour.
-    is_linear : bool
-        Whether the pixels are linear data.
-
-    Returns
-    -------
-    list of (H >> n, W >> n, 4) uint8
-        No side is shorter than 1; an odd last row or column is dropped.
+    ``pixels``: (H, W, 4) uint8, pixels in sRGB unless ``is_linear``; alpha is treated like a
+    colour. ``is_linear``: whether the pixels are linear data. Returns list of (H >> n, W >> n, 4)
+    uint8, no side is shorter than 1; an odd last row or column is dropped.
     """
     pixels = np.ascontiguousarray(pixels)
     height, width = pixels.shape[:2]

@@ -43,29 +43,10 @@ _BYTES_PER_VERTEX = 24  # a position and a normal, of three float32 each
 class PosedMesh:
     """One actor's posed vertices.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use; some framebuffer must be bound when ``update`` runs.
-    programs : Programs
-        Provides the skinning program.
-    mesh : MeshBuffers
-        Mesh shared by all actors of the figure.
-    way : str
-        Method of summing pose correctives, see ``rest_buffers``.
-
-    Attributes
-    ----------
-    posed : moderngl.Buffer
-        A row for every split vertex: position (relative to ``center``) and unit normal.
-    center : (3,)
-        Origin of the positions in figure space; part of the model matrix.
-    back_faces : BackFaces
-        Regions in which back faces of the surface are visible.
-    scalars : ScalarBuffer
-        Values of a scalar quantity, computed when one is shown.
-    hidden_parts : frozenset of int
-        Parts of the mesh that are not drawn.
+    ``posed``: a row for every split vertex: position (relative to ``center``) and unit normal.
+    ``center``: (3,), origin of the positions in figure space; part of the model matrix.
+    ``context``: the context in use; some framebuffer must be bound when ``update`` runs. ``way``:
+    method of summing pose correctives, see ``rest_buffers``.
     """
 
     def __init__(
@@ -103,12 +84,8 @@ class PosedMesh:
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
         """Skin the mesh if pose or method changed since the last call.
 
-        Parameters
-        ----------
-        pose : Pose or None
-            Pose; None leaves the mesh in its bind pose.
-        skinning : Skinning or str
-            Skinning settings, or a key of ``viewer.rig.skinning.METHODS``.
+        ``pose``: pose; None leaves the mesh in its bind pose. ``skinning``: skinning settings, or a
+        key of ``viewer.rig.skinning.METHODS``.
         """
         self._looks.update(pose)
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
@@ -205,13 +182,7 @@ class PosedMesh:
 
 
 class _MaterialLooks:
-    """The surfaces of one actor that differ from its figure's surfaces.
-
-    Parameters
-    ----------
-    mesh : MeshBuffers
-        Mesh of the figure.
-    """
+    """The surfaces of one actor that differ from its figure's surfaces."""
 
     def __init__(self, mesh: MeshBuffers) -> None:
         self._mesh = mesh

@@ -36,12 +36,7 @@ _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
     """Set uniforms by name; uniforms that the compiler removed as unused are skipped.
 
-    Parameters
-    ----------
-    program : moderngl.Program
-        Program that has the uniforms.
-    values : mapping
-        Numbers, tuples of numbers, or ``bytes`` laid out as GLSL stores them.
+    ``values``: numbers, tuples of numbers, or ``bytes`` laid out as GLSL stores them.
     """
     for name, value in values.items():
         # Not ``name in program``, which compares the names of all members one by one.
@@ -57,10 +52,7 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
 class Programs:
     """Cache of compiled programs; one per context.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        Owns the programs; ``release`` frees them.
+    ``context``: owns the programs; ``release`` frees them.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -81,32 +73,13 @@ class Programs:
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
-        Parameters
-        ----------
-        name : str
-            Name of the vertex shader, without suffix.
-        chunk : str
-            A key of ``SHADING``, for fragment shaders with a chunk.
-        fragment : str
-            Name of the fragment shader; the same name if omitted.
-        skin : str
-            A key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
-        geometry : str
-            Name of the geometry shader between the two, if any.
-        affine : bool
-            Whether joints may scale or shear, for vertex shaders that skin.
-        summed : bool
-            Whether pose correctives have already been summed, for vertex shaders that skin
-            instances.
-        materials : bool
-            Whether surfaces have more than a base colour texture, see ``include/surface.glsl``.
-        effects : tuple of str
-            Macros of the fragment shader, see ``viewer.rendering.view.Effects``.
-
-        Raises
-        ------
-        RenderError
-            If the driver rejects a shader; the message gives the file and line.
+        ``name``: name of the vertex shader, without suffix. ``chunk``: a key of ``SHADING``, for
+        fragment shaders with a chunk. ``fragment``: name of the fragment shader; the same name if
+        omitted. ``skin``: a key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
+        ``geometry``: name of the geometry shader between the two, if any. ``materials``: whether
+        surfaces have more than a base colour texture, see ``include/surface.glsl``. ``effects``:
+        macros of the fragment shader, see ``viewer.rendering.view.Effects``. Raises ``RenderError``
+        if the driver rejects a shader; the message gives the file and line.
         """
         files = name, skin, fragment or name, chunk, geometry
         return self._get((*files, affine, summed, materials, *effects), ())

@@ -49,21 +49,8 @@ class RestBuffers:
 
     They are the figure's, or a copy with shape and correctives applied.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    mesh : MeshBuffers
-        Mesh that is used unchanged while shape and correctives are 0.
-    way : str
-        One of ``WAYS``; chosen by the driver if empty.
-
-    Attributes
-    ----------
-    positions, normals : moderngl.Buffer
-        One row per split vertex; positions are relative to the mesh's centre.
-    n_offsets : int
-        Number of rows of correctives that the shader adds.
+    ``mesh``: mesh that is used unchanged while shape and correctives are 0. ``way``: one of
+    ``WAYS``; chosen by the driver if empty.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
@@ -78,14 +65,7 @@ class RestBuffers:
     def update(self, figure: Figure, pose: Pose, how: Skinning) -> None:
         """Update to a shape and pose.
 
-        Parameters
-        ----------
-        figure : Figure
-            Figure with its shape applied.
-        pose : Pose
-            DOFs in lengths and radians.
-        how : Skinning
-            Whether pose correctives are added.
+        ``pose``: DOFs in lengths and radians.
         """
         weights = self._weights(figure, pose) if how.correctives else np.zeros(0)
         active = weights.any()
@@ -135,14 +115,7 @@ class RestBuffers:
     ) -> list[tuple[moderngl.Buffer, str, str]]:
         """Return the vertex attributes of ``include/skinning.glsl``, for a vertex array.
 
-        Parameters
-        ----------
-        program : moderngl.Program
-            Attributes that it does not use are omitted.
-        skin : SkinBuffers
-            Influences.
-        attached : bool
-            Whether shape and correctives apply; otherwise the mesh is used as stored.
+        ``program``: attributes that it does not use are omitted.
         """
         rest = self if attached else self.mesh
         found = [
@@ -172,21 +145,8 @@ class SummedOffsets:
     If the shader sums the offsets, a list contains the weights of all instances. If the CPU sums
     them, one matrix product computes a row of offsets for every instance.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    mesh : MeshBuffers
-        Mesh of the figure.
-    way : str
-        One of ``WAYS``.
-
-    Attributes
-    ----------
-    n_listed : int
-        Length of each instance's list; 0 if there are no correctives.
-    has_sums : bool
-        Whether there is a row of sums for each instance.
+    ``n_listed``: length of each instance's list; 0 if there are no correctives. ``way``: one of
+    ``WAYS``.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str) -> None:
@@ -200,14 +160,8 @@ class SummedOffsets:
     def update(self, weights: Floats | None, rows: NDArray[np.intp], count: int) -> None:
         """Update to new poses.
 
-        Parameters
-        ----------
-        weights : (C, P) or None
-            Weights of the correctives, for changed instances; None for no correctives.
-        rows : (C,)
-            Indices of these instances.
-        count : int
-            Number of all instances, A.
+        ``weights``: (C, P) or None, weights of the correctives, for changed instances; None for no
+        correctives. ``rows``: (C,), indices of these instances.
         """
         self.n_listed, self.has_sums = 0, False
         if weights is None:

@@ -16,13 +16,7 @@ _SRGB8 = 0x8C41
 
 
 class Studio:
-    """Prefiltered studio environment, and the lookup table of the split-sum approximation.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    """
+    """Prefiltered studio environment, and the lookup table of the split-sum approximation."""
 
     def __init__(self, context: moderngl.Context) -> None:
         with np.load(resource("assets", "studio", "studio.npz")) as stored:
@@ -51,13 +45,7 @@ class Studio:
 
 
 class Matcaps:
-    """Images of lit spheres (matcaps), each uploaded on first use.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    """
+    """Images of lit spheres (matcaps), each uploaded on first use."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context, self._owner = context, Owner()

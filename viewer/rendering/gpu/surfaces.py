@@ -46,33 +46,22 @@ _UNTEXTURED: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """Drawing properties of the triangles of one material.
-
-    Attributes
-    ----------
-    uniforms : dict
-        Uniforms of ``include/surface.glsl`` and ``shade/pbr.glsl``.
-    untextured : dict
-        Uniforms that differ while textures are off.
-    textures : tuple of (unit, texture)
-        Textures to bind before the triangles are drawn.
-    is_physical : bool
-        Whether the material has its own metallic and roughness values.
-    is_blended : bool
-        Whether the triangles are drawn after all opaque ones.
-    double_sided : bool
-        Whether back faces are drawn.
-    outline : Outline or None
-        Line around the triangles.
-    """
+    """Drawing properties of the triangles of one material."""
 
     uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}, ()))
+    """Uniforms of ``include/surface.glsl`` and ``shade/pbr.glsl``."""
     untextured: dict[str, Any] = field(default_factory=dict)
+    """Uniforms that differ while textures are off."""
     textures: tuple[tuple[int, moderngl.Texture], ...] = ()
+    """tuple of (unit, texture). Textures to bind before the triangles are drawn."""
     is_physical: bool = False
+    """Whether the material has its own metallic and roughness values."""
     is_blended: bool = False
+    """Whether the triangles are drawn after all opaque ones."""
     double_sided: bool = True
+    """Whether back faces are drawn."""
     outline: Outline | None = None
+    """Line around the triangles."""
 
     def use(self, program: moderngl.Program, textured: bool) -> None:
         """Set uniforms and bind textures."""
@@ -101,12 +90,8 @@ def needs_materials(mesh: Mesh) -> bool:
 def drawn_sets(mesh: Mesh, notes: list[str]) -> tuple[int, ...]:
     """Return the sets of texture coordinates that are drawn, the first set first.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Sets that no texture uses are omitted.
-    notes : list of str
-        Receives a message if textures use more sets than can be drawn.
+    ``mesh``: sets that no texture uses are omitted. ``notes``: receives a message if textures use
+    more sets than can be drawn.
     """
     used = {
         texture.uv_set
@@ -132,18 +117,7 @@ def upload_surfaces(
 ) -> list[Surface]:
     """Upload the textures of materials.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    materials : sequence of Material
-        Materials of one mesh.
-    sets : sequence of int
-        Sets of texture coordinates that are drawn; textures of other sets are omitted.
-    notes : list of str
-        Receives messages about limitations of the driver.
-    owner : Owner
-        Takes ownership of the textures.
+    ``sets``: sets of texture coordinates that are drawn; textures of other sets are omitted.
     """
     made: dict[tuple[object, ...], moderngl.Texture] = {}
     surfaces = []

@@ -24,21 +24,8 @@ _OPAQUE = 0xFF000000  # smallest value of an opaque pixel as a little-endian num
 class Target:
     """Framebuffers of an image that is being drawn.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    size : (int, int)
-        Width and height in pixels.
-    samples : int
-        Requested samples per pixel, rounded down to a power of two and limited by the driver.
-
-    Attributes
-    ----------
-    framebuffer : moderngl.Framebuffer
-        The framebuffer to draw to.
-    texture : moderngl.Texture
-        The image after ``resolve``.
+    ``texture``: the image after ``resolve``. ``size``: width and height in pixels. ``samples``:
+    requested samples per pixel, rounded down to a power of two and limited by the driver.
     """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
@@ -108,11 +95,8 @@ class Target:
     def read_into(self, buffer: moderngl.Buffer) -> None:
         """Queue a copy of the resolved image to a buffer, without waiting for it.
 
-        Parameters
-        ----------
-        buffer : moderngl.Buffer
-            4 bytes per pixel, last row first; ``picture_rows`` converts its contents to an
-            image. Reading it waits for the copy.
+        ``buffer``: 4 bytes per pixel, last row first; ``picture_rows`` converts its contents to an
+        image. Reading it waits for the copy.
         """
         self._resolved.read_into(buffer, components=4)
 
@@ -127,19 +111,7 @@ class Accumulation:
 
     Colours are premultiplied by alpha, so averaging pixels averages their coverage.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the program.
-    size : (int, int)
-        Width and height in pixels.
-
-    Attributes
-    ----------
-    count : int
-        Images added since the last ``clear``.
+    ``count``: images added since the last ``clear``. ``size``: width and height in pixels.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs, size: tuple[int, int]):
@@ -188,10 +160,7 @@ class Accumulation:
 def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:
     """Raise for an image size that the driver cannot draw; ``what`` begins the message.
 
-    Raises
-    ------
-    ViewerError
-        If the size is not supported; the message gives the limit.
+    Raises ``ViewerError`` if the size is not supported; the message gives the limit.
     """
     limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
     if not all(1 <= side <= limit for side in size):
@@ -206,12 +175,7 @@ def target_bytes(size: tuple[int, int], samples: int) -> int:
     Colour and depth of every sample, 4 bytes each, plus the resolved image; without
     multisampling, the image and its depth.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    samples : int
-        Samples per pixel; 0 without multisampling.
+    ``size``: width and height in pixels. ``samples``: samples per pixel; 0 without multisampling.
 
     >>> target_bytes((100, 10), 4), target_bytes((100, 10), 0)
     (36000, 8000)
@@ -221,15 +185,7 @@ def target_bytes(size: tuple[int, int], samples: int) -> int:
 
 
 def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
-    """Return pixels from OpenGL as a view: (H, W, 4) uint8, first row at the top.
-
-    Parameters
-    ----------
-    data : bytes
-        Pixels, last row first.
-    size : (int, int)
-        Width and height.
-    """
+    """Return pixels from OpenGL as a view: (H, W, 4) uint8, first row at the top."""
     return np.frombuffer(data, dtype=np.uint8).reshape(size[1], size[0], 4)[::-1]
 
 

@@ -76,12 +76,7 @@ def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
 def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
     """Upload consecutive texels into the first rows of a texture, padding the last row.
 
-    Parameters
-    ----------
-    texture : moderngl.Texture
-        A texture of float32 texels.
-    rows : (N, ...)
-        Consecutive texels; they replace the previous contents.
+    ``rows``: (N, ...), consecutive texels; they replace the previous contents.
     """
     wide = texture.width * texture.components
     flat = rows.reshape(-1)

@@ -12,13 +12,7 @@ from viewer.rig.arrays import Floats
 
 
 class VertexArrays:
-    """Cache of vertex arrays, created on first use and freed together.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    """
+    """Cache of vertex arrays, created on first use and freed together."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
@@ -33,16 +27,8 @@ class VertexArrays:
     ) -> moderngl.VertexArray:
         """Return the array for a program.
 
-        Parameters
-        ----------
-        program : moderngl.Program
-            Program cached by ``Programs``, so its id is unique.
-        content : callable
-            Returns buffers, layouts and attribute names; called only to create the array.
-        indices : moderngl.Buffer, optional
-            Index buffer of the triangles.
-        key : tuple
-            Distinguishes arrays of one program with different content or indices.
+        ``program``: program cached by ``Programs``, so its id is unique. ``content``: returns
+        buffers, layouts and attribute names; called only to create the array.
         """
         key = (id(program), *key)
         if key not in self._arrays:
@@ -59,21 +45,7 @@ class VertexArrays:
 
 
 class InstanceRows:
-    """Per-instance attributes in a buffer that grows on demand, and the vertex array of it.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    program : moderngl.Program
-        Program that draws a strip of four corners per row.
-    layout : str
-        Layout of a row in moderngl's notation.
-    names : tuple of str
-        Names of the attributes.
-    what : str
-        Name of the rows in messages.
-    """
+    """Per-instance attributes in a buffer that grows on demand, and the vertex array of it."""
 
     def __init__(
         self,
@@ -92,10 +64,7 @@ class InstanceRows:
     def write(self, rows: Floats) -> None:
         """Upload rows, (N, number of values in the layout).
 
-        Raises
-        ------
-        RenderError
-            If there is not enough graphics memory.
+        Raises ``RenderError`` if there is not enough graphics memory.
         """
         self._count = len(rows)
         if not self._count:

@@ -37,63 +37,40 @@ _MARK_STYLE = SegmentStyle(hidden=0.5, lift=0.004, border=1.5, border_color=(0.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Annotation:
-    """Segments, and labels drawn over them.
-
-    Attributes
-    ----------
-    segments : Segments
-        Segments in drawing order.
-    style : SegmentStyle
-        Style of the segments.
-    labels : Labels or None
-        Labels, which are never hidden.
-    """
+    """Segments, and labels drawn over them."""
 
     segments: Segments
+    """Segments in drawing order."""
     style: SegmentStyle
     labels: Labels | None = None
+    """Labels, which are never hidden."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Labels:
-    """Labels next to points.
-
-    Attributes
-    ----------
-    texts : tuple of N str
-        Their texts.
-    points : (N, 3)
-        Labelled points, scene space.
-    ranks : (N,) int
-        If there is no room for all labels, lower ranks take precedence, even across annotations;
-        among equal ranks, nearer points take precedence.
-    colors : (N, 3)
-        Colours of the text, sRGB, 0 to 1.
-    """
+    """Labels next to points."""
 
     texts: tuple[str, ...]
+    """Their texts."""
     points: Floats
+    """(N, 3). Labelled points, scene space."""
     ranks: Ints
+    """(N,) int. If there is no room for all labels, lower ranks take precedence, even across
+    annotations; among equal ranks, nearer points take precedence."""
     colors: Floats
+    """(N, 3). Colours of the text, sRGB, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marks:
-    """Positions of marks.
-
-    Attributes
-    ----------
-    points : (N, 3)
-        Scene space.
-    radii : (N,)
-        Radii of the points, pixels.
-    lines : (M, 2, 3)
-        Both ends of each line, scene space.
-    """
+    """Positions of marks."""
 
     points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(N, 3). Scene space."""
     radii: Floats = field(default_factory=lambda: np.zeros(0))
+    """(N,). Radii of the points, pixels."""
     lines: Floats = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    """(M, 2, 3). Both ends of each line, scene space."""
 
 
 def mark_annotation(marks: Marks) -> Annotation:
@@ -108,10 +85,7 @@ def mark_annotation(marks: Marks) -> Annotation:
 def letters_for(size: tuple[int, int]) -> int:
     """Return the height of text in an image, pixels.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image, pixels.
+    ``size``: width and height of the image, pixels.
     """
     return round(_LETTERS * picture_scale(size))
 
@@ -121,16 +95,8 @@ def place_labels(
 ) -> PlacedLabels:
     """Place labels next to their points: low ranks first, then nearer points.
 
-    Parameters
-    ----------
-    labels : sequence of Labels
-        The labels; they are placed without overlap.
-    view : View
-        The camera's matrices.
-    size : (int, int)
-        Width and height of the image, pixels.
-    lettering : Lettering
-        The font.
+    ``labels``: the labels; they are placed without overlap. ``size``: width and height of the
+    image, pixels.
     """
     texts = [text for one in labels for text in one.texts]
     points = np.concatenate([np.zeros((0, 3)), *(one.points for one in labels)])
@@ -157,36 +123,24 @@ def place_labels(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedLabels:
-    """Labels with their positions in the image.
-
-    Attributes
-    ----------
-    texts : tuple of M str
-        Their texts.
-    corners : (M, 2)
-        Top left corners, pixels from the image's left and upper edge.
-    colors : (M, 3)
-        sRGB, 0 to 1.
-    points : (M, 3)
-        Labelled points, scene space.
-    ends : (M, 2)
-        Point of each label that is nearest to the labelled point, pixels.
-    has_line : (M,) bool
-        Whether a leader line is needed.
-    owners : (M,)
-        Index of the ``Labels`` to which each label belongs.
-    n_seen : tuple of int
-        Number of points within the image for each ``Labels``.
-    """
+    """Labels with their positions in the image."""
 
     texts: tuple[str, ...]
+    """Their texts."""
     corners: Ints
+    """(M, 2). Top left corners, pixels from the image's left and upper edge."""
     colors: Floats
+    """(M, 3). sRGB, 0 to 1."""
     points: Floats
+    """(M, 3). Labelled points, scene space."""
     ends: Floats
+    """(M, 2). Point of each label that is nearest to the labelled point, pixels."""
     has_line: Bools
+    """(M,) bool. Whether a leader line is needed."""
     owners: Ints
+    """(M,). Index of the ``Labels`` to which each label belongs."""
     n_seen: tuple[int, ...]
+    """Number of points within the image for each ``Labels``."""
 
     @property
     def n_left_out(self) -> tuple[int, ...]:
@@ -198,14 +152,8 @@ class PlacedLabels:
 def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Segments:
     """Return the leader lines of labels that are not next to their points.
 
-    Parameters
-    ----------
-    placed : PlacedLabels
-        Placed labels from ``place_labels``.
-    view : View
-        The camera's matrices.
-    size : (int, int)
-        Width and height of the image, pixels.
+    ``placed``: placed labels from ``place_labels``. ``size``: width and height of the image,
+    pixels.
     """
     led, scale = placed.has_line, picture_scale(size)
     points, to = placed.points[led], placed.ends[led]

@@ -47,16 +47,7 @@ def joint_annotation(
 ) -> Annotation | None:
     """Return the marks at the joints of all actors; None if there are no joints.
 
-    Parameters
-    ----------
-    actors : sequence of Actor
-        The actors of a scene.
-    options : DisplayOptions
-        Display options that select the marks.
-    size : (int, int)
-        Width and height of the image, pixels.
-    selected : (int, int)
-        Index of an actor and of its highlighted joint; -1 for none.
+    ``size``: width and height of the image, pixels.
     """
     marks = joint_marks_of(actors)
     parts = [part for one in marks for part in _mark_segments(one, options, size, selected)]
@@ -79,21 +70,14 @@ def _mark_segments(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointMarks:
-    """One actor's joints.
-
-    Attributes
-    ----------
-    actor : int
-        Index in the scene.
-    skeleton : Skeleton
-        Skeleton of its figure.
-    matrices : (J, 4, 4)
-        Matrices from joint space to scene space.
-    """
+    """One actor's joints."""
 
     actor: int
+    """Index in the scene."""
     skeleton: Skeleton
+    """Skeleton of its figure."""
     matrices: Floats
+    """(J, 4, 4). Matrices from joint space to scene space."""
 
     @property
     def points(self) -> Floats:
@@ -123,17 +107,7 @@ def joint_marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
 
 
 def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
-    """Return a line from each parent to its child, in the colour of the parent's box.
-
-    Parameters
-    ----------
-    marks : JointMarks
-        Joints of one actor.
-    selected : int
-        The joint whose bones are highlighted, -1 for none.
-    scale : float
-        Scale of the marks relative to their standard size.
-    """
+    """Return a line from each parent to its child, in the colour of the parent's box."""
     points, (children, above) = marks.points, marks.bones
     colors = _colors(marks.skeleton, selected)[above]
     # A dark outline makes each bone visible on any background.
@@ -163,13 +137,6 @@ def axis_segments(marks: JointMarks, scale: float) -> Segments:
 
     Their length is a fraction of the distance to the nearest parent or child, so that the axes of
     finger joints do not overlap.
-
-    Parameters
-    ----------
-    marks : JointMarks
-        Joints of one actor.
-    scale : float
-        Scale of the marks relative to their standard size.
     """
     shown = shown_joints(marks.skeleton)
     points, count = marks.points[shown], len(shown)
@@ -205,15 +172,7 @@ def _colors(skeleton: Skeleton, selected: int) -> Floats:
 
 
 def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
-    """Return the joints' names: the selected joint first, then nearer joints.
-
-    Parameters
-    ----------
-    marks : sequence of JointMarks
-        Joints of all actors.
-    selected : (int, int)
-        Index of an actor and of its selected joint; -1 for none.
-    """
+    """Return the joints' names: the selected joint first, then nearer joints."""
     shown = [shown_joints(one.skeleton) for one in marks]
     texts = [
         printable(labels[joint], _LONGEST_NAME)
@@ -243,23 +202,8 @@ def joint_at(
 ) -> tuple[int, int, Floats] | None:
     """Return the joint whose dot or bone is at a pixel.
 
-    Parameters
-    ----------
-    marks : sequence of JointMarks
-        Joints of all actors.
-    view : View
-        The camera's matrices.
-    size : (int, int)
-        Width and height of the image, pixels.
-    pixel : (float, float)
-        Position from the image's left and upper edges.
-    with_bones : bool
-        Whether bones are drawn; a bone belongs to the joint that rotates it.
-
-    Returns
-    -------
-    (actor, joint, point) or None
-        Indices, and the position (3,) in scene space.
+    ``size``: width and height of the image, pixels. Returns (actor, joint, point) or None, indices,
+    and the position (3,) in scene space.
     """
     best: tuple[float, float, int, int, Floats] | None = None
     for one in marks:

@@ -53,24 +53,17 @@ _PAIRS = 1 << 18  # number of pairs of a rectangle and a dot per batch
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelLayout:
-    """The placed labels.
-
-    Attributes
-    ----------
-    chosen : (M,)
-        Indices of the placed labels, in the order of placement.
-    corners : (M, 2)
-        Top left corners of the labels, integer pixels.
-    ends : (M, 2)
-        Point on each label that is nearest to the labelled point, pixels.
-    has_line : (M,) bool
-        Whether the label needs a leader line because there was no room next to its point.
-    """
+    """The placed labels."""
 
     chosen: Ints
+    """(M,). Indices of the placed labels, in the order of placement."""
     corners: Ints
+    """(M, 2). Top left corners of the labels, integer pixels."""
     ends: Floats
+    """(M, 2). Point on each label that is nearest to the labelled point, pixels."""
     has_line: Bools
+    """(M,) bool. Whether the label needs a leader line because there was no room next to its point.
+    (M,) bool. Whether the label needs a leader line because there was no room next to its point."""
 
 
 def lay_out(
@@ -86,18 +79,9 @@ def lay_out(
     the most room; otherwise at a distance, with a leader line. It is never closer to another point
     than to its own; distances are accurate to a quarter of a pixel.
 
-    Parameters
-    ----------
-    anchors : (N, 2)
-        The points, pixels from the image's left and upper edge.
-    order : (N,)
-        Indices of the labels in the order of placement.
-    sizes : (N, 2)
-        Width and height of the labels, pixels, 1 or more.
-    picture : (int, int)
-        Width and height of the image; labels stay within it.
-    gap : float
-        Pixels between a point and its label.
+    ``anchors``: (N, 2), the points, pixels from the image's left and upper edge. ``order``: (N,),
+    indices of the labels in the order of placement. ``sizes``: (N, 2), width and height of the
+    labels, pixels, 1 or more.
     """
     n_cells = min(_CELLS_PER_LABEL * max(len(order), 1), _MANY_CELLS)
     side = max(int(_CELL_SIDE * gap), math.ceil(math.sqrt(math.prod(picture) / n_cells)))
@@ -204,34 +188,23 @@ class _Taken:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelPlaces:
-    """Candidate positions of labels.
-
-    Attributes
-    ----------
-    labels : (M,)
-        Index of the label to which each position belongs.
-    ranks : (M,)
-        Preference of the position, lower is better.
-    anchors : (M, 2)
-        The labels' points, pixels.
-    low, high : (M, 2)
-        Top left and bottom right corners, integer pixels.
-    ends : (M, 2)
-        Point of each rectangle that is nearest to the labelled point, pixels.
-    own : (M,)
-        Distance between these two points, pixels.
-    has_line : (M,) bool
-        Whether the position requires a leader line.
-    """
+    """Candidate positions of labels."""
 
     labels: Ints
+    """(M,). Index of the label to which each position belongs."""
     ranks: Ints
+    """(M,). Preference of the position, lower is better."""
     anchors: Floats
+    """(M, 2). The labels' points, pixels."""
     low: Ints
     high: Ints
+    """(M, 2). Top left and bottom right corners, integer pixels."""
     ends: Floats
+    """(M, 2). Point of each rectangle that is nearest to the labelled point, pixels."""
     own: Floats
+    """(M,). Distance between these two points, pixels."""
     has_line: Bools
+    """(M,) bool. Whether the position requires a leader line."""
 
     def take(self, rows: NDArray[np.integer[Any]]) -> LabelPlaces:
         """Return a selection of the positions."""
@@ -250,16 +223,8 @@ class LabelPlaces:
 def label_places(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> LabelPlaces:
     """Return all candidate positions of labels that lie within an image.
 
-    Parameters
-    ----------
-    anchors : (N, 2)
-        The points, pixels from the image's left and upper edge.
-    sizes : (N, 2)
-        Width and height of the labels, pixels.
-    picture : (int, int)
-        Width and height of the image.
-    gap : float
-        Pixels between a point and its label.
+    ``anchors``: (N, 2), the points, pixels from the image's left and upper edge. ``sizes``: (N, 2),
+    width and height of the labels, pixels.
     """
     ways = np.tile(_WAYS, (len(_REACHES), 1))
     nearest = anchors[:, None] + gap * np.repeat(_REACHES, len(_WAYS))[:, None] * ways
@@ -280,16 +245,7 @@ def label_places(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: fl
 def crowded(places: LabelPlaces, anchors: Floats, dots: Dots, gap: float) -> Bools:
     """Return a mask of positions certainly too close to other points, or over their own: (M,).
 
-    Parameters
-    ----------
-    places : Places
-        Candidate positions within the image.
-    anchors : (N, 2)
-        The labels' points, pixels.
-    dots : Dots
-        All points.
-    gap : float
-        Pixels between a point and its label.
+    ``anchors``: (N, 2), the labels' points, pixels.
     """
     # 0.7 < 1 / sqrt(2): all points of the enlarged rectangle are within the minimum distance.
     more = 0.7 * _least(places, gap)[:, None]
@@ -302,19 +258,9 @@ def crowded(places: LabelPlaces, anchors: Floats, dots: Dots, gap: float) -> Boo
 def line_pixels(places: LabelPlaces, gap: float) -> tuple[Ints, Bools]:
     """Return the pixels of leader lines from next to the points to just before their labels.
 
-    Parameters
-    ----------
-    places : Places
-        Candidate positions within the image.
-    gap : float
-        Pixels between a point and its label.
-
-    Returns
-    -------
-    pixels : (M, S, 2)
-        Column and row of the pixels, starting from the point.
-    are_part : (M, S) bool
-        Whether each pixel belongs to the line; positions without a line have none.
+    Returns ``pixels``: (M, S, 2), column and row of the pixels, starting from the point;
+    ``are_part``: (M, S) bool, whether each pixel belongs to the line; positions without a line have
+    none.
     """
     start, length = places.anchors[:, None], places.own[:, None]
     steps = np.arange(0.5 * gap, places.own.max(initial=0.0))
@@ -329,16 +275,7 @@ def crowded_lines(
 ) -> Bools:
     """Return a mask of lines that certainly pass too close to other points: (M,).
 
-    Parameters
-    ----------
-    places : Places
-        Positions to which the lines lead.
-    pixels, are_part : (M, S, 2), (M, S) bool
-        Result of ``line_pixels``.
-    dots : Dots
-        All points.
-    gap : float
-        Pixels between a point and its label.
+    ``pixels``, ``are_part``: (M, S, 2), (M, S) bool, result of ``line_pixels``.
     """
     diagonal = math.sqrt(2.0) * dots.cells.side
     if diagonal > _BESIDE_LINE * gap:
@@ -351,17 +288,7 @@ def crowded_lines(
 
 
 def clear_places(places: LabelPlaces, dots: Dots, gap: float) -> LabelPlaces:
-    """Return the positions that are far enough from other points, best first for each label.
-
-    Parameters
-    ----------
-    places : Places
-        Candidate positions within the image.
-    dots : Dots
-        All points.
-    gap : float
-        Pixels between a point and its label.
-    """
+    """Return the positions that are far enough from other points, best first for each label."""
     clear = np.full(len(places.labels), np.inf)
     for layer in range(dots.n_layers):
         nearest, beside_line = _clearances(places, dots, layer, gap)
@@ -402,13 +329,9 @@ def _clearances(places: LabelPlaces, dots: Dots, layer: int, gap: float) -> tupl
 class Dots:
     """Points sorted into grid cells.
 
-    Parameters
-    ----------
-    cells : Cells
-        Grid over the image.
-    points : (N, 2)
-        Pixels from the image's left and upper edge. Points within the same quarter of a pixel
-        are merged: otherwise all joints of a distant figure would be compared with each other.
+    ``points``: (N, 2), pixels from the image's left and upper edge. Points within the same quarter
+    of a pixel are merged: otherwise all joints of a distant figure would be compared with each
+    other.
     """
 
     def __init__(self, cells: Cells, points: Floats) -> None:
@@ -453,19 +376,9 @@ class Dots:
     def pairs(self, low: Floats, high: Floats, layer: int) -> Iterator[tuple[Ints, Floats]]:
         """Yield batches of pairs of a rectangle and a dot of one layer in the cells it touches.
 
-        Parameters
-        ----------
-        low, high : (M, 2)
-            Corners of the rectangles.
-        layer : int
-            Index of the layer, less than ``n_layers``.
-
-        Yields
-        ------
-        owners : (P,)
-            Indices of rectangles.
-        dots : (P, 2)
-            A point in or near each of these rectangles, pixels.
+        ``low``, ``high``: (M, 2), corners of the rectangles. ``layer``: index of the layer, less
+        than ``n_layers``. Yields ``owners``: (P,), indices of rectangles; ``dots``: (P, 2), a point
+        in or near each of these rectangles, pixels.
         """
         points, begins = self._layers[layer]
         first, after = self.cells.touching(low, high)
@@ -483,17 +396,7 @@ class Dots:
 class Cells:
     """The cells: 1 to ``n`` per axis within the image; 0 and ``n + 1`` are outside it.
 
-    Parameters
-    ----------
-    picture : (int, int)
-        Width and height, pixels.
-    side : int
-        Side length of a cell, pixels.
-
-    Attributes
-    ----------
-    shape : (int, int)
-        Rows and columns of an array with one element per cell.
+    ``picture``: width and height, pixels. ``side``: side length of a cell, pixels.
     """
 
     def __init__(self, picture: tuple[int, int], side: int) -> None:
@@ -533,12 +436,8 @@ def summed(table: Ints) -> Ints:
 def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
     """Return the sums over rectangles of cells: (...,).
 
-    Parameters
-    ----------
-    sums : (rows + 1, columns + 1)
-        Result of ``summed``.
-    first, after : (..., 2)
-        Column and row of the first cell and the cell after the last; empty if they are equal.
+    ``sums``: (rows + 1, columns + 1), result of ``summed``. ``first``, ``after``: (..., 2), column
+    and row of the first cell and the cell after the last; empty if they are equal.
     """
     flat, width = sums.ravel(), sums.shape[1]
     low, high = first[..., 1] * width, after[..., 1] * width

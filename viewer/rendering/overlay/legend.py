@@ -56,31 +56,21 @@ _areas: Memo[Figure, Floats] = Memo()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Legend:
-    """The legend of a scalar quantity.
-
-    Attributes
-    ----------
-    title, unit : str
-        Title and unit of the values; the unit may be empty.
-    colors : (N, 4) uint8
-        Colours of the bar from left to right, sRGB; empty for named items.
-    ticks : tuple of LegendTick
-        Round numbers along the bar.
-    entries : tuple of LegendEntry
-        Named items, largest area first.
-    lines : tuple of float
-        Positions of isolines on the bar.
-    note : str
-        Line below the bar: the range of the values, or the reason why there is nothing to show.
-    """
+    """The legend of a scalar quantity."""
 
     title: str
     unit: str = ""
+    """Title and unit of the values; the unit may be empty."""
     colors: Bytes = field(default_factory=lambda: np.zeros((0, 4), dtype=np.uint8))
+    """(N, 4) uint8. Colours of the bar from left to right, sRGB; empty for named items."""
     ticks: tuple[LegendTick, ...] = ()
+    """Round numbers along the bar."""
     entries: tuple[LegendEntry, ...] = ()
+    """Named items, largest area first."""
     lines: tuple[float, ...] = ()
+    """Positions of isolines on the bar."""
     note: str = ""
+    """Line below the bar: the range of the values, or the reason why there is nothing to show."""
 
     @property
     def heading(self) -> str:
@@ -106,21 +96,14 @@ class LegendEntry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColoredFigure:
-    """A figure with the values of a scalar quantity and their colours.
-
-    Attributes
-    ----------
-    figure : Figure
-        A figure with a mesh.
-    numbers : (V,)
-        Result of ``viewer.rig.scalars.compute``.
-    look : ScalarLook
-        Colours for this figure.
-    """
+    """A figure with the values of a scalar quantity and their colours."""
 
     figure: Figure
+    """A figure with a mesh."""
     numbers: Floats
+    """(V,). Result of ``viewer.rig.scalars.compute``."""
     look: ScalarLook
+    """Colours for this figure."""
 
 
 def legend_of(
@@ -128,16 +111,8 @@ def legend_of(
 ) -> Legend:
     """Return the legend of a scalar quantity.
 
-    Parameters
-    ----------
-    name : str
-        Name of the quantity.
-    having : sequence of ColoredFigure
-        The drawn figures that have the quantity; the first figure provides title and unit.
-    skinning : Skinning
-        Skinning of the figures.
-    figures : sequence of Figure
-        All figures of the scene, including those not drawn; at least one.
+    ``having``: the drawn figures that have the quantity; the first figure provides title and unit.
+    ``figures``: all figures of the scene, including those not drawn; at least one.
     """
     if not having:
         return _empty(name, skinning, figures)
@@ -227,13 +202,6 @@ def _vertex_areas(figure: Figure) -> Floats:
 def round_ticks(low: float, high: float, signed: bool = False) -> tuple[LegendTick, ...]:
     """Return at most six round numbers within a range: multiples of 1, 2 or 5 times 10 to the n.
 
-    Parameters
-    ----------
-    low, high : float
-        Ends of the range, low < high.
-    signed : bool
-        Whether numbers above 0 have a plus sign.
-
     >>> [tick.text for tick in round_ticks(0.0, 12.3)]
     ['0', '5', '10']
     """
@@ -260,21 +228,14 @@ def _text(number: float, signed: bool = False) -> str:
 
 @dataclass(frozen=True, slots=True)
 class LegendColumns:
-    """The items of each column.
-
-    Attributes
-    ----------
-    counts : tuple of int
-        Number of items per column, from left to right; the items fill the columns in order.
-    widths : tuple of float
-        Width of each column.
-    left_out : int
-        Number of omitted items, which a line "and N more" below the last column mentions.
-    """
+    """The items of each column."""
 
     counts: tuple[int, ...]
+    """Number of items per column, from left to right; the items fill the columns in order."""
     widths: tuple[float, ...]
+    """Width of each column."""
     left_out: int = 0
+    """Number of omitted items, which a line "and N more" below the last column mentions."""
 
     @property
     def rows(self) -> int:
@@ -286,20 +247,9 @@ class LegendColumns:
 def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendColumns:
     """Split items into as few columns as possible; omitted items are counted.
 
-    Parameters
-    ----------
-    widths : sequence of float
-        Width of each item's swatch and name, with the gap to the next column, in any unit.
-    rows : int
-        Maximum number of lines per column, 1 or more.
-    width : float
-        Maximum total width of all columns, in the same unit. The first column is used even if it is
-        wider.
-
-    Returns
-    -------
-    LegendColumns
-        Columns of about equal length if all items fit, otherwise full columns.
+    ``widths``: width of each item's swatch and name, with the gap to the next column, in any unit.
+    ``width``: maximum total width of all columns, in the same unit. The first column is used even
+    if it is wider. Returns columns of about equal length if all items fit, otherwise full columns.
 
     >>> legend_columns([10.0] * 5, 4, 30.0).counts
     (3, 2)
@@ -345,19 +295,8 @@ def legend_pixels(legend: Legend, size: tuple[int, int], is_light: bool = False)
     Many named items are set in several columns, then in smaller text, then in wider columns; items
     that still do not fit are counted.
 
-    Parameters
-    ----------
-    legend : Legend
-        The legend.
-    size : (int, int)
-        Width and height of the image that contains the legend, pixels.
-    is_light : bool
-        Whether the legend is dark text on a light panel, for light backgrounds.
-
-    Returns
-    -------
-    (H, W, 4) uint8 or None
-        sRGB with straight alpha, first row at the top; None if there is no room for it.
+    ``size``: width and height of the image that contains the legend, pixels. Returns (H, W, 4)
+    uint8 or None, sRGB with straight alpha, first row at the top; None if there is no room for it.
     """
     wanted = min(size[1] / _LETTERS_PER_HEIGHT, size[0] / _LETTERS_PER_WIDTH)
     letters = round(min(max(wanted, _TEXT_HEIGHTS[0]), _TEXT_HEIGHTS[1]))

@@ -21,61 +21,38 @@ HIDDEN = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """Segments in drawing order; segments of length 0 are dots.
-
-    Attributes
-    ----------
-    starts, ends : (N, 3)
-        Scene space.
-    colors : (N, 4)
-        sRGB and opacity, 0 to 1.
-    widths : (N,)
-        Pixels.
-    """
+    """Segments in drawing order; segments of length 0 are dots."""
 
     starts: Floats
     ends: Floats
+    """(N, 3). Scene space."""
     colors: Floats
+    """(N, 4). sRGB and opacity, 0 to 1."""
     widths: Floats
+    """(N,). Pixels."""
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentStyle:
-    """Style of segments.
-
-    Attributes
-    ----------
-    on_top : bool
-        Whether segments are drawn over everything drawn before.
-    hidden : float
-        Opacity of hidden parts, 0 to 1.
-    lift : float
-        Fraction of the distance to the eye by which segments are moved forward, so that segments
-        on a surface are visible.
-    border : float
-        Width of the border around each segment, pixels.
-    border_color : (r, g, b)
-        sRGB, 0 to 1.
-    """
+    """Style of segments."""
 
     on_top: bool = False
+    """Whether segments are drawn over everything drawn before."""
     hidden: float = HIDDEN
+    """Opacity of hidden parts, 0 to 1."""
     lift: float = 0.0
+    """Fraction of the distance to the eye by which segments are moved forward, so that segments on
+    a surface are visible."""
     border: float = 0.0
+    """Width of the border around each segment, pixels."""
     border_color: Color = (0.0, 0.0, 0.0)
+    """(r, g, b). sRGB, 0 to 1."""
 
 
 def dots(points: Floats, colors: Floats, diameter: float) -> Segments:
     """Return round dots.
 
-    Parameters
-    ----------
-    points : (N, 3)
-        Scene space.
-    colors : (N, 4) or (4,)
-        sRGB and opacity, 0 to 1.
-    diameter : float
-        Pixels.
+    ``points``: (N, 3), scene space. ``colors``: (N, 4) or (4,), sRGB and opacity, 0 to 1.
     """
     colors = np.broadcast_to(colors, (len(points), 4))
     return Segments(points, points, colors, np.full(len(points), diameter))
@@ -92,15 +69,7 @@ def joined(parts: Sequence[Segments]) -> Segments:
 
 
 class SegmentPass:
-    """Pass that draws segments.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-    """
+    """Pass that draws segments."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context = context
@@ -113,16 +82,7 @@ class SegmentPass:
     ) -> None:
         """Draw segments into the bound framebuffer.
 
-        Parameters
-        ----------
-        segments : Segments
-            In drawing order.
-        view : View
-            The camera's matrices.
-        size : (int, int)
-            Width and height of the image, pixels.
-        style : SegmentStyle
-            Style of the segments.
+        ``size``: width and height of the image, pixels.
         """
         if not len(segments.widths):
             return

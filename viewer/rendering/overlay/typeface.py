@@ -62,10 +62,7 @@ class Typeface:
 
     Letters that no font contains are written as escape sequences.
 
-    Parameters
-    ----------
-    letters : int
-        Height of the text, pixels.
+    ``letters``: height of the text, pixels.
     """
 
     def __init__(self, letters: int) -> None:
@@ -91,18 +88,8 @@ class Typeface:
     ) -> None:
         """Draw a text, with an outline of a given width in pixels.
 
-        Parameters
-        ----------
-        draw : ImageDraw
-            Draws on an image.
-        place : (float, float)
-            Upper left corner: left end of the text at the height of the ascender, pixels.
-        text : str
-            One line.
-        fill : colour
-            Colour in the mode of the image.
-        rim : int
-            Width of the outline, pixels.
+        ``place``: upper left corner: left end of the text at the height of the ascender, pixels.
+        ``rim``: width of the outline, pixels.
         """
         (x, top), base = place, self._fonts[0]
         for font, part in self._runs(text):
@@ -217,10 +204,7 @@ def _installed(folders: tuple[Path, ...]) -> tuple[Path, ...]:
 class Lettering:
     """Rasteriser of text in one font size.
 
-    Parameters
-    ----------
-    letters : int
-        Height of the text, pixels.
+    ``letters``: height of the text, pixels.
     """
 
     def __init__(self, letters: int) -> None:
@@ -264,12 +248,8 @@ class Lettering:
 def shelves(sizes: Ints, width: int, tallest: int) -> Ints:
     """Return positions of rectangles of equal height, packed in rows: (M, 2), M <= N.
 
-    Parameters
-    ----------
-    sizes : (N, 2)
-        Widths, at most ``width``, and heights, pixels.
-    width, tallest : int
-        Size of the image; rectangles that do not fit are omitted.
+    ``sizes``: (N, 2), widths, at most ``width``, and heights, pixels. ``width``, ``tallest``: size
+    of the image; rectangles that do not fit are omitted.
     """
     corners: list[tuple[int, int]] = []
     x = y = 0

@@ -26,15 +26,7 @@ _MOST_TEXTS = 1000  # number of texts up to which unused texts stay in the textu
 
 
 class AnnotationPass:
-    """Pass that draws annotations over the contents of the bound framebuffer.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader programs.
-    """
+    """Pass that draws annotations over the contents of the bound framebuffer."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.segments = SegmentPass(context, programs)
@@ -44,19 +36,8 @@ class AnnotationPass:
     def draw(self, annotation: Annotation, view: View, size: tuple[int, int]) -> None:
         """Draw the segments of one annotation.
 
-        Parameters
-        ----------
-        annotation : Annotation
-            The annotation to draw.
-        view : View
-            The camera's matrices.
-        size : (int, int)
-            Width and height of the image, pixels.
-
-        Raises
-        ------
-        RenderError
-            If there is not enough graphics memory.
+        ``size``: width and height of the image, pixels. Raises ``RenderError`` if there is not
+        enough graphics memory.
         """
         self.segments.draw(annotation.segments, view, size, annotation.style)
 
@@ -65,25 +46,9 @@ class AnnotationPass:
     ) -> list[tuple[int, int]]:
         """Draw the labels of several annotations without overlap.
 
-        Parameters
-        ----------
-        annotations : sequence of Annotation
-            All annotations of the image.
-        view : View
-            The camera's matrices.
-        size : (int, int)
-            Width and height of the image, pixels.
-
-        Returns
-        -------
-        list of (int, int)
-            For each annotation, the number of labels omitted for lack of room next to their points,
-            and the number of labels within the image.
-
-        Raises
-        ------
-        RenderError
-            If there is not enough graphics memory.
+        ``size``: width and height of the image, pixels. Returns for each annotation, the number of
+        labels omitted for lack of room next to their points, and the number of labels within the
+        image. Raises ``RenderError`` if there is not enough graphics memory.
         """
         having = [row for row, one in enumerate(annotations) if one.labels is not None]
         labels = [one.labels for one in annotations if one.labels is not None]
@@ -107,15 +72,7 @@ class AnnotationPass:
 
 
 class _LabelPass:
-    """Pass that draws labels.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-    """
+    """Pass that draws labels."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context = context
@@ -136,18 +93,9 @@ class _LabelPass:
     ) -> None:
         """Draw texts over the bound framebuffer's contents.
 
-        Parameters
-        ----------
-        texts : sequence of N str
-            The texts; those that do not fit into the texture are omitted.
-        corners : (N, 2)
-            Top left corners, pixels from the image's left and upper edge.
-        colors : (N, 3)
-            Colours of the text, sRGB, 0 to 1.
-        lettering : Lettering
-            The font.
-        size : (int, int)
-            Width and height of the image, pixels.
+        ``texts``: the texts; those that do not fit into the texture are omitted. ``corners``: (N,
+        2), top left corners, pixels from the image's left and upper edge. ``colors``: (N, 3),
+        colours of the text, sRGB, 0 to 1. ``size``: width and height of the image, pixels.
         """
         if not texts:
             return

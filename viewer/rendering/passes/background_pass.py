@@ -31,15 +31,7 @@ _PARALLEL_FOV = 35.0
 
 
 class BackgroundPass:
-    """Pass that clears a target and fills it with its background.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader programs.
-    """
+    """Pass that clears a target and fills it with its background."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -50,12 +42,8 @@ class BackgroundPass:
     def draw(self, target: Target, background: str) -> None:
         """Clear the depth and colour of a target, which must be bound.
 
-        Parameters
-        ----------
-        target : Target
-            The target.
-        background : str
-            An entry of ``BACKGROUNDS`` or ``"#rrggbb"``; ``"environment"`` clears to transparent.
+        ``background``: an entry of ``BACKGROUNDS`` or ``"#rrggbb"``; ``"environment"`` clears to
+        transparent.
         """
         if background != "gradient":
             color = _CLEARED.get(background) or (*parse_color(background), 1.0)
@@ -130,17 +118,7 @@ class _Picture:
 
 
 class BackdropPass:
-    """Pass that draws the studio.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader programs.
-    studio : Studio
-        The environment to show.
-    """
+    """Pass that draws the studio."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, studio: Studio) -> None:
         self.context, self.studio = context, studio

@@ -17,15 +17,7 @@ _UNIT = 0
 
 
 class CameraImagePass:
-    """Pass that draws images without lens distortion; each camera's last image stays uploaded.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-    """
+    """Pass that draws images without lens distortion; each camera's last image stays uploaded."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context = context
@@ -38,16 +30,8 @@ class CameraImagePass:
     ) -> None:
         """Draw the image of the camera through which the scene is seen, behind everything.
 
-        Parameters
-        ----------
-        camera : CameraView
-            The camera.
-        image : CameraImage
-            Image of the camera.
-        size : (int, int)
-            Width and height of the image, pixels.
-        brightness : float
-            Factor on the image's colours, 0 to 1.
+        ``size``: width and height of the image, pixels. ``brightness``: factor on the image's
+        colours, 0 to 1.
         """
         width, height = picture_size(camera)
         own, aspect = width / height, size[0] / size[1]

@@ -28,38 +28,20 @@ STYLES = ("solid", "translucent", "wireframe")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ghost:
-    """A visible surface that cannot be picked.
-
-    Attributes
-    ----------
-    figure : Figure
-        Figure with a mesh, which is drawn unposed.
-    placement : (4, 4)
-        Matrix from figure space to scene space.
-    style : str
-        One of ``STYLES``.
-    color : (r, g, b)
-        Linear.
-    """
+    """A visible surface that cannot be picked."""
 
     figure: Figure
+    """Figure with a mesh, which is drawn unposed."""
     placement: Floats
+    """(4, 4). Matrix from figure space to scene space."""
     style: str = "translucent"
+    """One of ``STYLES``."""
     color: Color = GHOST_COLOR
+    """(r, g, b). Linear."""
 
 
 class GhostPass:
-    """Pass that draws ghosts; the mesh is uploaded when a different ghost is drawn.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader programs.
-    mesh_pass : MeshPass
-        Draws the surface.
-    """
+    """Pass that draws ghosts; the mesh is uploaded when a different ghost is drawn."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, mesh_pass: MeshPass) -> None:
         self.context, self.programs, self._mesh_pass = context, programs, mesh_pass
@@ -70,19 +52,7 @@ class GhostPass:
     def draw(self, ghost: Ghost, view: View, options: DisplayOptions) -> None:
         """Draw a ghost over everything drawn so far.
 
-        Parameters
-        ----------
-        ghost : Ghost
-            The ghost.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Display options of the scene; its lights apply, textures and scalar quantities do not.
-
-        Raises
-        ------
-        RenderError
-            If there is not enough graphics memory.
+        Raises ``RenderError`` if there is not enough graphics memory.
         """
         posed = self._uploaded(ghost.figure)
         xray = ghost.style == "translucent"

@@ -33,15 +33,7 @@ def grid_step(box: Floats) -> float:
 
 
 class GroundPass:
-    """Pass that draws the ground grid.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader programs.
-    """
+    """Pass that draws the ground grid."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -51,15 +43,8 @@ class GroundPass:
     def draw_grid(self, view: View, box: Floats, background: str) -> None:
         """Draw the grid under a box.
 
-        Parameters
-        ----------
-        view : View
-            The camera's matrices.
-        box : (2, 3)
-            Bounds of the objects on the ground, scene space, which define the grid's height, step
-            and extent.
-        background : str
-            Background of the image; lines are light on a dark background.
+        ``box``: (2, 3), bounds of the objects on the ground, scene space, which define the grid's
+        height, step and extent.
         """
         program = self.programs.drawing("ground")
         step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)

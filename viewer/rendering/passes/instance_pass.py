@@ -73,17 +73,7 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
     culled, either all or none of the actors of a group are mirrored, and actors with mirrored
     joints are drawn individually.
 
-    Parameters
-    ----------
-    actors : sequence of Actor
-        Actors whose meshes are drawn.
-    options : DisplayOptions
-        Display options.
-
-    Returns
-    -------
-    list of list of Actor
-        Groups of at least ``FEWEST``.
+    Returns groups of at least ``FEWEST``.
     """
     if options.show == "binding" or options.shading == "scalar":
         return []
@@ -130,20 +120,7 @@ def draw_instances(
 ) -> None:
     """Draw the surfaces of actors that share a mesh.
 
-    Parameters
-    ----------
-    programs : Programs
-        Provides the shading programs.
-    instances : InstanceBuffers
-        Updated buffers.
-    actors : sequence of Actor
-        The actors with which the buffers were updated, in that order.
-    view : View
-        The camera's matrices.
-    options : DisplayOptions
-        Shading and lights.
-    blended : bool
-        Whether to draw the blended triangles instead of the opaque ones.
+    ``blended``: whether to draw the blended triangles instead of the opaque ones.
     """
     program = programs.drawing(
         "instance",
@@ -193,23 +170,8 @@ def draw_instance_shapes(
 class InstanceBuffers:
     """Matrices, placements and colours of actors that share a figure and a shape.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    mesh : MeshBuffers
-        Mesh of a figure with skeleton and skin.
-    way : str
-        Method of summing pose correctives, see ``rest_buffers``.
-
-    Attributes
-    ----------
-    count : int
-        Number of actors, A.
-    n_updates : int
-        Number of matrix uploads.
-    is_mirrored : bool
-        Whether the placements are reflections; all actors agree if faces are culled.
+    ``is_mirrored``: whether the placements are reflections; all actors agree if faces are culled.
+    ``way``: method of summing pose correctives, see ``rest_buffers``.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
@@ -234,17 +196,7 @@ class InstanceBuffers:
     def update(self, poses: Sequence[Pose], how: Skinning) -> None:
         """Upload the matrices of poses that changed.
 
-        Parameters
-        ----------
-        poses : sequence of A Pose
-            Poses, all with the same shape.
-        how : Skinning
-            Method and influences.
-
-        Raises
-        ------
-        RenderError
-            If there is not enough graphics memory.
+        Raises ``RenderError`` if there is not enough graphics memory.
         """
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
         skinning_key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())

@@ -71,12 +71,7 @@ class SkeletonBuffers:
     def update(self, pose: Pose, options: DisplayOptions) -> None:
         """Upload the joints' matrices if the pose changed.
 
-        Parameters
-        ----------
-        pose : Pose
-            DOFs in lengths and radians.
-        options : DisplayOptions
-            Style of the skeleton.
+        ``pose``: DOFs in lengths and radians.
         """
         if self.is_current(pose, options):
             return
@@ -95,15 +90,7 @@ class SkeletonBuffers:
 
 
 class JointPass:
-    """Pass that draws skeletons.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-    """
+    """Pass that draws skeletons."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -122,25 +109,8 @@ class JointPass:
     ) -> None:
         """Draw a skeleton.
 
-        Parameters
-        ----------
-        skeleton : SkeletonBuffers
-            Updated buffers.
-        placement : (4, 4)
-            Matrix from figure space to scene space.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Style and lights.
-        selected : int
-            The joint to highlight, -1 for none.
-        opacity : float
-            Below 1, the skeleton is one translucent layer.
-        color : (r, g, b), optional
-            Colour of all joints, linear; one colour per joint if omitted.
-        overlays : bool
-            Draw a translucent skeleton over everything drawn before: otherwise boxes that enclose
-            the skin would hide it.
+        ``placement``: (4, 4), matrix from figure space to scene space. ``color``: (r, g, b), colour
+        of all joints, linear; one colour per joint if omitted.
         """
         overlays = overlays and opacity < 1.0
         view = in_front(view) if overlays else view

@@ -21,17 +21,7 @@ _CUBE_SIZE = 0.006  # half the side length of a cube, relative to the figure's s
 
 
 class KeypointBuffers:
-    """Cubes of one actor's keypoints.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    figure : Figure
-        Figure with keypoints and a mesh.
-    cube : moderngl.Buffer
-        Vertices of a cube, shared by all boxes.
-    """
+    """Cubes of one actor's keypoints."""
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
         assert figure.keypoints is not None  # checked by the caller
@@ -54,13 +44,7 @@ class KeypointBuffers:
 
 
 class KeypointPass:
-    """Pass that draws keypoints with the shader program of the joints.
-
-    Parameters
-    ----------
-    joints : JointPass
-        Provides the program and the cube.
-    """
+    """Pass that draws keypoints with the shader program of the joints."""
 
     def __init__(self, joints: JointPass) -> None:
         self.joints = joints
@@ -75,18 +59,7 @@ class KeypointPass:
     ) -> None:
         """Draw the markers, in front of everything.
 
-        Parameters
-        ----------
-        points : KeypointBuffers
-            Updated buffers.
-        placement : (4, 4)
-            Matrix from figure space to scene space.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Lights.
-        opacity : float
-            Opacity of the markers.
+        ``placement``: (4, 4), matrix from figure space to scene space.
         """
         program = self.joints.programs.drawing("joint", "phong", fragment="mesh")
         draw_boxes(program, points.boxes, placement, in_front(view), options, opacity=opacity)

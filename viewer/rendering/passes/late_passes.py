@@ -46,19 +46,7 @@ if TYPE_CHECKING:
 
 
 class LatePasses:
-    """Passes that many scenes do not need, each created on demand.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        OpenGL 3.3 or newer.
-    programs : Programs
-        Shader programs shared by all passes.
-    mesh_pass, joint_pass : MeshPass, JointPass
-        Passes that some of the optional passes use for drawing.
-    buffers : ActorBuffers
-        Uploaded buffers.
-    """
+    """Passes that many scenes do not need, each created on demand."""
 
     def __init__(
         self,

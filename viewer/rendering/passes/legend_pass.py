@@ -13,15 +13,7 @@ _MARGIN = 0.014  # margin of the legend, as a fraction of the image height
 
 
 class LegendPass:
-    """Pass that draws a legend over everything else.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-    """
+    """Pass that draws a legend over everything else."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context = context
@@ -33,19 +25,7 @@ class LegendPass:
     def draw(self, legend: Legend, size: tuple[int, int], is_light: bool = False) -> bool:
         """Draw a legend into the upper left corner of the bound framebuffer.
 
-        Parameters
-        ----------
-        legend : Legend
-            The legend; its texture is cached until a different one is drawn.
-        size : (int, int)
-            Width and height of the image, pixels.
-        is_light : bool
-            Whether the background is light, which the legend then is too.
-
-        Returns
-        -------
-        bool
-            Whether there was room for the legend.
+        ``size``: width and height of the image, pixels.
         """
         wanted = legend, size, is_light
         if self._drawn is None or self._drawn[0] is not legend or self._drawn[1:] != wanted[1:]:

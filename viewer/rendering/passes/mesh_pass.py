@@ -38,15 +38,7 @@ _WIDTH_SLOT = TEXTURES.index("occlusion_texture")  # texture of an outline's wid
 
 
 class MeshPass:
-    """Pass that draws posed meshes with any shading.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shading programs.
-    """
+    """Pass that draws posed meshes with any shading."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -65,20 +57,8 @@ class MeshPass:
     ) -> None:
         """Draw the surface: its opaque or its blended triangles.
 
-        Parameters
-        ----------
-        mesh : PosedMesh
-            Updated buffers.
-        placement : (4, 4)
-            Matrix from figure space to scene space.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Shading and lights.
-        color : (r, g, b), optional
-            Colour of untextured surfaces, linear; ``SKIN_COLOR`` if omitted.
-        opacity : float
-            Factor on the opacity of surfaces.
+        ``placement``: (4, 4), matrix from figure space to scene space. ``color``: (r, g, b), colour
+        of untextured surfaces, linear; ``SKIN_COLOR`` if omitted.
         """
         look = mesh.scalars.look if options.shading == "scalar" else None
         corners = "corners" if look is not None else ""
@@ -301,14 +281,7 @@ def draw_layer(
 ) -> None:
     """Draw surfaces; only the nearest layer if they are translucent.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    options : DisplayOptions
-        Display options that determine the opacity of surfaces.
-    draw : callable
-        Draws the surfaces; called twice if they are translucent.
+    ``draw``: draws the surfaces; called twice if they are translucent.
     """
     if surface_opacity(options) == 1.0:
         draw()

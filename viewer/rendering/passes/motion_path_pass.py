@@ -44,13 +44,7 @@ def path_colors(count: int) -> Floats:
 
 
 class MotionPathBuffers:
-    """Segments of one actor's paths, recomputed only if their inputs changed.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    """
+    """Segments of one actor's paths, recomputed only if their inputs changed."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
@@ -140,15 +134,7 @@ def _place(actor: Actor) -> tuple[bytes, float]:
 
 
 class MotionPathPass:
-    """Pass that draws motion paths.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-    """
+    """Pass that draws motion paths."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -163,18 +149,8 @@ class MotionPathPass:
     ) -> None:
         """Draw one actor's paths, with hidden parts faint.
 
-        Parameters
-        ----------
-        paths : MotionPathBuffers
-            Updated buffers.
-        placement : (4, 4)
-            Matrix from figure space to scene space.
-        view : View
-            The camera's matrices.
-        size : (int, int)
-            Width and height of the image, pixels.
-        at : Moment
-            The drawn part of the paths.
+        ``placement``: (4, 4), matrix from figure space to scene space. ``size``: width and height
+        of the image, pixels.
         """
         if not paths.count:
             return

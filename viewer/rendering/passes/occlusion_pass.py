@@ -19,14 +19,7 @@ _RADIUS = 0.09  # radius within which surfaces occlude, relative to a figure's s
 class OcclusionPass:
     """Pass that computes how much ambient light reaches each pixel, at half resolution.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the programs.
-    size : (int, int)
-        Width and height of the image, pixels.
+    ``size``: width and height of the image, pixels.
     """
 
     def __init__(
@@ -62,18 +55,9 @@ class OcclusionPass:
     ) -> Occlusion:
         """Compute the occlusion of an image.
 
-        Parameters
-        ----------
-        draw : callable
-            Draws all surfaces, with a view and a fragment shader.
-        view : View
-            The camera's matrices.
-        size : float
-            Size of a figure in scene units, which determines the radius.
-        phase : float
-            Phase of the direction pattern, 0 to 1: different for each pass of an image.
-        strength : float
-            Strength of the occlusion, 0 to 1.
+        ``size``: size of a figure in scene units, which determines the radius. ``phase``: phase of
+        the direction pattern, 0 to 1: different for each pass of an image. ``strength``: strength
+        of the occlusion, 0 to 1.
         """
         halved = self._halved(view)
         context = self.context

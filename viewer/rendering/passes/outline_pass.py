@@ -41,24 +41,16 @@ _MOST = 12  # maximum search radius around a mask, pixels
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlined:
-    """An outlined part of the scene.
-
-    Attributes
-    ----------
-    actor : int
-        Index in the scene.
-    joint : int
-        Joint of the actor, outlined if the skeleton is drawn; -1 for the whole actor.
-    points : (N, 3)
-        Points in scene space, outlined instead of the actor and joint if there are any.
-    is_hovered : bool
-        Whether it lies under the pointer, rather than being selected.
-    """
+    """An outlined part of the scene."""
 
     actor: int
+    """Index in the scene."""
     joint: int = -1
+    """Joint of the actor, outlined if the skeleton is drawn; -1 for the whole actor."""
     points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(N, 3). Points in scene space, outlined instead of the actor and joint if there are any."""
     is_hovered: bool = False
+    """Whether it lies under the pointer, rather than being selected."""
 
     def key(self) -> tuple[object, ...]:
         """Return a key that identifies the outline in an unchanged scene."""
@@ -66,17 +58,7 @@ class Outlined:
 
 
 class OutlinePass:
-    """Pass that draws outlines over everything, even over objects in front of the outlined parts.
-
-    Parameters
-    ----------
-    programs : Programs
-        Provides the shader programs.
-    meshes, points : MeshPass, PointPass
-        The passes that draw the scene's surfaces and points.
-    buffers : ActorBuffers
-        The buffers uploaded for drawing.
-    """
+    """Pass that draws outlines over everything, even objects in front of the outlined parts."""
 
     def __init__(
         self,
@@ -105,26 +87,9 @@ class OutlinePass:
     ) -> None:
         """Draw outlines into a target; its framebuffer is bound afterwards.
 
-        Parameters
-        ----------
-        outlined : sequence of Outlined
-            Parts of the scene.
-        scene : Scene
-            The drawn scene.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Display options.
-        target : Target
-            The image.
-        is_layer : bool
-            Whether to replace the target's colours where there are lines, with straight instead of
-            premultiplied alpha.
-
-        Raises
-        ------
-        RenderError
-            If the driver has no room for the masks.
+        ``is_layer``: whether to replace the target's colours where there are lines, with straight
+        instead of premultiplied alpha. Raises ``RenderError`` if the driver has no room for the
+        masks.
         """
         self._make(target.size, options.samples)
         assert self._mask is not None  # ``_make`` created it

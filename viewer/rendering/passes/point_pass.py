@@ -48,15 +48,8 @@ def point_radii(points: Floats) -> Floats:
     Files do not state their unit, so radii are relative to the size of the point set, and smaller
     if points are close together, as on hands and faces.
 
-    Parameters
-    ----------
-    points : (F, K, 4)
-        x, y, z and confidence in a sample of frames.
-
-    Returns
-    -------
-    (K,)
-        Figure units, medians over the frames with visible points; 0 if there are none.
+    ``points``: (F, K, 4), x, y, z and confidence in a sample of frames. Returns (K,), figure units,
+    medians over the frames with visible points; 0 if there are none.
     """
     sizes, gaps = [], []
     for frame in points:
@@ -109,17 +102,8 @@ def _radii_of(actor: Actor, points: Floats) -> Floats:
 class PointBuffers:
     """Capsules of one actor's keypoints and limbs.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    layout : PointLayout
-        Keypoints and limbs of the figure.
-
-    Attributes
-    ----------
-    elements : (N,) int32
-        Index of each instance: a keypoint, or a limb plus the number of keypoints.
+    ``elements``: (N,) int32, index of each instance: a keypoint, or a limb plus the number of
+    keypoints.
     """
 
     def __init__(self, context: moderngl.Context, layout: PointLayout) -> None:
@@ -137,16 +121,8 @@ class PointBuffers:
     def update(self, actor: Actor, placement: Floats, view: View, options: DisplayOptions) -> None:
         """Upload the actor's current points, with translucent capsules sorted from back to front.
 
-        Parameters
-        ----------
-        actor : Actor
-            An actor with points.
-        placement : (4, 4)
-            Matrix from figure space to scene space.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Points below its minimum confidence, and limbs that end at such points, are omitted.
+        ``placement``: (4, 4), matrix from figure space to scene space. ``options``: points below
+        its minimum confidence, and limbs that end at such points, are omitted.
         """
         least, translucency = options.min_confidence, options.opacity * actor.opacity
         points = actor.points
@@ -212,17 +188,8 @@ class PointBuffers:
 class PointPass:
     """Pass that draws keypoints and limbs.
 
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the shader program.
-
-    Attributes
-    ----------
-    capsule, coarse : (moderngl.Buffer, moderngl.Buffer)
-        Vertices and indices, shared by all instances; the coarse ones are for many points.
+    ``capsule``, ``coarse``: (moderngl.Buffer, moderngl.Buffer), vertices and indices, shared by all
+    instances; the coarse ones are for many points.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -246,18 +213,7 @@ class PointPass:
     ) -> None:
         """Draw one actor's keypoints.
 
-        Parameters
-        ----------
-        points : PointBuffers
-            Updated buffers.
-        placement : (4, 4)
-            Matrix from figure space to scene space.
-        view : View
-            The camera's matrices.
-        options : DisplayOptions
-            Lights, and the opacity of a skeleton over the skin.
-        overlays : bool
-            Whether parts hidden by other objects, such as a fitted body, are drawn translucently.
+        ``placement``: (4, 4), matrix from figure space to scene space.
         """
         if not len(points.elements):
             return

@@ -67,23 +67,9 @@ def draw_shapes(
 ) -> None:
     """Draw the shapes of all surfaces, with the cutouts of their materials.
 
-    Parameters
-    ----------
-    array : moderngl.VertexArray
-        The mesh with a program whose fragment shader needs no colours.
-    indices : IndexSet
-        The triangles.
-    options : DisplayOptions
-        Display options.
-    fragment : str
-        Name of the fragment shader. With ``"depth"`` back faces are drawn too, because they block
-        light; with ``"geometry"`` blended surfaces are omitted, because others show through them.
-    prepare : callable
-        Sets further uniforms before each run.
-    instances : int
-        Number of instances.
-    is_mirrored : bool
-        Whether the mesh is reflected, which reverses the winding of its front faces.
+    ``fragment``: name of the fragment shader. With ``"depth"`` back faces are drawn too, because
+    they block light; with ``"geometry"`` blended surfaces are omitted, because others show through
+    them.
     """
     program = array.program
     has_materials = "u_alpha_mode" in program
@@ -113,18 +99,6 @@ class SortedTriangles:
     triangles that intersect or overlap cyclically, and for interleaved materials, which are drawn
     one after the other. The posed vertices are read back when the pose changes, and sorted when
     the view changes.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-
-    Attributes
-    ----------
-    indices : moderngl.Buffer
-        Indices of split vertices.
-    runs : tuple of MeshRun
-        A run per material, the farthest first.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -139,14 +113,8 @@ class SortedTriangles:
     def sort(self, mesh: PosedMesh, source: IndexSet, along: Floats) -> None:
         """Sort the triangles, and upload them if their order may have changed.
 
-        Parameters
-        ----------
-        mesh : PosedMesh
-            The updated mesh.
-        source : IndexSet
-            Triangles of the mesh; the blended ones are used.
-        along : (3,)
-            Row of the model-view matrix that yields the depth, which decreases with the distance.
+        ``along``: (3,), row of the model-view matrix that yields the depth, which decreases with
+        the distance.
         """
         given = tuple(run for run in source.runs if run.surface.is_blended and run.count)
         if given != self._given or source.indices is not self._buffer:

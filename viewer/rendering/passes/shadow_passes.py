@@ -45,15 +45,7 @@ _FIELD_UNIT = 0
 
 
 class ShadowPass:
-    """Pass that draws depths as seen from a light.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    side : int
-        Texels on each side of the map.
-    """
+    """Pass that draws depths as seen from a light."""
 
     def __init__(self, context: moderngl.Context, side: int) -> None:
         self.context, self.side = context, side
@@ -74,16 +66,9 @@ class ShadowPass:
     ) -> Shadow:
         """Draw a shadow map.
 
-        Parameters
-        ----------
-        draw : callable
-            Draws the shadow casters, with a view and a fragment shader.
-        spheres : (N, 4)
-            Bounds of the casters: centres and radii, scene space; at least one.
-        direction : (3,)
-            Unit vector towards the light, scene space.
-        strength : float
-            0 to 1: fraction of the light that a shadow removes.
+        ``spheres``: (N, 4), bounds of the casters: centres and radii, scene space; at least one.
+        ``direction``: (3,), unit vector towards the light, scene space. ``strength``: 0 to 1:
+        fraction of the light that a shadow removes.
         """
         view, extent = light_view(spheres, direction, self.side)
         _draw_depths(self._framebuffer, draw, view)
@@ -96,15 +81,7 @@ class ShadowPass:
 
 
 class ContactPass:
-    """Pass that draws heights as seen from below the ground, and blurs them.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the programs.
-    """
+    """Pass that draws heights as seen from below the ground, and blurs them."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -132,18 +109,9 @@ class ContactPass:
     ) -> ContactShadows | None:
         """Draw and return the contact shadows of figures; None if all are far above the ground.
 
-        Parameters
-        ----------
-        draw : callable
-            Draws the figures, with a view and a fragment shader.
-        spheres : (N, 4)
-            Bounds of the figures: centres and radii, scene space.
-        size : float
-            Size of a figure in scene units, which determines the softness.
-        axes : (3, 3)
-            The ground's two axes and the up axis as rows.
-        height : float
-            Height of the ground, scene units.
+        ``spheres``: (N, 4), bounds of the figures: centres and radii, scene space. ``size``: size
+        of a figure in scene units, which determines the softness. ``axes``: (3, 3), the ground's
+        two axes and the up axis as rows. ``height``: height of the ground, scene units.
         """
         centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
         near = (centers - radii)[:, 2] < height + _FAR * size
@@ -191,31 +159,18 @@ class ContactPass:
 
 @dataclass(frozen=True, slots=True)
 class ContactShadows:
-    """A field of contact shadows.
-
-    Attributes
-    ----------
-    texture : moderngl.Texture
-        Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1.
-    low, high : (2,)
-        Opposite corners of the field, along the ground's axes.
-    """
+    """A field of contact shadows."""
 
     texture: moderngl.Texture
+    """Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1.
+    Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1."""
     low: Floats
     high: Floats
+    """(2,). Opposite corners of the field, along the ground's axes."""
 
 
 class GroundShadowPass:
-    """Pass that draws black patches on the ground, whose opacity represents the shadow.
-
-    Parameters
-    ----------
-    context : moderngl.Context
-        The context in use.
-    programs : Programs
-        Provides the programs.
-    """
+    """Pass that draws black patches on the ground, whose opacity represents the shadow."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -225,16 +180,7 @@ class GroundShadowPass:
     def draw_shadow(self, shadow: Shadow, view: View, up: Floats, height: float) -> None:
         """Draw the key light's shadow.
 
-        Parameters
-        ----------
-        shadow : Shadow
-            The shadow map.
-        view : View
-            The camera's matrices.
-        up : (3,)
-            The up axis.
-        height : float
-            Height of the ground along that axis.
+        ``up``: (3,), the up axis.
         """
         back = np.linalg.inv(shadow.matrix)
         away = back[:3, 2]
@@ -322,14 +268,8 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
     Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
     not crawl while figures move.
 
-    Parameters
-    ----------
-    spheres : (N, 4)
-        Centres and radii, scene space.
-    direction : (3,)
-        Unit vector towards the light.
-    side : int
-        Texels on each side of the map.
+    ``spheres``: (N, 4), centres and radii, scene space. ``direction``: (3,), unit vector towards
+    the light.
     """
     aside = np.eye(3)[np.argmin(np.abs(direction))]
     right = np.cross(aside, direction)
@@ -351,14 +291,8 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
 def _parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
     """Return a parallel view of a box.
 
-    Parameters
-    ----------
-    axes : (3, 3)
-        Right, up and backward as rows, scene space.
-    middle : (3,)
-        Centre of the box, along these axes.
-    halves : (3,)
-        Half the side lengths of the box.
+    ``axes``: (3, 3), right, up and backward as rows, scene space. ``middle``: (3,), centre of the
+    box, along these axes. ``halves``: (3,), half the side lengths of the box.
     """
     matrix = np.eye(4)
     matrix[:3, :3] = axes

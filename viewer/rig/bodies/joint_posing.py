@@ -139,27 +139,18 @@ def dof_table() -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnatomicalPosing:
-    """Rules of SKEL's joints for one shape.
-
-    Attributes
-    ----------
-    parents : (24,) int32
-        Parent of each joint.
-    data_frames : (24, 3, 3)
-        A: frames of the bones in the pose of the data.
-    data_steps : (24, 3)
-        Positions of the joints relative to their parents in that pose.
-    learned : (24, 3, 3)
-        Learned rotations from the pose of the data to the T-pose.
-    joints : (24, 3)
-        Rest joints.
-    """
+    """Rules of SKEL's joints for one shape."""
 
     parents: Ints
+    """(24,) int32. Parent of each joint."""
     data_frames: Floats
+    """(24, 3, 3). A: frames of the bones in the pose of the data."""
     data_steps: Floats
+    """(24, 3). Positions of the joints relative to their parents in that pose."""
     learned: Floats
+    """(24, 3, 3). Learned rotations from the pose of the data to the T-pose."""
     joints: Floats
+    """(24, 3). Rest joints."""
 
     def with_joints(self, joints: Floats) -> AnatomicalPosing:
         """Return the rules for other rest joints."""

@@ -24,18 +24,12 @@ _SCALE = 6  # index of the scale among the parameters of a joint
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelParameters:
-    """Parameters that pose and scale a figure.
-
-    Attributes
-    ----------
-    names : tuple of P str
-        Names of the model parameters.
-    transform : (7 J, P)
-        Joint parameters per unit of each model parameter: lengths, radians and octaves.
-    """
+    """Parameters that pose and scale a figure."""
 
     names: tuple[str, ...]
+    """Names of the model parameters."""
     transform: Floats
+    """(7 J, P). Joint parameters per unit of each model parameter: lengths, radians and octaves."""
 
     def __post_init__(self) -> None:
         values = frozen("transform", self.transform, (None, len(self.names)))
@@ -49,19 +43,8 @@ class ModelParameters:
     def apply(self, skeleton: Skeleton, pose: Pose, values: Floats) -> None:
         """Set the DOFs, translations and scales of a pose in place.
 
-        Parameters
-        ----------
-        skeleton : Skeleton
-            Skeleton with a DOF for each joint parameter that the transform drives.
-        pose : Pose
-            Modified, except for its shape and placement.
-        values : (P,)
-            Model parameters.
-
-        Raises
-        ------
-        RigError
-            If the number of values is wrong.
+        ``pose``: modified, except for its shape and placement. ``values``: (P,), model parameters.
+        Raises ``RigError`` if the number of values is wrong.
         """
         if len(values) != self.count:
             raise RigError(f"expected {self.count} model parameters, found {len(values)}")
@@ -75,15 +58,7 @@ class ModelParameters:
 def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
     """Return the joint and kind of each joint parameter that can be nonzero, except scales.
 
-    Parameters
-    ----------
-    transform : (7 J, P)
-        See ``ModelParameters``.
-
-    Returns
-    -------
-    joints, kinds : (D,) int32
-        Rows of a DOF table.
+    ``transform``: (7 J, P), see ``ModelParameters``. Returns (D,) int32, rows of a DOF table.
     """
     driven = transform.any(axis=1).reshape(-1, PER_JOINT)[:, :_SCALE]
     joints, kinds = np.nonzero(driven)

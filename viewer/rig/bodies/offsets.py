@@ -22,16 +22,8 @@ _FIRST = 64  # rows after which this fraction is estimated
 class SparseOffsets(Deferred):
     """Offsets (P, V, 3) that are read block by block on first use, and stored without zeros.
 
-    Parameters
-    ----------
-    shape : (int, int, int)
-        P, V, 3.
-    dtype : dtype
-        Element type of the file; products are in double precision.
-    load : callable
-        Returns the whole array; see ``Deferred``.
-    blocks : callable
-        Yields blocks of consecutive rows, valid until the next one; may raise a ``FormatError``.
+    ``load``: returns the whole array; see ``Deferred``. ``blocks``: yields blocks of consecutive
+    rows, valid until the next one; may raise a ``FormatError``.
     """
 
     __slots__ = ("_blocks", "_entries", "_lock")
@@ -124,14 +116,7 @@ class _Entries:
 class DeferredOffsets(Deferred):
     """Offsets of blend shapes whose weighted sum does not need the whole array.
 
-    Parameters
-    ----------
-    shape : (int, int, int)
-        S, V, 3.
-    load : callable
-        Returns the array; see ``Deferred``.
-    total : callable
-        Returns sum_s w_s d_s, (V, 3), for weights (S,).
+    ``load``: returns the array; see ``Deferred``.
     """
 
     __slots__ = ("total",)

@@ -55,15 +55,7 @@ def phenotype_range(name: str) -> tuple[float, float]:
 def target_masks(targets: Sequence[Sequence[str]]) -> Bools:
     """Return which variations each target belongs to.
 
-    Parameters
-    ----------
-    targets : sequence of R sequences of str
-        Names of the variations of each target.
-
-    Returns
-    -------
-    (R, N) bool
-        One column for each of the N variations.
+    Returns (R, N) bool, one column for each of the N variations.
     """
     mask = np.zeros((len(targets), len(_ALL)), dtype=np.bool_)
     for row, names in enumerate(targets):
@@ -74,17 +66,8 @@ def target_masks(targets: Sequence[Sequence[str]]) -> Bools:
 def weights_of(values: Floats, masks: Bools) -> Floats:
     """Return the coefficients of targets.
 
-    Parameters
-    ----------
-    values : (11,)
-        Values of ``PHENOTYPES``, clamped to their ranges.
-    masks : (R, N) bool
-        From ``target_masks``.
-
-    Returns
-    -------
-    (R,)
-        Products of the weights of the targets' variations.
+    ``values``: (11,), values of ``PHENOTYPES``, clamped to their ranges. ``masks``: (R, N) bool,
+    from ``target_masks``. Returns (R,), products of the weights of the targets' variations.
     """
     parts = [
         _anchored(float(value), len(names), phenotype_range(name)[0])
@@ -109,15 +92,8 @@ def _fractions(values: Floats) -> Floats:
 class TargetRows:
     """Offsets of the base mesh by target, each read on first use and stored without zeros.
 
-    Parameters
-    ----------
-    count : int
-        Number of targets, R.
-    n_points : int
-        Number of vertices of the base mesh, B.
-    load : callable
-        Returns the vertices (N,) that a target moves and their offsets (N, 3); may raise a
-        ``FormatError``.
+    ``load``: returns the vertices (N,) that a target moves and their offsets (N, 3); may raise a
+    ``FormatError``.
     """
 
     def __init__(
@@ -149,29 +125,21 @@ class TargetSpace:
 
     A weight is the difference from the mean body. A local change has two targets, one for positive
     and one for negative weights.
-
-    Attributes
-    ----------
-    targets : TargetRows
-        Targets of the phenotypes, then of the facial actions, then pairs for the local changes.
-    masks : (R, N) bool
-        Variations of the targets of the phenotypes, from ``phenotypes.target_masks``.
-    n_actions : int
-        Number of facial actions.
-    vertices : (V,)
-        Vertices of the base mesh that the figure has.
-    regressor : JointRegressor
-        Joints as means of vertices of the base mesh.
-    matrix : (3, 3)
-        Transform from the base mesh to the figure.
     """
 
     targets: TargetRows
+    """Targets of the phenotypes, then of the facial actions, then pairs for the local changes."""
     masks: Bools
+    """(R, N) bool. Variations of the targets of the phenotypes, from ``phenotypes.target_masks``.
+    (R, N) bool. Variations of the targets of the phenotypes, from ``phenotypes.target_masks``."""
     n_actions: int
+    """Number of facial actions."""
     vertices: Ints
+    """(V,). Vertices of the base mesh that the figure has."""
     regressor: JointRegressor
+    """Joints as means of vertices of the base mesh."""
     matrix: Floats
+    """(3, 3). Transform from the base mesh to the figure."""
 
     @property
     def n_weights(self) -> int:

@@ -48,19 +48,13 @@ class Feature(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MappedFeature:
-    """SKEL: nine entries of R - I for each joint of SMPL, from SKEL's nearest joint.
-
-    Attributes
-    ----------
-    targets : tuple of J int
-        Joint of the other model that each joint drives; 0, its root, drives nothing. If several
-        joints have the same target, the last one drives it.
-    n_targets : int
-        Number of joints of the other model.
-    """
+    """SKEL: nine entries of R - I for each joint of SMPL, from SKEL's nearest joint."""
 
     targets: tuple[int, ...]
+    """Joint of the other model that each joint drives; 0, its root, drives nothing. If several
+    joints have the same target, the last one drives it."""
     n_targets: int
+    """Number of joints of the other model."""
 
     @property
     def n_weights(self) -> int:
@@ -82,20 +76,14 @@ class QuaternionFeature:
 
     Osman et al. 2020 (STAR), eq. 3, and Osman et al. 2022 (SUPR), eq. 5: a joint contributes the
     four numbers (x, y, z, w - 1) of its unit quaternion with w >= 0.
-
-    Attributes
-    ----------
-    n_joints : int
-        Number of joints of the skeleton, J.
-    has_root : bool
-        Whether the root's quaternion is included, as in SUPR.
-    shape : int
-        Blend shape whose weight comes last, as in STAR; -1 for none.
     """
 
     n_joints: int
+    """Number of joints of the skeleton, J."""
     has_root: bool
+    """Whether the root's quaternion is included, as in SUPR."""
     shape: int = -1
+    """Blend shape whose weight comes last, as in STAR; -1 for none."""
 
     @property
     def n_weights(self) -> int:
@@ -121,24 +109,17 @@ class NetworkFeature:
     The input x has six numbers for each joint from the third on: the first two columns of its
     rotation relative to its rest, minus those of the identity (``MHRPoseCorrectivesModel`` of the
     Momentum Human Rig).
-
-    Attributes
-    ----------
-    n_joints : int
-        Number of joints of the skeleton, J.
-    n_weights : int
-        Number of outputs, P.
-    outputs, inputs : (N,) int32
-        Row and column of each entry of the (P, 6 (J - 2)) matrix.
-    entries : (N,)
-        Value of each entry.
     """
 
     n_joints: int
+    """Number of joints of the skeleton, J."""
     n_weights: int
+    """Number of outputs, P."""
     outputs: Ints
     inputs: Ints
+    """(N,) int32. Row and column of each entry of the (P, 6 (J - 2)) matrix."""
     entries: Floats
+    """(N,). Value of each entry."""
 
     def __post_init__(self) -> None:
         for name, dtype in (("outputs", np.int32), ("inputs", np.int32), ("entries", np.float64)):

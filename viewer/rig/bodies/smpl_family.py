@@ -149,18 +149,12 @@ def members_by_numbers() -> dict[int, tuple[str, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class Animal:
-    """One model of an animal: title and joints.
-
-    Attributes
-    ----------
-    title : str
-        Name of the model.
-    chains : tuple of tuple of str
-        Names in order; each joint of a chain except the first is a child of the previous one.
-    """
+    """One model of an animal: title and joints."""
 
     title: str
+    """Name of the model."""
     chains: tuple[tuple[str, ...], ...]
+    """Names in order; each joint of a chain except the first is a child of the previous one."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -221,12 +215,7 @@ def animal_of(parents: Sequence[int]) -> Animal | None:
 def upright_axis(animal: Animal, joints: Floats) -> str:
     """Return the axis along which the root lies above the feet, ``"y"`` or ``"z"``.
 
-    Parameters
-    ----------
-    animal : Animal
-        Provides the names.
-    joints : (J, 3)
-        Rest positions.
+    ``joints``: (J, 3), rest positions.
     """
     feet = [row for row, name in enumerate(animal.names) if "Foot" in name or "Toe" in name]
     above = joints[0] - joints[feet].mean(axis=0)

@@ -29,24 +29,16 @@ _FLIP = np.diag([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraMotion:
-    """Placement of a moving camera in each frame.
-
-    Attributes
-    ----------
-    timing : Timing
-        Frame rate, and the row of each frame.
-    rotations : (N, 3, 3)
-        R of each row, scene to camera.
-    translations : (N, 3)
-        T of each row, scene units.
-    intrinsics : (N, 3, 3) or None
-        K of each row, pixels, if it changes.
-    """
+    """Placement of a moving camera in each frame."""
 
     timing: Timing
+    """Frame rate, and the row of each frame."""
     rotations: Floats
+    """(N, 3, 3). R of each row, scene to camera."""
     translations: Floats
+    """(N, 3). T of each row, scene units."""
     intrinsics: Floats | None = None
+    """(N, 3, 3) or None. K of each row, pixels, if it changes."""
 
     def __post_init__(self) -> None:
         count = len(self.rotations)
@@ -59,41 +51,28 @@ class CameraMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraPath:
-    """The nodes that move a camera outside all figures.
-
-    Attributes
-    ----------
-    nodes : Skeleton
-        A chain of nodes as joints, which ends with the camera.
-    animations : tuple of Animation
-        The animations of the file that move them, with joints of ``nodes``.
-    """
+    """The nodes that move a camera outside all figures."""
 
     nodes: Skeleton
+    """A chain of nodes as joints, which ends with the camera."""
     animations: tuple[Animation, ...]
+    """The animations of the file that move them, with joints of ``nodes``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraMount:
-    """The joint or the nodes that move a camera.
-
-    Attributes
-    ----------
-    record : FileRecord
-        Record of the figure with the joint, or of one that plays the same animations as the nodes.
-        Edits of the figure keep it.
-    joint : int
-        Index of the joint; -1 if the camera moves in the space of the figure.
-    matrix : (4, 4)
-        Camera to joint space at rest; here the camera looks along -z with y up, as in glTF.
-    path : CameraPath or None
-        The nodes that move the camera; None if they are still.
-    """
+    """The joint or the nodes that move a camera."""
 
     record: FileRecord
+    """Record of the figure with the joint, or of one that plays the same animations as the nodes.
+    Edits of the figure keep it."""
     joint: int
+    """Index of the joint; -1 if the camera moves in the space of the figure."""
     matrix: Floats
+    """(4, 4). Camera to joint space at rest; here the camera looks along -z with y up, as in glTF.
+    (4, 4). Camera to joint space at rest; here the camera looks along -z with y up, as in glTF."""
     path: CameraPath | None = None
+    """The nodes that move the camera; None if they are still."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix", frozen("matrix", self.matrix, (4, 4)))
@@ -104,39 +83,27 @@ class CameraView:
     """A pinhole camera in OpenCV's convention: x right, y down, z forward.
 
     A scene point X is projected to the pixel K (R X + T), divided by its third component.
-
-    Attributes
-    ----------
-    name : str
-        Name in the files.
-    intrinsic : (3, 3)
-        K, pixels.
-    rotation : (3, 3)
-        R, scene to camera.
-    translation : (3,)
-        T, scene units.
-    size : (int, int) or None
-        Width and height of its images, if the files state them.
-    distortion : (N,)
-        OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
-    motion : CameraMotion or None
-        Its placement over time if it moves; the fields above then apply to the first frame.
-    near, far : float or None
-        Distances of the clipping planes that its file states, scene units. They are not used.
-    mount : CameraMount or None
-        The joint or the nodes that move it; rotation and translation then apply to the rest pose.
     """
 
     name: str
+    """Name in the files."""
     intrinsic: Floats
+    """(3, 3). K, pixels."""
     rotation: Floats
+    """(3, 3). R, scene to camera."""
     translation: Floats
+    """(3,). T, scene units."""
     size: tuple[int, int] | None = None
+    """Width and height of its images, if the files state them."""
     distortion: Floats = ()  # type: ignore[assignment]  # converted to an array below
+    """(N,). OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none."""
     motion: CameraMotion | None = None
+    """Its placement over time if it moves; the fields above then apply to the first frame."""
     near: float | None = None
     far: float | None = None
+    """Distances of the clipping planes that its file states, scene units. They are not used."""
     mount: CameraMount | None = None
+    """The joint or the nodes that move it; rotation and translation then apply to the rest pose."""
 
     def __post_init__(self) -> None:
         shapes = {"intrinsic": (3, 3), "rotation": (3, 3), "translation": (3,)}
@@ -150,13 +117,6 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
 
     Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Gaps are
     interpolated too; outside the motion, the first or last frame is used.
-
-    Parameters
-    ----------
-    view : CameraView
-        Fixed or moving camera.
-    seconds : float
-        Time of the scene.
     """
     motion = view.motion
     if motion is None:
@@ -183,10 +143,7 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
 def extrinsics(world: Floats) -> tuple[Floats, Floats]:
     """Return R and T of a camera that looks along -z with y up, without its scale.
 
-    Parameters
-    ----------
-    world : (4, 4)
-        Camera to scene space.
+    ``world``: (4, 4), camera to scene space.
     """
     rotation = _FLIP @ nearest_rotations(world[:3, :3])[0].T
     return rotation, -rotation @ world[:3, 3]
@@ -195,12 +152,8 @@ def extrinsics(world: Floats) -> tuple[Floats, Floats]:
 def motion_times(view: CameraView, most: int) -> Floats:
     """Return sample times of a camera's motion, including the first and the last: (T,).
 
-    Parameters
-    ----------
-    view : CameraView
-        Fixed or moving camera; a fixed camera has only the time 0.
-    most : int
-        Maximum number of times, at least 2.
+    ``view``: fixed or moving camera; a fixed camera has only the time 0. ``most``: maximum number
+    of times, at least 2.
     """
     if view.motion is None:
         return np.zeros(1)
@@ -216,12 +169,7 @@ def placed_view(view: CameraView, placement: Floats) -> CameraView:
 
     With the placement X' = s P X + p: R' = R P^T and T' = s T - R' p.
 
-    Parameters
-    ----------
-    view : CameraView
-        Fixed or moving camera.
-    placement : (4, 4)
-        Rotation, uniform scale and translation.
+    ``placement``: (4, 4), rotation, uniform scale and translation.
     """
     scale, place = float(np.linalg.norm(placement[:3, 0])), placement[:3, 3]
     turn = placement[:3, :3] / scale

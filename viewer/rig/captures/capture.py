@@ -19,94 +19,60 @@ RestRoots = Callable[[Floats | None], Floats]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CapturePart:
-    """Consecutive frames of a capture.
-
-    Attributes
-    ----------
-    stop : int
-        End frame of this part (exclusive), counted from the capture's first frame.
-    bodies : mapping of person to BodyMotion
-        Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere.
-    points : mapping of person to (PointLayout, PointClip)
-        Keypoints in the same form.
-    parameters : mapping of person to ParameterMotion
-        Model parameters in the same form; people who have both are shown as bodies if the figure of
-        the bodies has model parameters, otherwise as points.
-    warnings : tuple of Diagnostic
-        Messages from the reader about these frames.
-    """
+    """Consecutive frames of a capture."""
 
     stop: int
+    """End frame of this part (exclusive), counted from the capture's first frame."""
     bodies: dict[int, BodyMotion] = field(default_factory=dict)
+    """Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere."""
     points: dict[int, tuple[PointLayout, PointClip]] = field(default_factory=dict)
+    """mapping of person to (PointLayout, PointClip). Keypoints in the same form."""
     warnings: tuple[Diagnostic, ...] = ()
+    """Messages from the reader about these frames."""
     parameters: dict[int, ParameterMotion] = field(default_factory=dict)
+    """Model parameters in the same form; people who have both are shown as bodies if the figure of
+    the bodies has model parameters, otherwise as points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Capture:
-    """A sequence that has been opened but not yet read.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    n_frames : int
-        Number of frames on its timeline, gaps included, F.
-    first_frame : int
-        Number of the first frame in the files.
-    parts : callable
-        Returns an iterator over the parts in time order; the first is short so that something
-        can be shown early. Every call reads the files again.
-    up : "y", "z", "-y", "-z" or ""
-        The axis that points up in the world; empty to detect it from the first bodies.
-    views : tuple of CameraView
-        Calibrated cameras.
-    images : CameraImages or None
-        Images of the cameras, if available.
-    views_of : callable or None
-        Returns further cameras, whose positions depend on the figure that shows the bodies.
-    facts : tuple of (str, str)
-        Recognised contents of the file, for ``viewer info``.
-    space : "world", "camera" or ""
-        The space of its bodies if the file has several; empty if it has only one.
-    is_in_camera : bool
-        Whether its people are in the space of a camera, which is at the origin.
-    in_space : callable or None
-        Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
-    model : str
-        The model that its people use, e.g. ``"SMPL+H"`` or ``"MHR"``; empty if unknown.
-    warnings : tuple of Diagnostic
-        Messages from opening the sequence.
-    """
+    """A sequence that has been opened but not yet read."""
 
     name: str
+    """Display name."""
     n_frames: int
+    """Number of frames on its timeline, gaps included, F."""
     first_frame: int
+    """Number of the first frame in the files."""
     parts: Callable[[], Iterator[CapturePart]]
+    """Returns an iterator over the parts in time order; the first is short so that something can be
+    shown early. Every call reads the files again."""
     up: str = ""
+    """One of "y", "z", "-y", "-z" or "". The axis that points up in the world; empty to detect it
+    from the first bodies."""
     views: tuple[CameraView, ...] = ()
+    """Calibrated cameras."""
     model: str = ""
+    """The model that its people use, e.g. ``"SMPL+H"`` or ``"MHR"``; empty if unknown."""
     warnings: tuple[Diagnostic, ...] = ()
+    """Messages from opening the sequence."""
     images: CameraImages | None = None
+    """Images of the cameras, if available."""
     views_of: Callable[[RestRoots], tuple[CameraView, ...]] | None = None
+    """Returns further cameras, whose positions depend on the figure that shows the bodies."""
     facts: tuple[tuple[str, str], ...] = ()
+    """Recognised contents of the file, for ``viewer info``."""
     space: str = ""
+    """One of "world", "camera" or "". The space of its bodies if the file has several; empty if it
+    has only one."""
     is_in_camera: bool = False
+    """Whether its people are in the space of a camera, which is at the origin."""
     in_space: Callable[[str], Capture] | None = None
+    """Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one."""
 
 
 def capture_rate(requested: float | None, own: float | None, video: float | None) -> float:
     """Return the first rate that is known, otherwise ``DEFAULT_RATE``, in frames per second.
-
-    Parameters
-    ----------
-    requested : float or None
-        Rate requested by the user.
-    own : float or None
-        Rate of the files, or of the tool that wrote them.
-    video : float or None
-        Rate of the source video.
 
     >>> capture_rate(None, None, 25.0), capture_rate(None, None, None)
     (25.0, 30.0)

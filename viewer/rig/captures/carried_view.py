@@ -26,15 +26,7 @@ def carrier_of(view: CameraView, actors: Sequence[Actor]) -> Actor | None:
 
 
 def view_in(view: CameraView, scene: Scene) -> CameraView:
-    """Return a camera at the time of a scene and, if a joint carries it, in the scene's pose.
-
-    Parameters
-    ----------
-    view : CameraView
-        One of the scene's cameras.
-    scene : Scene
-        The scene, posed at its time.
-    """
+    """Return a camera at the time of a scene and, if a joint carries it, in the scene's pose."""
     mount, actor = view.mount, carrier_of(view, scene.actors)
     if mount is None or actor is None or actor.pose is None:
         return view_at(view, scene.time or 0.0)

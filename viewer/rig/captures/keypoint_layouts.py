@@ -134,22 +134,9 @@ _ALIKE = (
 def keypoint_layout(count: int, title: str = "") -> PointLayout:
     """Return the layout of a set of keypoints.
 
-    Parameters
-    ----------
-    count : int
-        Number of keypoints, K.
-    title : str
-        Name of a layout, if several have this count; empty for the default.
-
-    Returns
-    -------
-    PointLayout
-        Layout with names ``point0``, ``point1`` … and no limbs if no layout has this count.
-
-    Raises
-    ------
-    RigError
-        If the named layout does not exist or has a different number of keypoints.
+    ``title``: name of a layout, if several have this count; empty for the default. Returns layout
+    with names ``point0``, ``point1`` … and no limbs if no layout has this count. Raises
+    ``RigError`` if the named layout does not exist or has a different number of keypoints.
 
     >>> keypoint_layout(17).title, keypoint_layout(17, "h36m").names[0]
     ('coco', 'mid_hip')
@@ -190,13 +177,6 @@ def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
 
     A hand that follows a body is attached to the body's wrist: the wrist of the hand is the same
     point.
-
-    Parameters
-    ----------
-    title : str
-        Title of the combined layout.
-    parts : sequence of PointLayout
-        Layouts in the order of the points.
     """
     names: list[str] = []
     limbs: list[tuple[int, int]] = []
@@ -260,16 +240,6 @@ def matching_joints(layout: PointLayout) -> dict[int, str]:
     The mapping is SMPLify-X's: limbs, fingers, the neck, and the middle of the hips as the pelvis.
     Eyes, ears, toes and heels lie on the skin, where there is no joint.
 
-    Parameters
-    ----------
-    layout : PointLayout
-        Layout of the keypoints.
-
-    Returns
-    -------
-    dict of int to str
-        Index of a keypoint to the name of the joint.
-
     >>> matching_joints(keypoint_layout(25))[8]
     'pelvis'
     """
@@ -297,17 +267,7 @@ def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
 
     The joints are the model's: regressed from its shaped mesh, then posed.
 
-    Parameters
-    ----------
-    points : Actor
-        Captured keypoints at the current time.
-    body : Actor
-        A posed figure with the SMPL family's joint names.
-
-    Returns
-    -------
-    dict of str to float
-        Keypoint names to distances in scene units; empty if either actor is absent.
+    Returns keypoint names to distances in scene units; empty if either actor is absent.
     """
     layout, skeleton = points.figure.points, body.figure.skeleton
     if layout is None or points.points is None or skeleton is None or body.pose is None:

@@ -12,24 +12,16 @@ from viewer.rig.motion.timing import Timing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLayout:
-    """Names and limbs of a set of keypoints.
-
-    Attributes
-    ----------
-    title : str
-        ``"body25"``, ``"coco"`` …
-    names : tuple of K str
-        Standard names: ``left_knee``.
-    limbs : (L, 2) int32
-        Pairs of keypoints, drawn as lines.
-    sides : (K,) int32
-        -1 for right, 0 for the middle, 1 for left.
-    """
+    """Names and limbs of a set of keypoints."""
 
     title: str
+    """``"body25"``, ``"coco"`` …."""
     names: tuple[str, ...]
+    """Standard names: ``left_knee``."""
     limbs: Ints
+    """(L, 2) int32. Pairs of keypoints, drawn as lines."""
     sides: Ints
+    """(K,) int32. -1 for right, 0 for the middle, 1 for left."""
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -41,21 +33,15 @@ class PointLayout:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class PointClip:
-    """A motion of points.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    timing : Timing
-        Frame rate, and the row of each frame.
-    points : (N, K, 4)
-        x, y, z and confidence; confidence 0 means "not visible", and x, y, z are then undefined.
-    """
+    """A motion of points."""
 
     name: str
+    """Display name."""
     timing: Timing
+    """Frame rate, and the row of each frame."""
     points: Floats
+    """(N, K, 4). x, y, z and confidence; confidence 0 means "not visible", and x, y, z are then
+    undefined."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen("points", self.points, (None, None, 4)))
@@ -77,19 +63,7 @@ def sample_points(clip: PointClip, time: float, interpolate: bool = False) -> Fl
     A point is interpolated linearly between two frames in which it is visible. Otherwise it keeps
     the position and confidence of the earlier frame until the next frame.
 
-    Parameters
-    ----------
-    clip : PointClip
-        The motion.
-    time : float
-        Seconds.
-    interpolate : bool
-        Interpolate across gaps.
-
-    Returns
-    -------
-    (K, 4) or None
-        x, y, z, confidence.
+    Returns (K, 4) or None, x, y, z, confidence.
     """
     before, after, fraction = (
         part[0] for part in clip.timing.locate(np.array([time]), interpolate)

@@ -17,36 +17,24 @@ from viewer.rig.scene import Actor, Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledPoints:
-    """Captured points at a fixed rate.
-
-    Attributes
-    ----------
-    name : str
-        Name of the actor.
-    layout : PointLayout
-        Names and limbs of the K points.
-    frame_rate : float
-        Frames per second.
-    first_frame : int
-        Number of the first frame.
-    times : (F,)
-        Seconds.
-    present : (F,) bool
-        Whether the person is present.
-    points : (F, K, 3)
-        In the unit of the capture; NaN where a point is not visible.
-    confidences : (F, K)
-        0 where a point is not visible.
-    """
+    """Captured points at a fixed rate."""
 
     name: str
+    """Name of the actor."""
     layout: PointLayout
+    """Names and limbs of the K points."""
     frame_rate: float
+    """Frames per second."""
     first_frame: int
+    """Number of the first frame."""
     times: Floats
+    """(F,). Seconds."""
     present: Bools
+    """(F,) bool. Whether the person is present."""
     points: Floats
+    """(F, K, 3). In the unit of the capture; NaN where a point is not visible."""
     confidences: Floats
+    """(F, K). 0 where a point is not visible."""
 
 
 def sample_upright_points(
@@ -58,26 +46,10 @@ def sample_upright_points(
 ) -> tuple[SampledPoints, Literal["y", "z"]]:
     """Sample an actor's points, rotated upright if their world is upside down.
 
-    Parameters
-    ----------
-    scene : Scene
-        Provides the up axis.
-    actor : Actor
-        Actor with captured points; its placement in the scene is ignored.
-    rate, frames, interpolate
-        As for ``viewer.rig.motion.sampled_animation.sample_animation``.
-
-    Returns
-    -------
-    animation : SampledPoints
-        The sampled frames.
-    up : "y" or "z"
-        Up axis of the frames.
-
-    Raises
-    ------
-    RigError
-        If the actor has no motion of points, or no frame in the range.
+    ``actor``: actor with captured points; its placement in the scene is ignored. ``rate``,
+    ``frames``, ``interpolate``: as for ``viewer.rig.motion.sampled_animation.sample_animation``.
+    Returns ``animation``: the sampled frames; ``up``: up axis of the frames. Raises ``RigError`` if
+    the actor has no motion of points, or no frame in the range.
     """
     motion, layout = actor.clip, actor.figure.points
     if not isinstance(motion, PointClip) or layout is None:

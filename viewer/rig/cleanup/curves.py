@@ -23,18 +23,8 @@ _BLOCK = 32  # rows that are solved together, with one call for all curves
 def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
     """Return the curves that minimise the sum above, independently of each other.
 
-    Parameters
-    ----------
-    targets : (S, N, C)
-        Targets t of S curves with C components.
-    weights : (S, N)
-        Weights w, greater than 0.
-    span : float
-        Length s in rows.
-
-    Returns
-    -------
-    (S, N, C)
+    ``targets``: (S, N, C), targets t of S curves with C components. ``weights``: (S, N), weights w,
+    greater than 0. Returns (S, N, C).
     """
     count = targets.shape[1]
     n_blocks = -(-count // _BLOCK)
@@ -107,14 +97,8 @@ EASE = 0.2
 def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
     """Return values that fade in and out around held frames; gaps separate runs.
 
-    Parameters
-    ----------
-    values : (F, C)
-        Corrections in held frames.
-    is_held, present : (F,)
-        Masks of held frames and of existing frames.
-    ease : int
-        Number of frames over which a correction fades.
+    ``values``: (F, C), corrections in held frames. ``is_held``, ``present``: (F,), masks of held
+    frames and of existing frames.
     """
     result = values.copy()
     for start, stop in runs_of(present):

@@ -15,35 +15,20 @@ _TOGETHER = 1000  # frames per batch, which limits the memory for matrices
 
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """Distances between the joints of two motions in their common frames.
-
-    Attributes
-    ----------
-    mean, largest : float
-        Mean and maximum distance over all joints and frames, figure units.
-    joint, frame : int
-        Location of the largest distance; frames are numbered as in the first motion.
-    n_frames : int
-        Number of compared frames.
-    """
+    """Distances between the joints of two motions in their common frames."""
 
     mean: float = 0.0
     largest: float = 0.0
+    """Mean and maximum distance over all joints and frames, figure units."""
     joint: int = 0
     frame: int = 0
+    """Location of the largest distance; frames are numbered as in the first motion."""
     n_frames: int = 0
+    """Number of compared frames."""
 
 
 def joint_displacement(figure: Figure, before: SampledClip, after: SampledClip) -> Displacement:
-    """Return how far joints move, at the times of the first motion's frames.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    before, after : SampledClip
-        Two motions of the figure on the same timeline.
-    """
+    """Return how far joints move, at the times of the first motion's frames."""
     timing = before.timing
     times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
     inside = (times >= after.start - 1e-9) & (times <= after.end + 1e-9)

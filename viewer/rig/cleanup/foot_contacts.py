@@ -18,23 +18,8 @@ _SHORTEST = 0.1  # minimum duration of a contact, seconds
 def contacts(positions: Floats, present: Bools, rate: float, size: float, up: int) -> Bools:
     """Return the frames in which a joint is on the ground: low and slow, with hysteresis.
 
-    Parameters
-    ----------
-    positions : (F, 3)
-        Positions of the joint.
-    present : (F,)
-        Frames that have positions.
-    rate : float
-        Frames per second.
-    size : float
-        Height of the figure.
-    up : int
-        The axis that points up.
-
-    Returns
-    -------
-    (F,)
-        Contacts of at least 0.1 seconds.
+    ``positions``: (F, 3), positions of the joint. ``present``: (F,), frames that have positions.
+    ``rate``: frames per second. Returns (F,), contacts of at least 0.1 seconds.
     """
     result = np.zeros(len(positions), dtype=np.bool_)
     if not present.any():

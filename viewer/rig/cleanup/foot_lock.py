@@ -28,26 +28,18 @@ _FARTHEST = 0.15  # maximum horizontal correction of a foot, relative to the fig
 
 @dataclass(frozen=True, slots=True)
 class FootLock:
-    """Changes made by foot locking.
-
-    Attributes
-    ----------
-    n_contacts : int
-        Number of contacts of a foot with the ground.
-    before, after : float
-        Total distance that feet slide while they are on the ground, figure units.
-    lowered : float
-        Largest distance by which the body was lowered because a leg was too short.
-    n_glides : int
-        Number of contacts in which a foot is not held because it glides too far, as on skates or
-        where the whole body drifts.
-    """
+    """Changes made by foot locking."""
 
     n_contacts: int = 0
+    """Number of contacts of a foot with the ground."""
     before: float = 0.0
     after: float = 0.0
+    """Total distance that feet slide while they are on the ground, figure units."""
     lowered: float = 0.0
+    """Largest distance by which the body was lowered because a leg was too short."""
     n_glides: int = 0
+    """Number of contacts in which a foot is not held because it glides too far, as on skates or
+    where the whole body drifts."""
 
 
 def legs_of(skeleton: Skeleton) -> list[Leg]:
@@ -73,16 +65,8 @@ def lock_feet(
     fades. Hips and knees rotate so that the ankles reach their targets; if a leg is too short, the
     body is lowered. Feet that glide farther than legs can follow are not held.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure of the motion.
-    clip : SampledClip
-        Its motion.
-    up : int
-        The vertical axis of the figure's space.
-    way : float
-        1 if it points up, -1 if it points down.
+    ``up``: the vertical axis of the figure's space. ``way``: 1 if it points up, -1 if it points
+    down.
     """
     skeleton = figure.require_skeleton()
     legs, clip = legs_of(skeleton), cast("SampledClip", in_frame_order(clip))

@@ -39,18 +39,8 @@ def in_frame_order(clip: Captured) -> Captured:
 def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
     """Return a range of frames of a clip, with unchanged times and numbers.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Any clip.
-    first, stop : int, optional
-        First frame and end frame (exclusive), in the numbering of the file; the ends of the clip if
-        omitted.
-
-    Raises
-    ------
-    RigError
-        If the range is empty or exceeds the clip.
+    ``first``, ``stop``: first frame and end frame (exclusive), in the numbering of the file; the
+    ends of the clip if omitted. Raises ``RigError`` if the range is empty or exceeds the clip.
     """
     low = clip.timing.first_frame
     high = low + clip.timing.n_frames
@@ -67,12 +57,8 @@ def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -
 def _with_rows(clip: Captured, frames: _Indices) -> Captured:
     """Return a clip of some of the frames, each with a separate row, in time order.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Any clip.
-    frames : (F,)
-        Consecutive indices of frames, from 0; rate, first frame and start are adjusted.
+    ``frames``: (F,), consecutive indices of frames, from 0; rate, first frame and start are
+    adjusted.
     """
     timing = clip.timing
     chosen = timing.rows[frames]
@@ -103,17 +89,7 @@ def resampled(clip: Captured, rate: float) -> Captured:
     original frames, values are unchanged. A new frame between two original frames is missing if
     either of those is missing. Frames are counted from 0.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Any clip.
-    rate : float
-        Frames per second.
-
-    Raises
-    ------
-    RigError
-        If there would be more than a million frames.
+    ``rate``: frames per second. Raises ``RigError`` if there would be more than a million frames.
     """
     timing = clip.timing
     count = int(np.floor((timing.n_frames - 1) / timing.frame_rate * rate + _ON_FRAME)) + 1
@@ -169,14 +145,7 @@ def points_between(clip: PointClip, times: Floats, interpolate: bool = False) ->
     Other points keep the values of the previous row or, with ``interpolate``, which also
     interpolates across gaps, are invisible.
 
-    Parameters
-    ----------
-    clip : PointClip
-        Points.
-    times : (T,)
-        Seconds.
-    interpolate : bool
-        See above.
+    ``times``: (T,), seconds.
     """
     before, after, fraction = clip.timing.locate(times, interpolate)
     start, end = clip.points[before], clip.points[after]

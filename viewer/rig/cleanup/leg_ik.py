@@ -25,20 +25,14 @@ _FLEXED = np.sin(np.radians(15.0))
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Joints of one leg.
-
-    Attributes
-    ----------
-    hip, knee, ankle : int
-        Indices in the skeleton.
-    toe : int
-        The ball of the foot; the ankle if there is none.
-    """
+    """Joints of one leg."""
 
     hip: int
     knee: int
     ankle: int
+    """Indices in the skeleton."""
     toe: int
+    """The ball of the foot; the ankle if there is none."""
 
 
 def leg_rotations(
@@ -53,20 +47,10 @@ def leg_rotations(
 
     Feet keep their orientation in the world.
 
-    Parameters
-    ----------
-    rotations : (N, J, 4)
-        Local rotations, unit quaternions.
-    world : (N, J, 4, 4)
-        World matrices of the same poses.
-    parents : (J,)
-        -1 for a root.
-    legs : sequence of Leg
-        The legs, from left to right.
-    drop : (N, 3)
-        Translation of the whole body.
-    shifts : sequence of (N, 3)
-        Translation of each leg's ankle, instead of ``drop``.
+    ``rotations``: (N, J, 4), local rotations, unit quaternions. ``world``: (N, J, 4, 4), world
+    matrices of the same poses. ``parents``: (J,), -1 for a root. ``drop``: (N, 3), translation of
+    the whole body. ``shifts``: sequence of (N, 3), translation of each leg's ankle, instead of
+    ``drop``.
     """
     result = rotations.copy()
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
@@ -104,19 +88,10 @@ def bend(
     at the target, so the knee keeps its direction. The nearer a leg is to straight, the more the
     knee points forwards instead, perpendicular to its axis.
 
-    Parameters
-    ----------
-    hips, knees, ankles : (F, 3)
-        Positions.
-    targets : (F, 3)
-        Targets of the ankle; those out of reach are approached as closely as possible.
-    axis : (F, 3)
-        Unit vectors along the axis of the knee: the normal of a bent leg's plane, thigh x shin.
-
-    Returns
-    -------
-    thigh, shin : (F, 4)
-        Unit quaternions in the space of the positions: R' = Q R.
+    ``hips``, ``knees``, ``ankles``: (F, 3), positions. ``targets``: (F, 3), targets of the ankle;
+    those out of reach are approached as closely as possible. ``axis``: (F, 3), unit vectors along
+    the axis of the knee: the normal of a bent leg's plane, thigh x shin. Returns (F, 4), unit
+    quaternions in the space of the positions: R' = Q R.
     """
     upper, lower = knees - hips, ankles - knees
     a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
@@ -143,14 +118,9 @@ def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats
     This is the mean normal of the leg's plane, thigh x shin, weighted by the fourth power of the
     sine of the bend; ``across`` has the weight of a bend of 15 degrees.
 
-    Parameters
-    ----------
-    thighs : (N, 3, 3)
-        World rotations of the thigh.
-    points : ((N, 3), (N, 3), (N, 3))
-        World positions of hip, knee and ankle.
-    across : (N, 3)
-        Directions from right to left: the axis of a knee that hardly bends.
+    ``thighs``: (N, 3, 3), world rotations of the thigh. ``points``: ((N, 3), (N, 3), (N, 3)), world
+    positions of hip, knee and ankle. ``across``: (N, 3), directions from right to left: the axis of
+    a knee that hardly bends.
     """
     hips, knees, ankles = points
     upper, lower = knees - hips, ankles - knees
@@ -181,25 +151,9 @@ def lowering(
 ) -> Floats:
     """Return how far the body must be lowered so that all ankle targets are in reach.
 
-    Parameters
-    ----------
-    points : (N, J, 3)
-        World positions of the joints.
-    legs : sequence of Leg
-        The legs.
-    shifts : sequence of (N, 3)
-        Translation of each leg's ankle.
-    rate : float
-        Frames per second.
-    up : (3,)
-        The up axis.
-    extended : float
-        Legs extend up to this fraction of their full length, or up to their previous extension.
-
-    Returns
-    -------
-    (N,)
-        Distances along the up axis, smooth over time.
+    ``points``: (N, J, 3), world positions of the joints. ``shifts``: sequence of (N, 3),
+    translation of each leg's ankle. ``rate``: frames per second. ``up``: (3,), the up axis. Returns
+    (N,), distances along the up axis, smooth over time.
     """
     needed = np.zeros(len(points))
     for leg, shift in zip(legs, shifts, strict=True):

@@ -49,14 +49,7 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
 
     Shapes and scales are unchanged.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Any clip.
-    chosen : Filter
-        The filter.
-    metres : float
-        Length of the clip's unit.
+    ``metres``: length of the clip's unit.
     """
     ordered = in_frame_order(clip)
     rate = ordered.timing.frame_rate
@@ -86,13 +79,7 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
 
 
 def run_lengths(clip: Captured) -> list[int]:
-    """Return the lengths of the runs of frames that are filtered separately.
-
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Any clip; each of its points has separate runs.
-    """
+    """Return the lengths of the runs of frames that are filtered separately."""
     if not isinstance(clip, PointClip):
         return [stop - start for start, stop in runs_of(clip.timing.present)]
     rows = clip.timing.rows
@@ -135,20 +122,14 @@ class OneEuro:
     is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
     rotations, x - x' is the rotation vector from x' to x. At constant cutoff, both passes together
     scale a frequency of w radians per frame by a^2 / (1 - 2 (1 - a) cos w + (1 - a)^2).
-
-    Attributes
-    ----------
-    cutoff : float
-        Cutoff frequency at rest, Hz.
-    beta : float
-        Hz per radian per second for rotations, per metre per second for positions.
-    speed_cutoff : float
-        Cutoff frequency of the speed, Hz.
     """
 
     cutoff: float = 3.0
+    """Cutoff frequency at rest, Hz."""
     beta: float = 2.0
+    """Hz per radian per second for rotations, per metre per second for positions."""
     speed_cutoff: float = 1.0
+    """Cutoff frequency of the speed, Hz."""
 
     def rotations(self, quaternions: Floats, rate: float) -> Floats:
         """Return filtered unit quaternions (N, ..., 4) of frames at ``rate`` per second."""
@@ -235,17 +216,12 @@ class SavitzkyGolay:
     Near the ends of a motion, the window stays within the motion, and the polynomial is evaluated
     away from the middle of the window. Rotations are fitted as rotation vectors relative to the
     rotation of the frame, so constant and uniform rotations are unchanged.
-
-    Attributes
-    ----------
-    window : int
-        Odd number of frames; 0 for 0.2 seconds.
-    order : int
-        Degree of the polynomial, less than the window.
     """
 
     window: int = 0
+    """Odd number of frames; 0 for 0.2 seconds."""
     order: int = 2
+    """Degree of the polynomial, less than the window."""
 
     def frames(self, rate: float) -> int:
         """Return the length of the window at a frame rate, frames."""
@@ -320,15 +296,8 @@ def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
 
     The sign of a quaternion matters: a negative real part means a rotation by more than pi.
 
-    Parameters
-    ----------
-    base, quaternions : (..., 4)
-        Unit quaternions b and q.
-
-    Returns
-    -------
-    (..., 3)
-        Radians, in the space of ``base``.
+    ``base``, ``quaternions``: (..., 4), unit quaternions b and q. Returns (..., 3), radians, in the
+    space of ``base``.
 
     >>> half_turn = np.array([0.0, 0.0, 1.0, 0.0])
     >>> _relative_vectors(np.array([0.0, 0.0, 0.0, 1.0]), half_turn).round(6).tolist()

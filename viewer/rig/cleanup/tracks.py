@@ -19,18 +19,12 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Gaps of a clip as half-open ranges of frames, counted from 0.
-
-    Attributes
-    ----------
-    closed : tuple of (int, int)
-        Gaps that were interpolated.
-    left : tuple of (int, int)
-        Gaps that are too long.
-    """
+    """Gaps of a clip as half-open ranges of frames, counted from 0."""
 
     closed: tuple[Span, ...] = ()
+    """Gaps that were interpolated."""
     left: tuple[Span, ...] = ()
+    """Gaps that are too long."""
 
 
 def inner_gaps(clip: SampledClip | PointClip) -> list[Span]:
@@ -49,12 +43,7 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
     Everything else is interpolated linearly. Frames before the first and after the last one stay
     missing.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Any clip.
-    longest : int, optional
-        Number of frames of the longest gap to interpolate; all gaps if omitted.
+    ``longest``: number of frames of the longest gap to interpolate; all gaps if omitted.
     """
     gaps = inner_gaps(clip)
     limit = clip.timing.n_frames if longest is None else longest
@@ -107,15 +96,7 @@ def common_frames(first: Captured, second: Captured) -> Ints:
 def joined_tracks(first: Captured, second: Captured) -> Captured:
     """Return a clip with the frames of both clips; the first takes precedence.
 
-    Parameters
-    ----------
-    first, second : SampledClip or PointClip
-        Clips of one skeleton, or of the same points, on one timeline.
-
-    Raises
-    ------
-    RigError
-        If the timelines, joints or points differ.
+    Raises ``RigError`` if the timelines, joints or points differ.
     """
     a, b = first.timing, second.timing
     if (a.frame_rate, a.first_frame, a.start) != (b.frame_rate, b.first_frame, b.start):

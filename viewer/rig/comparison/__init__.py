@@ -52,28 +52,12 @@ def compare(
     are converted to the unit of the first if both are known. The actors are left in the pose in
     which their meshes are farthest apart.
 
-    Parameters
-    ----------
-    first, second : Actor
-        The first is the reference: lengths are given in its unit and as fractions of its size.
-    skinning : Skinning, optional
-        Skinning options of both meshes.
-    n_poses : int
-        Number of test poses for figures without motion; see ``steps_of``.
-    frames : (int or None, int or None), optional
-        First frame and end frame (exclusive), in the numbering of the first motion.
-    report : callable, optional
-        Called with the number of finished steps and their total.
-
-    Returns
-    -------
-    Difference
-        Result with a mismatch for everything that only one actor has.
-
-    Raises
-    ------
-    RigError
-        If the range contains no frame, or surfaces differ and SciPy is missing.
+    ``first``, ``second``: the first is the reference: lengths are given in its unit and as
+    fractions of its size. ``n_poses``: number of test poses for figures without motion; see
+    ``steps_of``. ``frames``: (int or None, int or None), first frame and end frame (exclusive), in
+    the numbering of the first motion. Returns result with a mismatch for everything that only one
+    actor has. Raises ``RigError`` if the range contains no frame, or surfaces differ and SciPy is
+    missing.
     """
     steps = steps_of(first, second, n_poses, frames)
     return _Comparison(first, second, skinning or Skinning(), steps).run(report)
@@ -81,35 +65,23 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The differences of two figures or motions.
-
-    Attributes
-    ----------
-    measures : tuple of Measure
-        One for each property that both figures have.
-    mismatches : tuple of Diagnostic
-        Items that only one figure has, such as joints or frames; no tolerance applies to them.
-    notes : tuple of Diagnostic
-        Notes on the method of comparison.
-    size : float
-        Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
-    unit : str
-        Unit of the first figure, as in ``Figure.unit``.
-    """
+    """The differences of two figures or motions."""
 
     measures: tuple[Measure, ...]
+    """One for each property that both figures have."""
     mismatches: tuple[Diagnostic, ...]
+    """Items that only one figure has, such as joints or frames; no tolerance applies to them."""
     notes: tuple[Diagnostic, ...]
+    """Notes on the method of comparison."""
     size: float
+    """Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit."""
     unit: str
+    """Unit of the first figure, as in ``Figure.unit``."""
 
     def exceeds(self, tolerance: float) -> bool:
         """Return whether any difference exceeds a tolerance.
 
-        Parameters
-        ----------
-        tolerance : float
-            Limit for lengths as fractions of the size, angles in radians, and weights.
+        ``tolerance``: limit for lengths as fractions of the size, angles in radians, and weights.
         """
         # Written as "not within" rather than "more than", so that NaN exceeds any tolerance.
         within = all(measure.relative(self.size) <= tolerance for measure in self.measures)
@@ -118,36 +90,26 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """The difference of one property.
-
-    Attributes
-    ----------
-    name : str
-        ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
-    kind : "length", "angle" or "weight"
-        Lengths are in the first figure's unit, angles in radians; weights are dimensionless.
-    maximum, mean : float
-        Maximum and mean over all compared items and steps.
-    step, item : str
-        Location of the maximum: a frame or test pose, and a joint or vertex. The step is empty for
-        weights, which do not depend on the pose.
-    items : tuple of str
-        Names of the entries of ``item_maxima``; empty for vertices, which have indices.
-    item_maxima : (N,)
-        Largest value of each joint or vertex over all steps; 0 where nothing was compared.
-    n_compared : int
-        Number of values in the mean.
-    """
+    """The difference of one property."""
 
     name: str
+    """``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …."""
     kind: str
+    """One of "length", "angle" or "weight". Lengths are in the first figure's unit, angles in
+    radians; weights are dimensionless."""
     maximum: float
     mean: float
+    """Maximum and mean over all compared items and steps."""
     step: str
     item: str
+    """Location of the maximum: a frame or test pose, and a joint or vertex. The step is empty for
+    weights, which do not depend on the pose."""
     items: tuple[str, ...]
+    """Names of the entries of ``item_maxima``; empty for vertices, which have indices."""
     item_maxima: Floats
+    """(N,). Largest value of each joint or vertex over all steps; 0 where nothing was compared."""
     n_compared: int
+    """Number of values in the mean."""
 
     def relative(self, size: float) -> float:
         """Return the value that a tolerance applies to: lengths as a fraction of the size."""
@@ -157,11 +119,8 @@ class Measure:
 def content_notes(first: Figure, second: Figure) -> list[Diagnostic]:
     """Return notes about materials, parts, blend shapes and animations that differ.
 
-    Parameters
-    ----------
-    first, second : Figure
-        The figures. Kinds of content that only one figure has are not reported: few formats store
-        them.
+    ``first``, ``second``: the figures. Kinds of content that only one figure has are not reported:
+    few formats store them.
     """
     notes = []
     for what, names in (
@@ -373,21 +332,8 @@ class _Comparison:
 class _Tally:
     """Accumulator of a measure over all steps.
 
-    Parameters
-    ----------
-    name, kind : str
-        As in ``Measure``.
-    count : int
-        Number of joints or vertices.
-    items : tuple of str
-        Names of the joints; empty for vertices, which have indices.
-
-    Attributes
-    ----------
-    worst : float
-        Largest value so far, negative before the first.
-    step : str
-        Step of the largest value.
+    ``worst``: largest value so far, negative before the first. ``name``, ``kind``: as in
+    ``Measure``. ``items``: names of the joints; empty for vertices, which have indices.
     """
 
     def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:

@@ -24,38 +24,23 @@ _KEYS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """Matched names.
-
-    Attributes
-    ----------
-    first, second : (N,) int32
-        Indices into both lists, in the order of the first list.
-    names : tuple of N str
-        Names in the first list.
-    mismatches, notes : tuple of Diagnostic
-        Unmatched names; notes on items that were not matched by name.
-    """
+    """Matched names."""
 
     first: Ints
     second: Ints
+    """(N,) int32. Indices into both lists, in the order of the first list."""
     names: tuple[str, ...]
+    """Names in the first list."""
     mismatches: tuple[Diagnostic, ...] = ()
     notes: tuple[Diagnostic, ...] = ()
+    """Unmatched names; notes on items that were not matched by name."""
 
 
 def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     """Match joints by name, or by index if no name matches and the joint counts are equal.
 
-    Parameters
-    ----------
-    first, second : Skeleton
-        Skeletons of two figures.
-
-    Returns
-    -------
-    Pairs
-        Matched joints, with mismatches for unmatched joints and joints with different parents, and
-        a note if the order differs, as skins and clips refer to joints by index.
+    Returns matched joints, with mismatches for unmatched joints and joints with different parents,
+    and a note if the order differs, as skins and clips refer to joints by index.
     """
     pairs = pair_names(_unique_labels(first), _unique_labels(second), "joint")
     parents = [
@@ -103,18 +88,9 @@ def _places(found: Ints, count: int) -> Ints:
 def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     """Match two lists of names.
 
-    Parameters
-    ----------
-    first, second : sequences of str
-        Names, each list without duplicates.
-    what : str
-        The kind of item: ``"joint"``, ``"DOF"`` or ``"point"``.
-
-    Returns
-    -------
-    Pairs
-        Matched names; if no name matches and both lists have the same length, matched by index,
-        with a note.
+    ``first``, ``second``: names, each list without duplicates. ``what``: the kind of item:
+    ``"joint"``, ``"DOF"`` or ``"point"``. Returns matched names; if no name matches and both lists
+    have the same length, matched by index, with a note.
     """
     numbers = {name: number for number, name in enumerate(second)}
     shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]
@@ -138,15 +114,7 @@ def rotation_distance(first: Floats, second: Floats) -> Floats:
 
     It stays accurate for small angles, unlike the arc cosine of the trace.
 
-    Parameters
-    ----------
-    first, second : (..., 3, 3)
-        Rotation matrices.
-
-    Returns
-    -------
-    (...)
-        Radians, 0 to pi.
+    ``first``, ``second``: (..., 3, 3), rotation matrices. Returns (...), radians, 0 to pi.
 
     >>> quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     >>> round(float(rotation_distance(np.eye(3), quarter)), 12) == round(np.pi / 2, 12)
@@ -161,17 +129,7 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
 
     The maximum for rows that sum to 1 is 2, if no joint has weight in both.
 
-    Parameters
-    ----------
-    first, second : Skin
-        Influences of the same V vertices.
-    pairs : Pairs
-        Matched joints; weights of unmatched joints are included in full.
-
-    Returns
-    -------
-    (V,)
-        0 for equal rows, regardless of the order of influences and of duplicate joints.
+    Returns (V,), 0 for equal rows, regardless of the order of influences and of duplicate joints.
     """
     # Unmatched joints of the second skin get indices that the first skin does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
@@ -187,19 +145,8 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
 def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
     """Interpolate a skin's weights at points of its surface by barycentric coordinates.
 
-    Parameters
-    ----------
-    skin : Skin
-        Influences on the mesh on which the points lie.
-    triangles : (T, 3)
-        Triangles of that mesh.
-    found : SurfacePoints
-        N points.
-
-    Returns
-    -------
-    Skin
-        Influences of N vertices; a vertex may list a joint several times.
+    ``triangles``: (T, 3), triangles of that mesh. Returns influences of N vertices; a vertex may
+    list a joint several times.
     """
     corners = skin_rows(skin, triangles[found.triangles].ravel())
     factors = np.repeat(found.barycentric.ravel(), np.diff(corners.starts))

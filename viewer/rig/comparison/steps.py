@@ -28,32 +28,22 @@ _SAME_TIME = 1e-6  # seconds
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steps:
-    """Poses to compare.
-
-    Attributes
-    ----------
-    times : (F,)
-        Seconds, for two motions; empty for test poses.
-    dofs : (N, D)
-        Test poses: values of the DOFs that both figures have.
-    first, second : (D,) int32
-        Rows of these DOFs in both skeletons.
-    first_frame : int
-        Number of the first frame.
-    mismatches, notes : tuple of Diagnostic
-        DOFs or motions that only one actor has; notes on the choice of steps.
-    own : (Pose or None, Pose or None)
-        Initial poses of figures without motion.
-    """
+    """Poses to compare."""
 
     times: Floats
+    """(F,). Seconds, for two motions; empty for test poses."""
     dofs: Floats
+    """(N, D). Test poses: values of the DOFs that both figures have."""
     first: Ints
     second: Ints
+    """(D,) int32. Rows of these DOFs in both skeletons."""
     first_frame: int = 0
+    """Number of the first frame."""
     mismatches: tuple[Diagnostic, ...] = ()
     notes: tuple[Diagnostic, ...] = ()
+    """DOFs or motions that only one actor has; notes on the choice of steps."""
     own: tuple[Pose | None, Pose | None] = (None, None)
+    """(Pose or None, Pose or None). Initial poses of figures without motion."""
 
     @property
     def count(self) -> int:
@@ -85,19 +75,9 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
     and, for DOFs with the same names, in ``n_poses`` test poses within the limits of both. The
     test poses depend only on names and limits.
 
-    Parameters
-    ----------
-    first, second : Actor
-        Not modified.
-    n_poses : int
-        Test poses for figures without motion.
-    frames : (int or None, int or None), optional
-        First frame and end frame (exclusive), in the numbering of the first motion.
-
-    Raises
-    ------
-    RigError
-        If the range contains no frame.
+    ``first``, ``second``: not modified. ``n_poses``: test poses for figures without motion.
+    ``frames``: (int or None, int or None), first frame and end frame (exclusive), in the numbering
+    of the first motion. Raises ``RigError`` if the range contains no frame.
     """
     if first.clip is not None and second.clip is not None:
         return _motion_steps(first, second, frames)

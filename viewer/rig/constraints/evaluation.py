@@ -53,19 +53,9 @@ def constrained(
     The result does not depend on the rotations of constrained joints, so the function is
     idempotent.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides constraints, hierarchy and rest rotations.
-    rotations : (J, ..., 4)
-        Local rotations, unit quaternions (x, y, z, w).
-    translations, scales : (J, ..., 3)
-        Local positions and factors; ``...`` is broadcast.
-
-    Returns
-    -------
-    (J, ..., 4)
-        Local rotations.
+    ``rotations``: (J, ..., 4), local rotations, unit quaternions (x, y, z, w). ``translations``,
+    ``scales``: (J, ..., 3), local positions and factors; ``...`` is broadcast. Returns (J, ..., 4),
+    local rotations.
     """
     if not skeleton.constraints:
         return rotations

@@ -34,24 +34,16 @@ _FEW = 10_000  # number of points below which starting threads costs more time t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfacePoints:
-    """Points on the triangles of a mesh.
-
-    Attributes
-    ----------
-    triangles : (N,) int32
-        Triangle on which each point lies; any one of several equally close triangles.
-    barycentric : (N, 3)
-        Weights of its corners, from 0 to 1, with a sum of 1.
-    positions : (N, 3)
-        Positions in the mesh's space.
-    distances : (N,)
-        Distances from the query points, in the mesh's unit.
-    """
+    """Points on the triangles of a mesh."""
 
     triangles: Ints
+    """(N,) int32. Triangle on which each point lies; any one of several equally close triangles."""
     barycentric: Floats
+    """(N, 3). Weights of its corners, from 0 to 1, with a sum of 1."""
     positions: Floats
+    """(N, 3). Positions in the mesh's space."""
     distances: Floats
+    """(N,). Distances from the query points, in the mesh's unit."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -66,17 +58,9 @@ class SurfacePoints:
 class Surface:
     """A mesh prepared for closest-point queries.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Any unit.
-    triangles : (T, 3)
-        Vertex indices. Degenerate triangles are treated as segments or points.
-
-    Raises
-    ------
-    RigError
-        If there is no triangle, an index is out of range, or SciPy is missing.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Degenerate triangles are
+    treated as segments or points. Raises ``RigError`` if there is no triangle, an index is out of
+    range, or SciPy is missing.
     """
 
     def __init__(self, positions: Floats, triangles: Ints) -> None:
@@ -97,20 +81,7 @@ class Surface:
     def closest(self, points: Floats) -> SurfacePoints:
         """Find the closest point of the surface to each point.
 
-        Parameters
-        ----------
-        points : (N, 3)
-            In the mesh's space.
-
-        Returns
-        -------
-        SurfacePoints
-            Closest point to each query point.
-
-        Raises
-        ------
-        RigError
-            If a coordinate is not finite.
+        ``points``: (N, 3), in the mesh's space. Raises ``RigError`` if a coordinate is not finite.
         """
         points = frozen("points", points, (None, 3)) - self._center
         found = np.zeros(len(points), dtype=np.int32)
@@ -195,19 +166,9 @@ class Surface:
 def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
     """Interpolate vertex values at points of the surface: x = b0 x_a + b1 x_b + b2 x_c.
 
-    Parameters
-    ----------
-    found : SurfacePoints
-        N points.
-    triangles : (T, 3)
-        Vertex indices of the same mesh.
-    values : (V, ...) array or (V, J) sparse matrix
-        One row per vertex of the mesh.
-
-    Returns
-    -------
-    (N, ...) array or (N, J) sparse matrix in rows
-        Sparse if ``values`` is sparse.
+    ``triangles``: (T, 3), vertex indices of the same mesh. ``values``: (V, ...) array or (V, J)
+    sparse matrix, one row per vertex of the mesh. Returns (N, ...) array or (N, J) sparse matrix in
+    rows, sparse if ``values`` is sparse.
     """
     corners = triangles[found.triangles]
     if not isinstance(values, np.ndarray):

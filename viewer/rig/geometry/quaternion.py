@@ -14,15 +14,8 @@ _PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u t
 def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
     """Return q = (sin(t/2) r / t, cos(t/2)) of rotation vectors r with angle t = |r|.
 
-    Parameters
-    ----------
-    vectors : (..., 3)
-        Axis times angle, radians.
-
-    Returns
-    -------
-    (..., 4)
-        Unit quaternions (x, y, z, w).
+    ``vectors``: (..., 3), axis times angle, radians. Returns (..., 4), unit quaternions (x, y, z,
+    w).
 
     >>> rotation_vector_to_quaternion(np.array([0.0, 0.0, np.pi])).round(12).tolist()
     [0.0, 0.0, 1.0, 0.0]
@@ -36,16 +29,9 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
 def between(start: Floats, end: Floats) -> Floats:
     """Return the smallest rotations from one direction to another: q = (a x b, 1 + a . b) / |q|.
 
-    Parameters
-    ----------
-    start, end : (..., 3)
-        Vectors a and b, of any length here; if one is 0, the result is the identity.
-
-    Returns
-    -------
-    (..., 4)
-        Unit quaternions (x, y, z, w). For opposite vectors, a rotation by 180 degrees about any
-        perpendicular axis.
+    ``start``, ``end``: (..., 3), vectors a and b, of any length here; if one is 0, the result is
+    the identity. Returns (..., 4), unit quaternions (x, y, z, w). For opposite vectors, a rotation
+    by 180 degrees about any perpendicular axis.
 
     >>> between(np.array([0.0, 2.0, 0.0]), np.array([0.0, -1.0, 0.0])).tolist()
     [0.0, 0.0, -1.0, 0.0]
@@ -77,15 +63,7 @@ def align_signs(quaternions: Floats) -> None:
 def conjugate(quaternions: Floats) -> Floats:
     """Return the inverses of unit quaternions.
 
-    Parameters
-    ----------
-    quaternions : (..., 4)
-        Unit quaternions (x, y, z, w).
-
-    Returns
-    -------
-    (..., 4)
-        (-x, -y, -z, w).
+    ``quaternions``: (..., 4), unit quaternions (x, y, z, w). Returns (..., 4), (-x, -y, -z, w).
     """
     return quaternions * [-1.0, -1.0, -1.0, 1.0]
 
@@ -93,15 +71,8 @@ def conjugate(quaternions: Floats) -> Floats:
 def multiply(first: Floats, second: Floats) -> Floats:
     """Return the Hamilton product: the rotation ``second``, followed by ``first``.
 
-    Parameters
-    ----------
-    first, second : (..., 4)
-        (x, y, z, w).
-
-    Returns
-    -------
-    (..., 4)
-        R(first) R(second) as a quaternion.
+    ``first``, ``second``: (..., 4), (x, y, z, w). Returns (..., 4), r(first) R(second) as a
+    quaternion.
     """
     a, b = np.broadcast_arrays(np.asarray(first, float), np.asarray(second, float))
     result = np.empty(a.shape)
@@ -117,17 +88,9 @@ def slerp(start: Floats, end: Floats, fraction: Floats | float) -> Floats:
 
     q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), with q1 negated if q0 . q1 < 0.
 
-    Parameters
-    ----------
-    start, end : (..., 4)
-        Unit quaternions (x, y, z, w).
-    fraction : (...)
-        0 gives ``start``, 1 gives ``end`` (or its negative, the same rotation).
-
-    Returns
-    -------
-    (..., 4)
-        Unit quaternions.
+    ``start``, ``end``: (..., 4), unit quaternions (x, y, z, w). ``fraction``: (...), 0 gives
+    ``start``, 1 gives ``end`` (or its negative, the same rotation). Returns (..., 4), unit
+    quaternions.
 
     >>> half = np.sqrt(0.5)
     >>> quarter = slerp(np.array([0, 0, 0, 1.0]), np.array([0, 0, 1.0, 0]), 0.5)

@@ -13,21 +13,14 @@ _EDGE = 1e-9  # barycentric tolerance: no ray may pass between two adjacent tria
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RayHit:
-    """The intersection of a ray with a surface.
-
-    Attributes
-    ----------
-    triangle : int
-        Index of the triangle that is hit.
-    barycentric : (3,)
-        Weights of its corners, with a sum of 1.
-    distance : float
-        Distance from the ray's origin, in multiples of the length of its direction.
-    """
+    """The intersection of a ray with a surface."""
 
     triangle: int
+    """Index of the triangle that is hit."""
     barycentric: Floats
+    """(3,). Weights of its corners, with a sum of 1."""
     distance: float
+    """Distance from the ray's origin, in multiples of the length of its direction."""
 
 
 def first_hit(
@@ -38,14 +31,8 @@ def first_hit(
     With edges e1, e2 from corner a, o + t d = a + u e1 + v e2 is solved by determinants
     (Möller and Trumbore 1997, eq. 6).
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Vertices.
-    triangles : (T, 3)
-        Vertex indices.
-    origin, direction : (3,)
-        Ray in the same space; triangles behind its origin are ignored.
+    ``positions``: (V, 3), vertices. ``triangles``: (T, 3), vertex indices. ``origin``,
+    ``direction``: (3,), ray in the same space; triangles behind its origin are ignored.
 
     >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     >>> eye, ahead = np.array([0.25, 0.25, 2.0]), np.array([0.0, 0.0, -1.0])

@@ -12,17 +12,7 @@ _SMALL = 1e-8  # squared angle below which the Taylor series are exact to the la
 def axis_rotations(axis: int, angles: Floats) -> Floats:
     """Return the matrices of right-handed rotations about one coordinate axis.
 
-    Parameters
-    ----------
-    axis : int
-        0 for x, 1 for y, 2 for z.
-    angles : (...)
-        Radians.
-
-    Returns
-    -------
-    (..., 3, 3)
-        Matrices for column vectors.
+    ``angles``: (...), radians. Returns (..., 3, 3), matrices for column vectors.
 
     >>> bool(np.allclose(axis_rotations(2, np.array(np.pi / 2)) @ [1, 0, 0], [0, 1, 0]))
     True
@@ -42,15 +32,8 @@ def quaternion_to_matrix(quaternions: Floats) -> Floats:
 
     With q = (x, y, z, w) of any non-zero length, R v = q v q* / |q|^2 (Shoemake 1985).
 
-    Parameters
-    ----------
-    quaternions : (..., 4)
-        (x, y, z, w); they need not be of unit length.
-
-    Returns
-    -------
-    (..., 3, 3)
-        Matrices for column vectors.
+    ``quaternions``: (..., 4), (x, y, z, w); they need not be of unit length. Returns (..., 3, 3),
+    matrices for column vectors.
 
     >>> half = np.sqrt(0.5)
     >>> rotated = quaternion_to_matrix(np.array([0, 0, half, half])) @ [1, 0, 0]
@@ -79,15 +62,8 @@ def rotation_vector_to_matrix(vectors: Floats) -> Floats:
     a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 are accurate at any angle t, whereas
     (1 - cos t) / t^2 suffers from cancellation near 0.
 
-    Parameters
-    ----------
-    vectors : (..., 3)
-        Axis times angle, radians.
-
-    Returns
-    -------
-    (..., 3, 3)
-        Matrices for column vectors.
+    ``vectors``: (..., 3), axis times angle, radians. Returns (..., 3, 3), matrices for column
+    vectors.
 
     >>> rotated = rotation_vector_to_matrix(np.array([0, 0, np.pi / 2])) @ [1, 0, 0]
     >>> bool(np.allclose(rotated, [0, 1, 0]))
@@ -111,15 +87,7 @@ def rotation_vector_to_matrix(vectors: Floats) -> Floats:
 def matrix_to_quaternion(matrices: Floats) -> Floats:
     """Return the unit quaternions of rotation matrices, w >= 0 (Shepperd 1978).
 
-    Parameters
-    ----------
-    matrices : (..., 3, 3)
-        Rotations for column vectors.
-
-    Returns
-    -------
-    (..., 4)
-        (x, y, z, w).
+    ``matrices``: (..., 3, 3), rotations for column vectors. Returns (..., 4), (x, y, z, w).
 
     >>> matrix_to_quaternion(np.eye(3)).tolist()
     [0.0, 0.0, 0.0, 1.0]
@@ -157,15 +125,7 @@ def matrix_to_quaternion(matrices: Floats) -> Floats:
 def matrix_to_rotation_vector(matrices: Floats) -> Floats:
     """Return the rotation vectors of rotation matrices: axis times angle, 0 to pi.
 
-    Parameters
-    ----------
-    matrices : (..., 3, 3)
-        Rotations for column vectors.
-
-    Returns
-    -------
-    (..., 3)
-        Radians.
+    ``matrices``: (..., 3, 3), rotations for column vectors. Returns (..., 3), radians.
 
     >>> vector = np.array([0.3, -0.2, 0.1])
     >>> bool(np.allclose(matrix_to_rotation_vector(rotation_vector_to_matrix(vector)), vector))
@@ -186,15 +146,8 @@ def matrix_to_euler(matrices: Floats) -> Floats:
     In gimbal lock (y = +-90 degrees) x and z rotate about the same axis, so only their sum or
     difference is determined. The angles returned still reproduce R exactly.
 
-    Parameters
-    ----------
-    matrices : (..., 3, 3)
-        Rotations for column vectors.
-
-    Returns
-    -------
-    (..., 3)
-        Radians; x and z from -pi to pi, y from -pi / 2 to pi / 2.
+    ``matrices``: (..., 3, 3), rotations for column vectors. Returns (..., 3), radians; x and z from
+    -pi to pi, y from -pi / 2 to pi / 2.
 
     >>> bool(np.allclose(matrix_to_euler(axis_rotations(1, np.array(0.5))), [0, 0.5, 0]))
     True
@@ -213,17 +166,9 @@ def matrix_to_euler(matrices: Floats) -> Floats:
 def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     """Split matrices into rotation and stretch, M = R P (polar decomposition by SVD).
 
-    Parameters
-    ----------
-    matrices : (..., 3, 3)
-        Matrices to split; a reflection results in a stretch with a negative determinant.
-
-    Returns
-    -------
-    rotations : (..., 3, 3)
-        The proper rotations nearest to the matrices.
-    stretches : (..., 3, 3)
-        R^T M.
+    ``matrices``: (..., 3, 3), matrices to split; a reflection results in a stretch with a negative
+    determinant. Returns ``rotations``: (..., 3, 3), the proper rotations nearest to the matrices;
+    ``stretches``: (..., 3, 3), R^T M.
     """
     # M = U S V^T yields R = U V^T, with the last column of U negated if that is a reflection.
     left, _, right = np.linalg.svd(matrices)

@@ -29,12 +29,8 @@ _HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two co
 def welded(positions: Floats, triangles: Ints) -> Indices:
     """Return triangles with coincident vertices merged, so that seams are closed.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Vertices at exactly equal positions are represented by the first of them.
-    triangles : (T, 3), or any other shape
-        Vertex indices.
+    ``positions``: (V, 3), vertices at exactly equal positions are represented by the first of them.
+    ``triangles``: (T, 3), or any other shape, vertex indices.
     """
     # Sorting rows as three keys is several times faster than np.unique over rows.
     order = np.lexsort(positions.T)
@@ -50,37 +46,25 @@ def welded(positions: Floats, triangles: Ints) -> Indices:
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """The edges of all triangles; corner k of a triangle is the start of its edge k.
-
-    Attributes
-    ----------
-    keys : (3 T,)
-        Equal for edges with the same two vertices.
-    forward : (3 T,) bool
-        Whether the edge runs from the smaller vertex index to the larger.
-    counts : (3 T,)
-        Number of triangles with this edge.
-    pairs : (P, 2)
-        Triangles on both sides of edges that belong to exactly two triangles.
-    agree : (P,) bool
-        Whether the two triangles traverse the edge in opposite directions, as consistent neighbours
-        do.
-    """
+    """The edges of all triangles; corner k of a triangle is the start of its edge k."""
 
     keys: Indices
+    """(3 T,). Equal for edges with the same two vertices."""
     forward: Bools
+    """(3 T,) bool. Whether the edge runs from the smaller vertex index to the larger."""
     counts: Indices
+    """(3 T,). Number of triangles with this edge."""
     pairs: Indices
+    """(P, 2). Triangles on both sides of edges that belong to exactly two triangles."""
     agree: Bools
+    """(P,) bool. Whether the two triangles traverse the edge in opposite directions, as consistent
+    neighbours do."""
 
 
 def edges_of(corners: Indices) -> Edges:
     """Return the edges of triangles; those between equal vertices are excluded from the pairs.
 
-    Parameters
-    ----------
-    corners : (T, 3)
-        Vertex indices.
+    ``corners``: (T, 3), vertex indices.
     """
     start = corners.ravel().astype(np.int64)
     end = np.roll(corners, -1, axis=1).ravel().astype(np.int64)
@@ -101,12 +85,7 @@ def components(count: int, pairs: Indices) -> Indices:
     In each round, every root takes the smallest label across its edges, and labels are followed
     until they refer to themselves, so the number of rounds is logarithmic in the number of nodes.
 
-    Parameters
-    ----------
-    count : int
-        Number of nodes.
-    pairs : (P, 2)
-        Pairs of connected nodes.
+    ``pairs``: (P, 2), pairs of connected nodes.
     """
     labels = np.arange(count)
     while True:
@@ -126,22 +105,9 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     Every triangle is represented by two nodes, unflipped and flipped; edges connect consistent
     nodes. If both are in one component, the surface is non-orientable (Moebius).
 
-    Parameters
-    ----------
-    count : int
-        Number of triangles.
-    edges : Edges
-        Edges of these triangles.
-
-    Returns
-    -------
-    component : (count,)
-        Smallest triangle of each triangle's component.
-    flipped : (count,) bool
-        True for the smaller part of each component; of two equal parts, for the one without the
-        first triangle.
-    one_sided : (count,) bool
-        Triangles of components that are not orientable.
+    Returns ``component``: (count,), smallest triangle of each triangle's component; ``flipped``:
+    true for the smaller part of each component; of two equal parts, for the one without the first
+    triangle; ``one_sided``: triangles of components that are not orientable.
     """
     a, b = edges.pairs[:, 0], edges.pairs[:, 1]
     flip = np.where(edges.agree, 0, count)
@@ -163,19 +129,14 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shell:
-    """A closed surface whose triangles are counter-clockwise from outside.
-
-    Attributes
-    ----------
-    borders : (B,) int32
-        Vertices around its openings.
-    copies, originals : (N,) int32
-        Pairs of vertices at the same position; the surface is closed while these coincide.
-    """
+    """A closed surface whose triangles are counter-clockwise from outside."""
 
     borders: Ints
+    """(B,) int32. Vertices around its openings."""
     copies: Ints
     originals: Ints
+    """(N,) int32. Pairs of vertices at the same position; the surface is closed while these
+    coincide."""
 
     def is_closed(self, positions: Floats) -> bool:
         """Return whether coincident vertices still coincide at positions (V, 3)."""
@@ -185,18 +146,9 @@ class Shell:
 def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     """Return a mesh as a shell; None if its surface is not closed.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        In the bind pose.
-    skin : Skin or None
-        Vertices at the same position must have the same influences.
-
-    Returns
-    -------
-    Shell or None
-        None if edges belong to more than two triangles, if neighbours have opposite orientations,
-        if a connected part is clockwise or open, or if the mesh has more than 500,000 triangles.
+    ``skin``: vertices at the same position must have the same influences. Returns none if edges
+    belong to more than two triangles, if neighbours have opposite orientations, if a connected part
+    is clockwise or open, or if the mesh has more than 500,000 triangles.
     """
     if not 0 < mesh.n_triangles <= _MOST_TRIANGLES:
         return None

@@ -11,15 +11,7 @@ from viewer.rig.geometry.rotation import axis_rotations
 def translation_matrix(offset: Floats) -> Floats:
     """Return the matrices that translate by ``offset``.
 
-    Parameters
-    ----------
-    offset : (..., 3)
-        Lengths.
-
-    Returns
-    -------
-    (..., 4, 4)
-        Matrices for column vectors.
+    ``offset``: (..., 3), lengths. Returns (..., 4, 4), matrices for column vectors.
 
     >>> float(translation_matrix(np.array([1.0, 2.0, 3.0]))[2, 3])
     3.0
@@ -41,17 +33,8 @@ def rotation_transform(axis: int, angle: float) -> Floats:
 def apply_transform(matrix: Floats, points: Floats) -> Floats:
     """Transform points: p' = M [p 1].
 
-    Parameters
-    ----------
-    matrix : (4, 4)
-        Affine matrix.
-    points : (..., 3)
-        Points in the space from which the matrix maps.
-
-    Returns
-    -------
-    (..., 3)
-        Points in the space to which it maps.
+    ``matrix``: (4, 4), affine matrix. ``points``: (..., 3), points in the space from which the
+    matrix maps. Returns (..., 3), points in the space to which it maps.
 
     >>> apply_transform(translation_matrix(np.array([1.0, 0.0, 0.0])), np.zeros(3))
     array([1., 0., 0.])

@@ -13,15 +13,7 @@ _FLAT = 1e-5
 def unit(vectors: Floats) -> Floats:
     """Return vectors of length 1; a vector of length 0 stays 0.
 
-    Parameters
-    ----------
-    vectors : (..., 3)
-        Vectors of any length.
-
-    Returns
-    -------
-    (..., 3)
-        Unit vectors.
+    ``vectors``: (..., 3), vectors of any length. Returns (..., 3), unit vectors.
 
     >>> unit(np.array([0.0, 3.0, 4.0])).tolist()
     [0.0, 0.6, 0.8]
@@ -33,17 +25,8 @@ def unit(vectors: Floats) -> Floats:
 def moved_tangents(tangents: Floats, linear: Floats) -> Floats:
     """Return tangents transformed by a matrix, t' = A t / |A t|; a reflection changes the signs.
 
-    Parameters
-    ----------
-    tangents : (N, 4)
-        Direction of u, and the sign s of the direction of v, s n x t. Zeros stay 0.
-    linear : (3, 3)
-        A.
-
-    Returns
-    -------
-    (N, 4)
-        Unit vectors and signs.
+    ``tangents``: (N, 4), direction of u, and the sign s of the direction of v, s n x t. Zeros stay
+    0. ``linear``: (3, 3). Returns (N, 4), unit vectors and signs.
 
     >>> moved_tangents(np.array([[2.0, 0.0, 0.0, 1.0]]), np.diag([1.0, 1.0, -1.0])).tolist()
     [[1.0, 0.0, 0.0, -1.0]]

@@ -30,94 +30,64 @@ _RIGID = 1e-9  # tolerance within which a stretch is treated as the identity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DualTerms:
-    """The terms of dual quaternion skinning (Kavan et al. 2008, section 4).
-
-    Attributes
-    ----------
-    fractions : (K,)
-        Weights divided by their sum, w_i / sum_j w_j.
-    duals : (K, 8)
-        Each influence's unit dual quaternion (x, y, z, w), real part, then dual part.
-    signs : (K,)
-        -1 if the quaternion was negated, into the hemisphere of the strongest influence.
-    stretches : (K, 3, 4)
-        The non-rigid part of each matrix, applied before the rigid motion.
-    blended : (8,)
-        sum_i fraction_i sign_i dual_i.
-    length : float
-        Length of the real part of ``blended``, by which both parts are divided.
-    stretched : (3,)
-        The rest position, transformed by sum_i fraction_i stretch_i.
-    position : (3,)
-        ``stretched``, moved by the blended dual quaternion; the rest position if influences cancel.
-    """
+    """The terms of dual quaternion skinning (Kavan et al. 2008, section 4)."""
 
     fractions: Floats
+    """(K,). Weights divided by their sum, w_i / sum_j w_j."""
     duals: Floats
+    """(K, 8). Each influence's unit dual quaternion (x, y, z, w), real part, then dual part."""
     signs: Floats
+    """(K,). -1 if the quaternion was negated, into the hemisphere of the strongest influence."""
     stretches: Floats
+    """(K, 3, 4). The non-rigid part of each matrix, applied before the rigid motion."""
     blended: Floats
+    """(8,). sum_i fraction_i sign_i dual_i."""
     length: float
+    """Length of the real part of ``blended``, by which both parts are divided."""
     stretched: Floats
+    """(3,). The rest position, transformed by sum_i fraction_i stretch_i."""
     position: Floats
+    """(3,). ``stretched``, moved by the blended dual quaternion; the rest position if influences
+    cancel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    """All steps from the vertex in the file to its drawn position.
-
-    Attributes
-    ----------
-    vertex : int
-        Index of the vertex.
-    skinning : Skinning
-        Skinning options.
-    stored : (3,)
-        Position in the file, bind pose.
-    shaped : (3,)
-        Position after the figure's blend shapes.
-    rest : (3,)
-        Position p before skinning, after blend shapes and pose correctives.
-    joints : (K,)
-        Joints of the effective influences, strongest first.
-    names : tuple of K str
-        Names of these joints.
-    weights : (K,)
-        w_i, pruned and normalised if enabled.
-    matrices : (K, 4, 4)
-        M_i: skinning matrices, bind pose to figure space.
-    images : (K, 3)
-        M_i p: the vertex transformed by each joint alone.
-    terms : (K, 3)
-        w_i M_i p.
-    linear : (3,)
-        Sum of the terms: linear blend skinning; the rest position of a vertex without influence.
-    dual : DualTerms or None
-        Terms of methods that use dual quaternions; None for other methods.
-    skinned : (3,)
-        Result of the skinning method.
-    placement : (4, 4)
-        The figure's own scale and translation, applied last.
-    position : (3,)
-        Drawn position, figure space.
-    """
+    """All steps from the vertex in the file to its drawn position."""
 
     vertex: int
+    """Index of the vertex."""
     skinning: Skinning
+    """Skinning options."""
     stored: Floats
+    """(3,). Position in the file, bind pose."""
     shaped: Floats
+    """(3,). Position after the figure's blend shapes."""
     rest: Floats
+    """(3,). Position p before skinning, after blend shapes and pose correctives."""
     joints: Ints
+    """(K,). Joints of the effective influences, strongest first."""
     names: tuple[str, ...]
+    """Names of these joints."""
     weights: Floats
+    """(K,). w_i, pruned and normalised if enabled."""
     matrices: Floats
+    """(K, 4, 4). M_i: skinning matrices, bind pose to figure space."""
     images: Floats
+    """(K, 3). M_i p: the vertex transformed by each joint alone."""
     terms: Floats
+    """(K, 3). w_i M_i p."""
     linear: Floats
+    """(3,). Sum of the terms: linear blend skinning; the rest position of a vertex without
+    influence."""
     dual: DualTerms | None
+    """Terms of methods that use dual quaternions; None for other methods."""
     skinned: Floats
+    """(3,). Result of the skinning method."""
     placement: Floats
+    """(4, 4). The figure's own scale and translation, applied last."""
     position: Floats
+    """(3,). Drawn position, figure space."""
 
     @property
     def is_free(self) -> bool:
@@ -131,26 +101,8 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     Linear blend skinning: v' = sum_i w_i M_i [p 1]. Dual quaternion skinning: q = sum_i s_i q_i
     w_i / sum_j w_j, v' = (q / |q|) applied to the stretched p.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with mesh, skeleton and skin.
-    pose : Pose
-        DOFs in lengths and radians.
-    skinning : Skinning
-        Skinning of the drawn mesh.
-    vertex : int
-        Index of the vertex.
-
-    Returns
-    -------
-    Explanation
-        Lengths in figure units.
-
-    Raises
-    ------
-    RigError
-        If the figure has no skin attached to a skeleton, or no such vertex.
+    ``pose``: DOFs in lengths and radians. Returns lengths in figure units. Raises ``RigError`` if
+    the figure has no skin attached to a skeleton, or no such vertex.
     """
     if not figure.is_attached:
         raise RigError(f"figure {figure.name} has no skin attached to a skeleton")
@@ -194,20 +146,7 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
 
 
 def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
-    """Return the values of an explanation as lines, in the order of computation.
-
-    Parameters
-    ----------
-    explanation : Explanation
-        Explanation of one vertex.
-    digits : int
-        Decimal places of all numbers.
-
-    Returns
-    -------
-    list of str
-        Lines for a monospaced font.
-    """
+    """Return the values of an explanation as lines, in the order of computation."""
     text = _Text(explanation, digits)
     text.rest()
     if explanation.is_free:

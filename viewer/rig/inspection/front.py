@@ -72,10 +72,7 @@ def guess_front(scene: Scene) -> Front:
     direction of its motion, or by the shape of its feet if it has neither joints nor captured
     points. The votes of actors that face opposite directions cancel out.
 
-    Parameters
-    ----------
-    scene : Scene
-        Posed scene; not modified.
+    ``scene``: posed scene; not modified.
     """
     up = np.zeros(3)
     up["xyz".index(scene.up)] = 1.0
@@ -165,19 +162,8 @@ def _path(actor: Actor) -> Floats:
 def _from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     """Return evidence from left and right: the front is left x up.
 
-    Parameters
-    ----------
-    names : sequence of J str
-        Names of joints or keypoints.
-    places : (J, 3)
-        Their positions.
-    up : (3,)
-        Unit vector.
-
-    Returns
-    -------
-    (3,)
-        Mean of the unit vectors of all pairs.
+    ``places``: (J, 3), their positions. ``up``: (3,), unit vector. Returns (3,), mean of the unit
+    vectors of all pairs.
     """
     found: dict[str, dict[str, list[Floats]]] = {}
     for (side, word), place in zip(sided_words(names), places, strict=True):
@@ -227,19 +213,8 @@ def _from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 def _from_travel(places: Floats, size: float, up: Floats) -> Floats:
     """Return evidence from a motion: figures usually move forwards.
 
-    Parameters
-    ----------
-    places : (F, 3)
-        Positions of the figure, in time order.
-    size : float
-        Size of the figure.
-    up : (3,)
-        Unit vector.
-
-    Returns
-    -------
-    (3,)
-        Total displacement divided by path length; shorter if the path is shorter than the figure.
+    ``places``: (F, 3), positions of the figure, in time order. ``up``: (3,), unit vector. Returns
+    (3,), total displacement divided by path length; shorter if the path is shorter than the figure.
     """
     steps = _horizontal(np.diff(places, axis=0), up)
     path = float(np.linalg.norm(steps, axis=1).sum())
@@ -249,18 +224,8 @@ def _from_travel(places: Floats, size: float, up: Floats) -> Floats:
 def _from_soles(positions: Floats, up: Floats) -> Floats:
     """Return evidence from a mesh alone: two symmetric soles that extend in front of the ankles.
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        Rest vertices.
-    up : (3,)
-        The unit vector of an axis.
-
-    Returns
-    -------
-    (3,)
-        0 unless the mesh has exactly one mirror plane and stands on feet on both sides of the
-        plane.
+    ``positions``: (V, 3), rest vertices. ``up``: (3,), the unit vector of an axis. Returns (3,), 0
+    unless the mesh has exactly one mirror plane and stands on feet on both sides of the plane.
     """
     height = positions @ up
     low, tall = float(height.min()), float(np.ptp(height))

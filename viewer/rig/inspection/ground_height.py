@@ -38,19 +38,13 @@ _LOW = 0.02  # quantile of the heights, for feet that never rest
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Height of the ground, or the reason why it is unknown.
-
-    Attributes
-    ----------
-    height : float or None
-        Along the up axis; None if unknown.
-    levels : tuple of (float, int)
-        Heights at which feet rest and their numbers of frames, the most frequent first; if empty,
-        the height is only an estimate.
-    """
+    """Height of the ground, or the reason why it is unknown."""
 
     height: float | None
+    """Along the up axis; None if unknown."""
     levels: tuple[_Level, ...] = ()
+    """Heights at which feet rest and their numbers of frames, the most frequent first; if empty,
+    the height is only an estimate."""
 
     @property
     def is_guess(self) -> bool:
@@ -60,18 +54,12 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class RestingHeight:
-    """Height of the ground under an actor.
-
-    Attributes
-    ----------
-    height : float
-        Along the scene's up axis, scene units.
-    is_clear : bool
-        Whether feet rest at this height; otherwise it is the height of the lowest positions.
-    """
+    """Height of the ground under an actor."""
 
     height: float
+    """Along the scene's up axis, scene units."""
     is_clear: bool
+    """Whether feet rest at this height; otherwise it is the height of the lowest positions."""
 
 
 def ground_of(
@@ -83,18 +71,8 @@ def ground_of(
     height is unknown if they rest nearly as long on another level, or on a likely level that is a
     step away, or if they rest on two lower levels, as on descending stairs.
 
-    Parameters
-    ----------
-    lowest : (F,)
-        Height of the lower sole in every frame.
-    present : (F,)
-        Frames in which the actor is present.
-    step : float
-        Seconds between frames.
-    size : float
-        Height of the figure at rest.
-    likely : sequence of float
-        Conventional ground heights, the most likely first.
+    ``lowest``: (F,), height of the lower sole in every frame. ``present``: (F,), frames in which
+    the actor is present.
     """
     rests = lowest[resting_frames(lowest, present, step, size)]
     levels = _levels(rests, size) if len(rests) > _RESTS * present.sum() else ()
@@ -112,12 +90,7 @@ def ground_of(
 def resting_height(actor: Actor, up: str) -> RestingHeight | None:
     """Return the height at which an actor's feet rest; None unless two feet are found by name.
 
-    Parameters
-    ----------
-    actor : Actor
-        Placed actor with a motion of joints.
-    up : "y" or "z"
-        Up axis of the scene.
+    ``up``: either "y" or "z", up axis of the scene.
     """
     figure, motion = actor.figure, actor.clip
     if figure.skeleton is None or not isinstance(motion, JointMotion):
@@ -173,12 +146,7 @@ def resting_frames(
 ) -> Bools:
     """Return a mask of the frames in which the lower foot rests at a constant height: (F,).
 
-    Parameters
-    ----------
-    lowest, present, step, size
-        As for ``ground_of``.
-    seconds : float
-        Minimum duration.
+    ``lowest``, ``present``, ``step``, ``size``: as for ``ground_of``.
     """
     rests = np.zeros(len(lowest), dtype=np.bool_)
     width = max(1, round(seconds / step))

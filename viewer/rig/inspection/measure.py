@@ -20,38 +20,22 @@ _HOLE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """Measurements of a rest mesh, in its own unit.
-
-    Attributes
-    ----------
-    height : float
-        Extent along the up axis.
-    volume : float or None
-        Enclosed volume, cubed units; None if the mesh is open.
-    mass : float or None
-        Volume times ``DENSITY``, kilograms; None if there is no volume or the unit is not metres.
-    n_open_edges : int
-        Number of edges that belong to a single triangle, with coincident vertices merged.
-    """
+    """Measurements of a rest mesh, in its own unit."""
 
     height: float
+    """Extent along the up axis."""
     volume: float | None
+    """Enclosed volume, cubed units; None if the mesh is open."""
     mass: float | None
+    """Volume times ``DENSITY``, kilograms; None if there is no volume or the unit is not metres."""
     n_open_edges: int = 0
+    """Number of edges that belong to a single triangle, with coincident vertices merged."""
 
 
 def measure(figure: Figure) -> Measures:
     """Measure the rest mesh of a figure whose blend shapes have been applied.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh.
-
-    Raises
-    ------
-    RigError
-        If the figure has no mesh.
+    Raises ``RigError`` if the figure has no mesh.
     """
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to measure")

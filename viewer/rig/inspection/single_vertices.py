@@ -28,26 +28,8 @@ def deform_vertices(
 ) -> tuple[Floats, Floats]:
     """Skin a selection of vertices, with the same result as ``viewer.rig.skinning.deform``.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh.
-    pose : Pose or None
-        None for the pose stored in the file.
-    skinning : Skinning
-        Skinning options of the drawn mesh.
-    vertices : (N,)
-        Indices.
-
-    Returns
-    -------
-    positions, normals : (N, 3)
-        Figure units; unit length.
-
-    Raises
-    ------
-    RigError
-        If the figure has no such vertices.
+    ``pose``: none for the pose stored in the file. ``vertices``: (N,), indices. Returns (N, 3),
+    figure units; unit length. Raises ``RigError`` if the figure has no such vertices.
     """
     check_vertices(figure, vertices)
     if pose is not None:
@@ -67,21 +49,8 @@ def deform_vertices(
 def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = True) -> Floats:
     """Return some vertices before skinning: the rest mesh plus the pose correctives.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh, already shaped.
-    pose : Pose
-        DOFs in lengths and radians.
-    vertices : (N,)
-        Indices.
-    correct : bool
-        Whether to add the pose correctives, if the figure has any.
-
-    Returns
-    -------
-    (N, 3)
-        Vertices in the bind pose.
+    ``pose``: DOFs in lengths and radians. ``vertices``: (N,), indices. ``correct``: whether to add
+    the pose correctives, if the figure has any. Returns (N, 3), vertices in the bind pose.
     """
     rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
@@ -93,10 +62,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
 def check_vertices(figure: Figure, vertices: Ints) -> None:
     """Check that indices refer to vertices of a figure.
 
-    Raises
-    ------
-    RigError
-        If an index is out of range; the message states the index and the range.
+    Raises ``RigError`` if an index is out of range; the message states the index and the range.
     """
     count = 0 if figure.mesh is None else figure.mesh.n_vertices
     wrong = vertices[(vertices < 0) | (vertices >= count)]
@@ -112,37 +78,25 @@ _MOST = 8  # maximum number of influences that are listed individually
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexFacts:
-    """Properties of a vertex.
-
-    Attributes
-    ----------
-    vertex, triangle : int
-        Indices; -1 for no triangle.
-    position : (3,)
-        Drawn position, figure space and units.
-    normal : (3,)
-        Unit length.
-    uvs : (N, 2)
-        Texture coordinates, several along a seam; the triangle's coordinates come first.
-    body_part : str
-        Body part; empty if there is none.
-    joints : (K,)
-        Joints of the effective influences of non-zero weight, by decreasing weight.
-    names : tuple of K str
-        Names of these joints.
-    weights : (K,)
-        Weights; duplicates of a joint are summed.
-    """
+    """Properties of a vertex."""
 
     vertex: int
     triangle: int
+    """Indices; -1 for no triangle."""
     position: Floats
+    """(3,). Drawn position, figure space and units."""
     normal: Floats
+    """(3,). Unit length."""
     uvs: Floats
+    """(N, 2). Texture coordinates, several along a seam; the triangle's coordinates come first."""
     body_part: str
+    """Body part; empty if there is none."""
     joints: Ints
+    """(K,). Joints of the effective influences of non-zero weight, by decreasing weight."""
     names: tuple[str, ...]
+    """Names of these joints."""
     weights: Floats
+    """(K,). Weights; duplicates of a joint are summed."""
 
 
 def vertex_facts(
@@ -150,23 +104,8 @@ def vertex_facts(
 ) -> VertexFacts:
     """Return the properties of a vertex.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a mesh.
-    pose : Pose or None
-        None for the pose stored in the file, or for a figure without a skeleton.
-    skinning : Skinning
-        Skinning options of the drawn mesh.
-    vertex : int
-        Index.
-    triangle : int
-        Triangle under the cursor, -1 for none.
-
-    Raises
-    ------
-    RigError
-        If the figure has no such vertex or triangle.
+    ``pose``: none for the pose stored in the file, or for a figure without a skeleton. Raises
+    ``RigError`` if the figure has no such vertex or triangle.
     """
     chosen = np.array([vertex], dtype=np.int32)
     check_vertices(figure, chosen)
@@ -198,14 +137,8 @@ def vertex_facts(
 def nearest_corner(positions: Floats, triangle: Ints, point: Floats) -> int:
     """Return the vertex of a triangle that is closest to a point on it.
 
-    Parameters
-    ----------
-    positions : (3, 3)
-        Positions of the triangle's corners.
-    triangle : (3,)
-        Indices of these vertices.
-    point : (3,)
-        In the same space.
+    ``positions``: (3, 3), positions of the triangle's corners. ``triangle``: (3,), indices of these
+    vertices. ``point``: (3,), in the same space.
     """
     return int(triangle[np.linalg.norm(positions - point, axis=1).argmin()])
 

@@ -23,44 +23,26 @@ _N_SIDES = 8  # number of horizontal directions of tilts
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Soles:
-    """Points that move with the joints of the feet.
-
-    Attributes
-    ----------
-    joints : (N,) int32
-        For each of N feet, the joint nearest to the ground: the ball of the foot, or the ankle.
-    feet : (P,)
-        The foot to which each point belongs.
-    movers : (P,) int32
-        The joint with which each point moves.
-    places : (P, 3)
-        Positions of the points in that joint's space.
-    above : (P,)
-        Height of each point above the sole at rest: 0 on a mesh.
-    """
+    """Points that move with the joints of the feet."""
 
     joints: Ints
+    """(N,) int32. For each of N feet, the joint nearest to the ground: the ball of the foot, or the
+    ankle."""
     feet: Ints
+    """(P,). The foot to which each point belongs."""
     movers: Ints
+    """(P,) int32. The joint with which each point moves."""
     places: Floats
+    """(P, 3). Positions of the points in that joint's space."""
     above: Floats
+    """(P,). Height of each point above the sole at rest: 0 on a mesh."""
 
     def heights(self, world: Floats, axis: Floats, scale: float) -> Floats:
         """Return the height of the lowest point of each foot.
 
-        Parameters
-        ----------
-        world : (F, J, 4, 4)
-            Joint space to figure space.
-        axis : (4,)
-            Row of the placement matrix that yields the height.
-        scale : float
-            Scene units per figure unit.
-
-        Returns
-        -------
-        (F, N)
-            Heights along the scene's up axis.
+        ``world``: (F, J, 4, 4), joint space to figure space. ``axis``: (4,), row of the placement
+        matrix that yields the height. ``scale``: scene units per figure unit. Returns (F, N),
+        heights along the scene's up axis.
         """
         points = np.append(self.places, np.ones((len(self.places), 1)), axis=1)
         result = np.full((len(world), len(self.joints)), np.inf)
@@ -91,12 +73,7 @@ def _axis(figure: Figure) -> int:
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
     """Return the soles of a skeleton whose joint names identify two feet, or None.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure in the shape in which it is animated.
-    is_bound : bool
-        Whether its bindings are valid; otherwise joints are used instead of the mesh.
+    ``is_bound``: whether its bindings are valid; otherwise joints are used instead of the mesh.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -112,14 +89,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
 def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool) -> Soles:
     """Return the soles of the given feet of a figure with a skeleton.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure in the shape in which it is animated.
-    feet : sequence of sequence of int
-        For each foot, the joint nearest to the ground, and further joints that belong to it.
-    is_bound : bool
-        Whether its bindings are valid; otherwise joints are used instead of the mesh.
+    ``is_bound``: whether its bindings are valid; otherwise joints are used instead of the mesh.
     """
     skeleton = figure.require_skeleton()
     sole, _ = extent(figure)

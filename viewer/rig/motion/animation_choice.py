@@ -42,23 +42,10 @@ def animation_labels(figure: Figure) -> tuple[str, ...]:
 def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None:
     """Return the animation that a text selects.
 
-    Parameters
-    ----------
-    figures : sequence of Figure
-        Figures with animations; numbers refer to the figure with the most animations.
-    wanted : str
-        A name or label, matched exactly or, if there is no exact match, ignoring case; a number
-        from 1; ``NONE``; or an empty string for the first animation.
-
-    Returns
-    -------
-    Animation or None
-        None for ``NONE``, and if there are no animations and none is requested.
-
-    Raises
-    ------
-    RigError
-        If there is no such animation.
+    ``wanted``: a name or label, matched exactly or, if there is no exact match, ignoring case; a
+    number from 1; ``NONE``; or an empty string for the first animation. Returns none for ``NONE``,
+    and if there are no animations and none is requested. Raises ``RigError`` if there is no such
+    animation.
     """
     longest = max(figures, key=lambda figure: len(figure.animations), default=None)
     every = () if longest is None else longest.animations
@@ -110,13 +97,6 @@ def own_first(figure: Figure, others: Sequence[Figure]) -> int:
 
     Such a figure is an independent character, which plays its first animation regardless of the
     others.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure with animations.
-    others : sequence of Figure
-        Figures of the same file, which may include it.
     """
     mine = figure.animations
     shared = any(
@@ -134,19 +114,9 @@ def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) 
     Joints that the animation does not move return to the pose stored in the file. The figure's
     placement and blend shapes that neither animation moves are unchanged.
 
-    Parameters
-    ----------
-    actor : Actor
-        An actor, which has a pose if it has animations.
-    index : int
-        Index of the animation; -1 for none.
-    clip : TransformClip, optional
-        Edited keys of the animation; the file's keys if omitted.
-
-    Raises
-    ------
-    FormatError
-        If the keys are invalid; the actor is then unchanged.
+    ``actor``: an actor, which has a pose if it has animations. ``clip``: edited keys of the
+    animation; the file's keys if omitted. Raises ``FormatError`` if the keys are invalid; the actor
+    is then unchanged.
     """
     chosen: TransformClip | None = None
     if index >= 0:
@@ -192,19 +162,8 @@ def own_animations(
 
     Animations without keys are omitted.
 
-    Parameters
-    ----------
-    actor : Actor
-        See ``has_own_animations``.
-    only_played : bool
-        Return only the one that it plays.
-    refused : list of FormatError, optional
-        Receives the errors of animations with invalid keys, which are then left out.
-
-    Raises
-    ------
-    FormatError
-        If the keys of an animation are invalid, and ``refused`` is not given.
+    ``actor``: see ``has_own_animations``. ``only_played``: return only the one that it plays.
+    Raises ``FormatError`` if the keys of an animation are invalid, and ``refused`` is not given.
     """
     played = actor.clip if isinstance(actor.clip, TransformClip) else None
     if only_played:
@@ -225,13 +184,7 @@ def own_animations(
 
 
 def still_pose(actor: Actor) -> Pose:
-    """Return an actor's pose, with everything that its motion changes reset to the file's pose.
-
-    Parameters
-    ----------
-    actor : Actor
-        An actor with a pose.
-    """
+    """Return an actor's pose, with everything that its motion changes reset to the file's pose."""
     own, pose = figure_pose(actor.figure), actor.require_pose().copy()
     if not isinstance(actor.clip, TransformClip):
         return pose

@@ -30,55 +30,40 @@ from viewer.rig.units import METRES
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyMotion:
-    """One person's rotation vectors by joint name, with translation, shape and hands.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    timing : Timing
-        Frame rate, and the row of each frame.
-    joint_names : tuple of K str
-        Joints that ``vectors`` rotate, the root first.
-    vectors : (N, K, 3)
-        Rotation vectors relative to the parent joint, radians.
-    translations : (N, 3)
-        Translation of the body, metres.
-    about_origin : bool
-        True: the root rotates about the figure's origin, V = R X + T, as in EasyMocap. False:
-        about the rest pelvis, V = R (X - J0) + J0 + T, as in SMPL.
-    shape, expression : (N, S) or (1, S) or None
-        Coefficients; a single row applies to all frames.
-    hands : mapping of "left", "right" or "" to (N, C)
-        Coefficients of the hands' principal components, instead of finger joints.
-    flat_hands : bool
-        Whether ``hands`` are relative to the flat hand instead of the mean hand.
-    up : "y", "z", "-y", "-z" or ""
-        World up axis; empty if unknown.
-    shape_space : ShapeSpace
-        Model and gender of the body, as stated by the file.
-    world_rotations : (N, 3) or None
-        Rotation vectors that rotate the whole body about the figure's origin after ``vectors``
-        have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be False.
-    places_root : bool
-        Whether ``translations`` are the positions of the root joint, V = R (X - J0) + T; requires
-        ``about_origin`` to be False and no ``world_rotations``.
-    """
+    """One person's rotation vectors by joint name, with translation, shape and hands."""
 
     name: str
+    """Display name."""
     timing: Timing
+    """Frame rate, and the row of each frame."""
     joint_names: tuple[str, ...]
+    """Joints that ``vectors`` rotate, the root first."""
     vectors: Floats
+    """(N, K, 3). Rotation vectors relative to the parent joint, radians."""
     translations: Floats
+    """(N, 3). Translation of the body, metres."""
     about_origin: bool = False
+    """True: the root rotates about the figure's origin, V = R X + T, as in EasyMocap. False: about
+    the rest pelvis, V = R (X - J0) + J0 + T, as in SMPL."""
     shape: Floats | None = None
     expression: Floats | None = None
+    """(N, S) or (1, S) or None. Coefficients; a single row applies to all frames."""
     hands: dict[str, Floats] = field(default_factory=dict)
+    """mapping of "left", "right" or "" to (N, C). Coefficients of the hands' principal components,
+    instead of finger joints."""
     flat_hands: bool = False
+    """Whether ``hands`` are relative to the flat hand instead of the mean hand."""
     up: str = ""
+    """One of "y", "z", "-y", "-z" or "". World up axis; empty if unknown."""
     shape_space: ShapeSpace = ShapeSpace()
+    """Model and gender of the body, as stated by the file."""
     world_rotations: Floats | None = None
+    """(N, 3) or None. Rotation vectors that rotate the whole body about the figure's origin after
+    ``vectors`` have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be
+    False."""
     places_root: bool = False
+    """Whether ``translations`` are the positions of the root joint, V = R (X - J0) + T; requires
+    ``about_origin`` to be False and no ``world_rotations``."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -99,28 +84,19 @@ class BodyMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParameterMotion:
-    """Model parameters of one person over time, as SAM 3D Body stores them for MHR.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    timing : Timing
-        Frame rate, and the row of each frame.
-    parameters : (N, P)
-        ``mhr_model_params``: placement, pose and scales.
-    identity, expression : (N, S), (N, E)
-        ``shape_params`` and ``expr_params``.
-    places : (N, 3)
-        Translations of the whole figure, metres.
-    """
+    """Model parameters of one person over time, as SAM 3D Body stores them for MHR."""
 
     name: str
+    """Display name."""
     timing: Timing
+    """Frame rate, and the row of each frame."""
     parameters: Floats
+    """(N, P). ``mhr_model_params``: placement, pose and scales."""
     identity: Floats
     expression: Floats
+    """(N, S), (N, E). ``shape_params`` and ``expr_params``."""
     places: Floats
+    """(N, 3). Translations of the whole figure, metres."""
 
     def __post_init__(self) -> None:
         count = len(self.parameters)
@@ -136,24 +112,9 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     J0 is the root joint of the frame's own shape, so the vertices are exactly R X + T. A rotation W
     of the whole body makes the root's rotation W R and the translation T - J0 + W J0.
 
-    Parameters
-    ----------
-    motion : BodyMotion
-        Motion of any member of the family.
-    figure : Figure
-        Figure with the family's joint names; joints without a vector stay at rest.
-
-    Returns
-    -------
-    clip : SampledClip
-        Motion of ``figure``.
-    notes : list of Diagnostic
-        Messages about data that could not be used.
-
-    Raises
-    ------
-    RigError
-        If the figure has none of the joints.
+    ``figure``: figure with the family's joint names; joints without a vector stay at rest. Returns
+    ``notes``: messages about data that could not be used. Raises ``RigError`` if the figure has
+    none of the joints.
     """
     motion, said = _in_space_of(motion, figure)
     skeleton = figure.skeleton
@@ -205,17 +166,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
 def parameter_clip(motion: ParameterMotion, figure: Figure) -> SampledClip:
     """Return a motion of a figure with model parameters, in metres.
 
-    Parameters
-    ----------
-    motion : ParameterMotion
-        At least one row.
-    figure : Figure
-        MHR, or another figure with model parameters.
-
-    Raises
-    ------
-    RigError
-        If the figure has no model parameters, or the number of values is wrong.
+    Raises ``RigError`` if the figure has no model parameters, or the number of values is wrong.
     """
     if len(motion.parameters) == 0:
         raise RigError("expected model parameters of at least one frame")
@@ -245,19 +196,10 @@ def parameter_pose(
     The tool's vertices and joints are the pose's vertices and joints times 0.01, with y and z
     negated.
 
-    Parameters
-    ----------
-    figure : Figure
-        MHR, or another figure with model parameters.
-    parameters : (P,)
-        ``mhr_model_params``: placement, pose and scales.
-    identity, expression : (N,), (M,)
-        ``shape_params`` and ``expr_params``; missing trailing ones are treated as 0.
-
-    Raises
-    ------
-    RigError
-        If the figure has no model parameters, or the number of values is wrong.
+    ``parameters``: (P,), ``mhr_model_params``: placement, pose and scales. ``identity``,
+    ``expression``: (N,), (M,), ``shape_params`` and ``expr_params``; missing trailing ones are
+    treated as 0. Raises ``RigError`` if the figure has no model parameters, or the number of values
+    is wrong.
     """
     if figure.parameters is None:
         raise RigError(f"figure {figure.name} has no model parameters")

@@ -40,27 +40,18 @@ _tables: Memo[Clip, _Table] = Memo(kept=1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """The curve of one DOF.
-
-    Attributes
-    ----------
-    target : int
-        Row of the DOF in the skeleton's table.
-    times : (N,)
-        Seconds, non-decreasing.
-    values : (N,)
-        Lengths or radians.
-    tangents : tuple of N (incoming, outgoing)
-        Rules or slopes on both sides of each key.
-    extrapolation : (before, after)
-        Two of ``EXTRAPOLATIONS``.
-    """
+    """The curve of one DOF."""
 
     target: int
+    """Row of the DOF in the skeleton's table."""
     times: Floats
+    """(N,). Seconds, non-decreasing."""
     values: Floats
+    """(N,). Lengths or radians."""
     tangents: tuple[tuple[Tangent, Tangent], ...]
+    """tuple of N (incoming, outgoing). Rules or slopes on both sides of each key."""
     extrapolation: tuple[Extrapolation, Extrapolation] = ("constant", "constant")
+    """(before, after). Two of ``EXTRAPOLATIONS``."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", frozen("times", self.times, (None,)))
@@ -92,22 +83,15 @@ def _tangent(given: Tangent) -> Tangent:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Clip:
-    """A motion of one skeleton.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    channels : tuple of Channel
-        One per DOF that moves.
-    start, end : float
-        Playback range in seconds; the curves continue beyond it.
-    """
+    """A motion of one skeleton."""
 
     name: str
+    """Display name."""
     channels: tuple[Channel, ...]
+    """One per DOF that moves."""
     start: float
     end: float
+    """Playback range in seconds; the curves continue beyond it."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", float(self.start))
@@ -138,19 +122,8 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
 def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
     """Return the values of all curves of a clip at many times; see ``evaluate``.
 
-    Parameters
-    ----------
-    clip : Clip
-        Clip with C channels that have keys.
-    times : (T,)
-        Seconds.
-
-    Returns
-    -------
-    targets : (C,)
-        Rows of the skeleton's DOF table.
-    values : (T, C)
-        Lengths or radians; channels without keys are 0.
+    ``times``: (T,), seconds. Returns ``targets``: (C,), rows of the skeleton's DOF table;
+    ``values``: (T, C), lengths or radians; channels without keys are 0.
     """
     table = _tables.get(clip, (), lambda: _table(clip.channels))
     return table.targets, _values(table, np.atleast_1d(times))
@@ -181,16 +154,8 @@ def slopes(channel: Channel) -> Floats:
     flat is 0; linear is the slope of the span on that side; smooth is the slope from the previous
     key to the next. The first and last keys use their only span.
 
-    Parameters
-    ----------
-    channel : Channel
-        Channel with N keys.
-
-    Returns
-    -------
-    (N, 2)
-        Incoming and outgoing slope, value per second; 0 over a span of zero duration, and if
-        all keys are simultaneous.
+    Returns (N, 2), incoming and outgoing slope, value per second; 0 over a span of zero duration,
+    and if all keys are simultaneous.
     """
     times, values = channel.times, channel.values
     count = len(times)
@@ -330,10 +295,7 @@ def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
     """Raise an error if a clip was made for a different skeleton.
 
-    Raises
-    ------
-    RigError
-        If the number of channels or the DOFs do not match; see ``is_course_rig``.
+    Raises ``RigError`` if the number of channels or the DOFs do not match; see ``is_course_rig``.
     """
     found = misfit(clip, skeleton)
     if found is None:

@@ -42,16 +42,8 @@ def add_key(
     of the curve there, and neighbours whose rules depend on adjacent keys get their current slopes
     as explicit values. An existing key at this time is changed instead.
 
-    Parameters
-    ----------
-    channel : Channel
-        Channel with any number of keys.
-    time : float
-        Seconds.
-    value : float, optional
-        Length or radians; the value of the curve if omitted.
-    tangents : (incoming, outgoing), optional
-        Rules or slopes; smooth by default if a value is given, or outside the keys.
+    ``value``: length or radians; the value of the curve if omitted. ``tangents``: (incoming,
+    outgoing), rules or slopes; smooth by default if a value is given, or outside the keys.
     """
     there = np.flatnonzero(np.abs(channel.times - time) <= SHORTEST)
     if len(there):
@@ -110,18 +102,9 @@ def move_keys(
 ) -> Channel:
     """Return a channel with some keys moved together.
 
-    Parameters
-    ----------
-    channel : Channel
-        Channel that contains these keys.
-    keys : iterable of int
-        Indices, which do not change.
-    dt : float
-        Seconds; reduced if a key would otherwise pass an unmoved key.
-    dv : float
-        Length or radians.
-    gap : float
-        Minimum distance in seconds to unmoved keys that are at least this far away initially.
+    ``dt``: seconds; reduced if a key would otherwise pass an unmoved key. ``dv``: length or
+    radians. ``gap``: minimum distance in seconds to unmoved keys that are at least this far away
+    initially.
     """
     moved = np.zeros(len(channel.times), dtype=np.bool_)
     moved[list(keys)] = True
@@ -174,10 +157,7 @@ def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
 def set_tangent(channel: Channel, key: int, side: int, tangent: Tangent) -> Channel:
     """Return a channel with a new rule or slope on one side of a key: 0 incoming, 1 outgoing.
 
-    Raises
-    ------
-    RigError
-        If the rule is unknown or the slope is not finite.
+    Raises ``RigError`` if the rule is unknown or the slope is not finite.
     """
     pairs = list(channel.tangents)
     incoming, outgoing = pairs[key]
@@ -192,17 +172,7 @@ def set_extrapolation(channel: Channel, side: int, mode: Extrapolation) -> Chann
 
 
 def with_channel(clip: Clip, target: int, change: Callable[[Channel], Channel]) -> Clip:
-    """Return a clip with one channel changed, or added if the DOF has none yet.
-
-    Parameters
-    ----------
-    clip : Clip
-        Clip to edit.
-    target : int
-        Row of the DOF in the skeleton's table.
-    change : callable
-        Maps the old channel to the new one.
-    """
+    """Return a clip with one channel changed, or added if the DOF has none yet."""
     known = {channel.target for channel in clip.channels}
     if target not in known:
         channels = (*clip.channels, change(_no_keys(target)))
@@ -241,18 +211,8 @@ def key_pose(
 ) -> Clip:
     """Return a clip with a pose's DOFs keyed at one time.
 
-    Parameters
-    ----------
-    clip : Clip
-        Clip of the skeleton; its range is extended to include the time.
-    skeleton : Skeleton
-        Provides the limits.
-    pose : Pose
-        Lengths and radians.
-    time : float
-        Seconds.
-    only_changed : bool
-        Skip DOFs whose value equals the clip's value at that time, clamped to the limits.
+    ``pose``: lengths and radians. ``only_changed``: skip DOFs whose value equals the clip's value
+    at that time, clamped to the limits.
     """
     targets, values = evaluate_all(clip, np.array([time]))
     now = np.zeros(skeleton.n_dofs)
@@ -276,23 +236,9 @@ def clip_from_frames(
 ) -> Clip:
     """Return a clip with a key per frame.
 
-    Parameters
-    ----------
-    name : str
-        Display name.
-    dofs : (F, D)
-        Lengths and radians. A constant DOF gets a single key.
-    times : (F,)
-        Seconds, increasing.
-    rule : Tangent
-        Tangent rule on both sides of every key.
-    present : (F,) bool, optional
-        Frames that get keys; all if omitted.
-
-    Raises
-    ------
-    RigError
-        If there are no frames.
+    ``dofs``: (F, D), lengths and radians. A constant DOF gets a single key. ``times``: (F,),
+    seconds, increasing. ``present``: (F,) bool, frames that get keys; all if omitted. Raises
+    ``RigError`` if there are no frames.
     """
     keep = np.ones(len(times), dtype=np.bool_) if present is None else present
     if not keep.any():

@@ -36,34 +36,27 @@ JointMotion: TypeAlias = Clip | TransformClip | SampledClip
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frames:
-    """Many poses of one figure, in time order.
-
-    Attributes
-    ----------
-    times : (F,)
-        Seconds.
-    present : (F,) bool
-        Whether the actor is present; otherwise the row is undefined in the other arrays.
-    rotations : (F, J, 4)
-        Each joint's complete rotation relative to its parent: unit quaternions (x, y, z, w).
-    translations : (F, J, 3)
-        Offsets from the joints' rest translations, DOFs included.
-    scales : (F, J, 3) or (1, J, 3)
-        Local scale factors of the joints; a single row applies to all frames.
-    shape_weights : (F, S) or (1, S)
-        Weights of the figure's blend shapes; a single row applies to all frames.
-    figure_translations, figure_scales : (F, 3), (F,)
-        Placement of the whole figure.
-    """
+    """Many poses of one figure, in time order."""
 
     times: Floats
+    """(F,). Seconds."""
     present: Bools
+    """(F,) bool. Whether the actor is present; otherwise the row is undefined in the other arrays.
+    (F,) bool. Whether the actor is present; otherwise the row is undefined in the other arrays."""
     rotations: Floats
+    """(F, J, 4). Each joint's complete rotation relative to its parent: unit quaternions (x, y, z,
+    w)."""
     translations: Floats
+    """(F, J, 3). Offsets from the joints' rest translations, DOFs included."""
     scales: Floats
+    """(F, J, 3) or (1, J, 3). Local scale factors of the joints; a single row applies to all
+    frames."""
     shape_weights: Floats
+    """(F, S) or (1, S). Weights of the figure's blend shapes; a single row applies to all frames.
+    (F, S) or (1, S). Weights of the figure's blend shapes; a single row applies to all frames."""
     figure_translations: Floats
     figure_scales: Floats
+    """(F, 3), (F,). Placement of the whole figure."""
 
     @property
     def n_frames(self) -> int:
@@ -110,14 +103,9 @@ def scene_rate(actors: Iterable[Actor]) -> float:
 def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
     """Pose an actor by its clip at one time of the scene's clock, in place.
 
-    Parameters
-    ----------
-    actor : Actor
-        Actor whose ``pose``, ``points`` and ``is_present`` are modified, unless it has no clip.
-    time : float
-        Seconds; the actor's own ``offset`` is subtracted.
-    interpolate : bool
-        Interpolate across gaps of captures instead of marking the actor as absent.
+    ``actor``: actor whose ``pose``, ``points`` and ``is_present`` are modified, unless it has no
+    clip. ``time``: seconds; the actor's own ``offset`` is subtracted. ``interpolate``: interpolate
+    across gaps of captures instead of marking the actor as absent.
     """
     clip, skeleton, own = actor.clip, actor.figure.skeleton, time - actor.offset
     if isinstance(clip, PointClip):
@@ -168,23 +156,9 @@ def frames_of(
 ) -> Frames:
     """Return a figure's poses at many times.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    motion : Clip, TransformClip or SampledClip
-        Motion of that skeleton.
-    times : (F,)
-        Seconds on the motion's own clock.
-    base : Pose, optional
-        Provides shape and placement if the motion has none; the values in the file if omitted.
-    interpolate : bool
-        Interpolate across gaps.
-
-    Raises
-    ------
-    RigError
-        If the figure has no skeleton, or the joint counts differ.
+    ``times``: (F,), seconds on the motion's own clock. ``base``: provides shape and placement if
+    the motion has none; the values in the file if omitted. Raises ``RigError`` if the figure has no
+    skeleton, or the joint counts differ.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -320,17 +294,8 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
 def world_frames(figure: Figure, frames: Frames) -> Floats:
     """Return every joint's world matrix in every frame; all frames are computed together.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton; joints follow the frames' shapes.
-    frames : Frames
-        Poses of that figure.
-
-    Returns
-    -------
-    (F, J, 4, 4)
-        Joint space to figure space, including the figure's own scale and translation.
+    Returns (F, J, 4, 4), joint space to figure space, including the figure's own scale and
+    translation.
     """
     skeleton = figure.require_skeleton()
     frames, count = _constrained(figure, frames), frames.n_frames
@@ -367,17 +332,7 @@ def joint_positions(figure: Figure, frames: Frames) -> Floats:
     position p, these are Q R and p + Q t. The frames are the last axis, so that few operations
     multiply the matrices of all frames.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    frames : Frames
-        Poses of that figure.
-
-    Returns
-    -------
-    (F, J, 3)
-        Positions in figure space, including the figure's own scale and translation.
+    Returns (F, J, 3), positions in figure space, including the figure's own scale and translation.
     """
     skeleton = figure.require_skeleton()
     if skeleton.constraints or (frames.scales != 1.0).any():

@@ -13,17 +13,8 @@ from viewer.rig.skinning import joint_matrices
 def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
     """Return a joint's position, or the mean of all joints or captured points.
 
-    Parameters
-    ----------
-    actor : Actor
-        A posed and placed actor.
-    joint : int
-        Index of a joint or keypoint; -1 for the mean.
-
-    Returns
-    -------
-    (3,) or None
-        Scene space; None while the actor is absent or has neither joints nor points.
+    Returns (3,) or None, scene space; None while the actor is absent or has neither joints nor
+    points.
     """
     if not actor.is_present:
         return None

@@ -37,14 +37,9 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
     Actors with the same figure and clip, each at its own offset, are posed together; the result
     equals the result of ``viewer.rig.motion.evaluation.pose_actor`` for each.
 
-    Parameters
-    ----------
-    actors : iterable of Actor
-        Actors to pose; those without a clip are unchanged.
-    time : float
-        Seconds; each actor's own ``offset`` is subtracted.
-    interpolate : bool
-        Interpolate across gaps of captures instead of marking actors as absent.
+    ``actors``: actors to pose; those without a clip are unchanged. ``time``: seconds; each actor's
+    own ``offset`` is subtracted. ``interpolate``: interpolate across gaps of captures instead of
+    marking actors as absent.
     """
     groups: dict[tuple[int, int], list[Actor]] = {}
     for actor in actors:
@@ -126,17 +121,7 @@ def _pose_by_frames(
 def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
     """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs).
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton with J joints.
-    poses : sequence of A Pose
-        DOFs in lengths and radians.
-
-    Returns
-    -------
-    (A, J, 3, 3)
-        Matrices for column vectors.
+    ``poses``: DOFs in lengths and radians. Returns (A, J, 3, 3), matrices for column vectors.
     """
     beneath = quaternion_to_matrix(np.stack([pose.rotations for pose in poses]))
     return beneath @ dof_rotations(skeleton, np.stack([pose.dofs for pose in poses]))
@@ -145,19 +130,8 @@ def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
 def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None) -> Floats:
     """Return the world matrices of poses; see ``viewer.rig.kinematics.world_matrices``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The figure's skeleton, with its shape applied; all poses have this shape.
-    poses : sequence of A Pose
-        DOFs in lengths and radians.
-    rotations : (A, J, 3, 3), optional
-        ``local_rotations`` of the poses, if already computed.
-
-    Returns
-    -------
-    (A, J, 4, 4)
-        Joint-to-figure matrices.
+    ``poses``: DOFs in lengths and radians. ``rotations``: (A, J, 3, 3), ``local_rotations`` of the
+    poses, if already computed. Returns (A, J, 4, 4), joint-to-figure matrices.
     """
     rotations = local_rotations(skeleton, poses) if rotations is None else rotations
     # The joint axis comes first, as forward_kinematics multiplies whole rows of matrices per joint.
@@ -184,19 +158,9 @@ def posed_worlds(
 ) -> Floats:
     """Return ``worlds``; missing matrices are computed in one batch and cached in the poses.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The figure's skeleton, with its shape applied; all poses have this shape.
-    poses : sequence of A Pose
-        At least one; DOFs in lengths and radians.
-    rotations : (A, J, 3, 3), optional
-        ``local_rotations`` of the poses, if already computed.
-
-    Returns
-    -------
-    (A, J, 4, 4)
-        Joint-to-figure matrices.
+    ``poses``: at least one; DOFs in lengths and radians. ``rotations``: (A, J, 3, 3),
+    ``local_rotations`` of the poses, if already computed. Returns (A, J, 4, 4), joint-to-figure
+    matrices.
     """
     rows = [row for row, pose in enumerate(poses) if not is_posed(skeleton, pose)]
     missing = [poses[row] for row in rows]
@@ -212,17 +176,7 @@ def posed_worlds(
 def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
     """Return the skinning matrices of poses of one shape: M[a, j] = W[a, j] inverse(B[j]).
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with skeleton and skin.
-    poses : sequence of A Pose
-        At least one; all have the shape of the first.
-
-    Returns
-    -------
-    (A, J, 4, 4)
-        Bind-to-posed matrices, without the figure's own placement.
+    Returns (A, J, 4, 4), bind-to-posed matrices, without the figure's own placement.
     """
     figure = shaped(figure, poses[0].shape_weights)
     return skinning_matrices(

@@ -19,39 +19,28 @@ _SPACES = ("world", "figure")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionArrays:
-    """The frames of one actor's motion; F frames of J joints.
-
-    Attributes
-    ----------
-    name : str
-        Name of the actor.
-    joint_names : tuple of J str
-        Joints, parents first.
-    parents : (J,) int32
-        Index of each joint's parent; -1 for a root.
-    frame_rate : float
-        Frames per second.
-    frames : (F,) int32
-        Numbers of the frames in the video or the files, if they are numbered there.
-    present : (F,) bool
-        Whether the person is present; the other arrays are held or undefined elsewhere.
-    rotations : (F, J, 4)
-        Quaternions (x, y, z, w) relative to the parent joint.
-    translations : (F, 3)
-        Translation of the whole figure, in its own space and unit: metres for captured people.
-    shape_weights : (F, S) or (1, S)
-        Weights of the figure's blend shapes.
-    """
+    """The frames of one actor's motion; F frames of J joints."""
 
     name: str
+    """Name of the actor."""
     joint_names: tuple[str, ...]
+    """Joints, parents first."""
     parents: Ints
+    """(J,) int32. Index of each joint's parent; -1 for a root."""
     frame_rate: float
+    """Frames per second."""
     frames: Ints
+    """(F,) int32. Numbers of the frames in the video or the files, if they are numbered there."""
     present: Bools
+    """(F,) bool. Whether the person is present; the other arrays are held or undefined elsewhere.
+    (F,) bool. Whether the person is present; the other arrays are held or undefined elsewhere."""
     rotations: Floats
+    """(F, J, 4). Quaternions (x, y, z, w) relative to the parent joint."""
     translations: Floats
+    """(F, 3). Translation of the whole figure, in its own space and unit: metres for captured
+    people."""
     shape_weights: Floats
+    """(F, S) or (1, S). Weights of the figure's blend shapes."""
     _figure: Figure
     _frames: Frames
     _placement: Floats

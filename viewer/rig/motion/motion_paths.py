@@ -23,21 +23,14 @@ _BLOCK = 1 << 14  # number of matrices per batch, which limits the memory for lo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionPath:
-    """Positions of some joints of a figure at F times.
-
-    Attributes
-    ----------
-    times : (F,)
-        Seconds on the motion's own clock.
-    points : (F, N, 3)
-        Figure space, including the figure's own placement and scale.
-    present : (F, N) bool
-        Whether the point is present; otherwise it is undefined.
-    """
+    """Positions of some joints of a figure at F times."""
 
     times: Floats
+    """(F,). Seconds on the motion's own clock."""
     points: Floats
+    """(F, N, 3). Figure space, including the figure's own placement and scale."""
     present: Bools
+    """(F, N) bool. Whether the point is present; otherwise it is undefined."""
 
 
 def path_times(motion: Motion) -> Floats:
@@ -60,25 +53,11 @@ def motion_path(
 ) -> MotionPath:
     """Return the paths of joints, or of captured points.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton, or with captured points for a ``PointClip``.
-    motion : Motion
-        Motion of that figure.
-    joints : sequence of N int
-        Joints, or points of a ``PointClip``.
-    times : (F,), optional
-        Seconds on the motion's own clock; ``path_times`` if omitted.
-    base : Pose, optional
-        Provides shape and placement if the motion has none.
-    min_confidence : float
-        Points with a lower confidence are absent, as are invisible points.
-
-    Raises
-    ------
-    RigError
-        If the motion does not match the figure.
+    ``figure``: figure with a skeleton, or with captured points for a ``PointClip``. ``joints``:
+    joints, or points of a ``PointClip``. ``times``: (F,), seconds on the motion's own clock;
+    ``path_times`` if omitted. ``base``: provides shape and placement if the motion has none.
+    ``min_confidence``: points with a lower confidence are absent, as are invisible points. Raises
+    ``RigError`` if the motion does not match the figure.
     """
     times = path_times(motion) if times is None else np.asarray(times, dtype=np.float64)
     chosen: Ints = np.asarray(joints, dtype=np.int32)
@@ -111,14 +90,8 @@ def _point_path(
 def segments(path: MotionPath) -> tuple[Floats, Floats, Ints]:
     """Return the segments between successive times at which the point is present.
 
-    Returns
-    -------
-    points : (S, 2, 3)
-        Both ends, figure space.
-    times : (S, 2)
-        Times of both ends.
-    which : (S,) int32
-        Index of the path, 0 to N - 1.
+    Returns ``points``: (S, 2, 3), both ends, figure space; ``times``: (S, 2), times of both ends;
+    ``which``: (S,) int32, index of the path, 0 to N - 1.
     """
     which, first = np.nonzero((path.present[:-1] & path.present[1:]).T)
     ends = np.stack([first, first + 1], axis=1)

@@ -30,40 +30,27 @@ from viewer.rig.scene import Actor, Motion, Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledAnimation:
-    """A figure with one pose per frame.
-
-    Attributes
-    ----------
-    name : str
-        Name of the actor.
-    figure : Figure
-        Figure without a shape applied; the shape is in ``frames``.
-    frame_rate : float
-        Frames per second.
-    first_frame : int
-        Number of the first frame.
-    frames : Frames
-        Poses, in time order; gaps are in ``frames.present``.
-    motion : Clip, TransformClip or SampledClip
-        The motion from which the frames were sampled.
-    base : Pose or None
-        Provides the properties that the motion does not animate.
-    gender : str
-        Gender of a captured body, else of the body model; empty if it is unknown.
-    is_rotated : bool
-        Whether the frames are rotated upright, see ``upright_animation``; the motion is never
-        rotated.
-    """
+    """A figure with one pose per frame."""
 
     name: str
+    """Name of the actor."""
     figure: Figure
+    """Figure without a shape applied; the shape is in ``frames``."""
     frame_rate: float
+    """Frames per second."""
     first_frame: int
+    """Number of the first frame."""
     frames: Frames
+    """Poses, in time order; gaps are in ``frames.present``."""
     motion: JointMotion
+    """The motion from which the frames were sampled."""
     base: Pose | None = None
+    """Provides the properties that the motion does not animate."""
     gender: str = ""
+    """Gender of a captured body, else of the body model; empty if it is unknown."""
     is_rotated: bool = False
+    """Whether the frames are rotated upright, see ``upright_animation``; the motion is never
+    rotated."""
 
 
 def sample_animation(
@@ -74,23 +61,10 @@ def sample_animation(
 ) -> SampledAnimation:
     """Sample an actor's clip at a fixed rate.
 
-    Parameters
-    ----------
-    actor : Actor
-        Actor with a clip.
-    rate : float, optional
-        Frames per second; the result of ``frame_rate`` if omitted, which reproduces captured frames
-        exactly.
-    frames : (int, int), optional
-        First frame and end frame, exclusive (None: the clip's end), counted from the clip's
-        start at that rate; all if omitted.
-    interpolate : bool
-        Interpolate across gaps: rotations along the shorter arc.
-
-    Raises
-    ------
-    RigError
-        If there is no clip, or no frame in the range.
+    ``rate``: frames per second; the result of ``frame_rate`` if omitted, which reproduces captured
+    frames exactly. ``frames``: first frame and end frame, exclusive (None: the clip's end), counted
+    from the clip's start at that rate; all if omitted. Raises ``RigError`` if there is no clip, or
+    no frame in the range.
     """
     motion, figure = actor.clip, actor.figure
     if not isinstance(motion, JointMotion) or figure.skeleton is None:
@@ -119,10 +93,7 @@ def frame_range(
 ) -> tuple[int, int]:
     """Return the first frame and the exclusive end; see ``sample_animation`` for the arguments.
 
-    Raises
-    ------
-    RigError
-        If no frame is in the range.
+    Raises ``RigError`` if no frame is in the range.
     """
     count = frame_at(motion.end - motion.start, rate) + 1
     first, asked = (0, None) if frames is None else frames
@@ -145,21 +116,9 @@ def upright_animation(
 ) -> tuple[SampledAnimation, str]:
     """Sample an actor's clip, rotated upright if its world is upside down.
 
-    Parameters
-    ----------
-    scene : Scene
-        Provides the up axis.
-    actor, rate, frames, interpolate
-        As for ``sample_animation``. The actor's placement in the scene is ignored.
-    keeps_world : bool
-        Keep the orientation of the actor's own world, for formats that preserve a capture's values.
-
-    Returns
-    -------
-    animation : SampledAnimation
-        The sampled frames.
-    up : "y", "z", "-y" or "-z"
-        Up axis of the frames; negative axes occur only if ``keeps_world`` is True.
+    ``actor``, ``rate``, ``frames``, ``interpolate``: as for ``sample_animation``. The actor's
+    placement in the scene is ignored. Returns ``animation``: the sampled frames; ``up``: up axis of
+    the frames; negative axes occur only if ``keeps_world`` is True.
     """
     animation = sample_animation(actor, rate, frames, interpolate)
     up, hangs = own_up(scene, actor)
@@ -182,14 +141,8 @@ def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
 
     With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    frames : Frames
-        Its poses.
-    rotation : (4,)
-        Q, a unit quaternion of a rotation by a multiple of 90 degrees about an axis.
+    ``rotation``: (4,), q, a unit quaternion of a rotation by a multiple of 90 degrees about an
+    axis.
     """
     rotations = frames.rotations.copy()
     roots = np.flatnonzero(figure.require_skeleton().parents < 0)
@@ -207,21 +160,9 @@ def baked(
 ) -> SampledClip:
     """Return a clip's poses at a fixed rate, from its start to its last whole frame.
 
-    Parameters
-    ----------
-    figure : Figure
-        With the skeleton that the clip moves.
-    clip : TransformClip
-        The motion.
-    rate : float, optional
-        Frames per second; the rate of the keys if omitted.
-    base : Pose, optional
-        Provides what the clip does not animate; the figure's own pose if omitted.
-
-    Raises
-    ------
-    RigError
-        If the figure has no skeleton.
+    ``rate``: frames per second; the rate of the keys if omitted. ``base``: provides what the clip
+    does not animate; the figure's own pose if omitted. Raises ``RigError`` if the figure has no
+    skeleton.
     """
     rate = frame_rate(clip) if rate is None else rate
     times = frame_times(clip.start, clip.end, rate)

@@ -17,38 +17,27 @@ from viewer.rig.motion.timing import Timing
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class SampledClip:
-    """A motion of one skeleton as frames, as captures are stored.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    timing : Timing
-        Frame rate, and the row of each frame.
-    rotations : (N, J, 4)
-        Each joint's complete rotation relative to its parent: unit quaternions (x, y, z, w).
-    translations : (N, J, 3) or None
-        Offsets from the joints' rest translations.
-    figure_translations : (N, 3) or None
-        Translations of the whole figure, after skinning.
-    figure_scales : (N,) or None
-        Scales of the whole figure.
-    shape_weights : (N, S) or (1, S) or None
-        Blend shape weights; a single row applies to all frames. If None, the pose's values are
-        used.
-    scales : (N, J, 3) or (1, J, 3) or None
-        Local scale factors of the joints; a single row applies to all frames. If None, the pose's
-        values are used.
-    """
+    """A motion of one skeleton as frames, as captures are stored."""
 
     name: str
+    """Display name."""
     timing: Timing
+    """Frame rate, and the row of each frame."""
     rotations: Floats
+    """(N, J, 4). Each joint's complete rotation relative to its parent: unit quaternions (x, y, z,
+    w)."""
     translations: Floats | None = None
+    """(N, J, 3) or None. Offsets from the joints' rest translations."""
     figure_translations: Floats | None = None
+    """(N, 3) or None. Translations of the whole figure, after skinning."""
     figure_scales: Floats | None = None
+    """(N,) or None. Scales of the whole figure."""
     shape_weights: Floats | None = None
+    """(N, S) or (1, S) or None. Blend shape weights; a single row applies to all frames. If None,
+    the pose's values are used."""
     scales: Floats | None = None
+    """(N, J, 3) or (1, J, 3) or None. Local scale factors of the joints; a single row applies to
+    all frames. If None, the pose's values are used."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -107,19 +96,7 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
 
     Exactly at a frame, the stored values are returned unchanged.
 
-    Parameters
-    ----------
-    clip : SampledClip
-        The motion.
-    times : (T,)
-        Seconds.
-    interpolate : bool
-        Interpolate across gaps instead of reporting absence.
-
-    Returns
-    -------
-    SampledRows
-        Arrays with T rows each.
+    ``times``: (T,), seconds. ``interpolate``: interpolate across gaps instead of reporting absence.
     """
     before, after, fraction = clip.timing.locate(times, interpolate)
     present = before >= 0
@@ -166,15 +143,7 @@ def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
 
 
 def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
-    """Return one clip with the concatenated rows of several clips and a new timing.
-
-    Parameters
-    ----------
-    clips : sequence of SampledClip
-        At least one clip; all are of one skeleton and have the same arrays.
-    timing : Timing
-        Timing whose rows index the concatenated rows.
-    """
+    """Return one clip with the concatenated rows of several clips and a new timing."""
 
     def stack(name: str) -> Floats | None:
         parts = [getattr(clip, name) for clip in clips]
@@ -210,12 +179,7 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
 def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:
     """Return a clip with the same frames at a different rate; its start time is unchanged.
 
-    Parameters
-    ----------
-    clip : SampledClip or PointClip
-        Clip, returned unchanged if it already has that rate.
-    rate : float
-        Frames per second.
+    ``clip``: clip, returned unchanged if it already has that rate. ``rate``: frames per second.
     """
     if clip.timing.frame_rate == rate:
         return clip

@@ -26,27 +26,10 @@ def single_frame(
 ) -> SampledAnimation:
     """Return an actor's current pose as an animation of one frame.
 
-    Parameters
-    ----------
-    actor : Actor
-        Actor with joints; the frame of an absent actor is missing.
-    rate : float
-        Nominal frames per second of the animation.
-    number : int
-        Frame number.
-    time : float
-        Time of the frame in seconds.
-
-    Returns
-    -------
-    SampledAnimation
-        Animation whose ``motion`` also contains the frame: one key per DOF for rigs with keyed
-        clips.
-
-    Raises
-    ------
-    RigError
-        If there are no joints.
+    ``actor``: actor with joints; the frame of an absent actor is missing. ``rate``: nominal frames
+    per second of the animation. ``time``: time of the frame in seconds. Returns animation whose
+    ``motion`` also contains the frame: one key per DOF for rigs with keyed clips. Raises
+    ``RigError`` if there are no joints.
     """
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
@@ -80,21 +63,10 @@ def upright_single_frame(
 ) -> tuple[SampledAnimation, str]:
     """Return an actor's current pose, rotated upright if its world is upside down.
 
-    Parameters
-    ----------
-    scene : Scene
-        Provides the up axis.
-    actor, rate, number, time
-        As for ``single_frame``. The actor's placement in the scene is ignored.
-    keeps_world : bool
-        Keep the orientation of the actor's own world, as in ``upright_animation``.
-
-    Returns
-    -------
-    animation : SampledAnimation
-        Animation of one frame.
-    up : "y", "z", "-y" or "-z"
-        Up axis of the frame; negative axes occur only if ``keeps_world`` is True.
+    ``actor``, ``rate``, ``number``, ``time``: as for ``single_frame``. The actor's placement in the
+    scene is ignored. ``keeps_world``: keep the orientation of the actor's own world, as in
+    ``upright_animation``. Returns ``animation``: animation of one frame; ``up``: up axis of the
+    frame; negative axes occur only if ``keeps_world`` is True.
     """
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
@@ -108,16 +80,8 @@ def pose_frames(
 ) -> tuple[Figure, Frames]:
     """Return one pose as frames, and the figure that they animate.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with or without a skeleton.
-    pose : Pose or None
-        Pose of the figure; None for a figure without a skeleton.
-    is_present : bool
-        Whether the actor is present in the frame.
-    time : float
-        Time of the frame in seconds.
+    ``figure``: figure with or without a skeleton. ``pose``: pose of the figure; None for a figure
+    without a skeleton. ``time``: time of the frame in seconds.
     """
     skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
     place, scale = np.zeros((1, 3)), np.ones(1)

@@ -14,24 +14,16 @@ from viewer.rig.motion.sampled_clip import SampledClip
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkeletonMotion:
-    """Contents of a motion capture file with its own hierarchy.
-
-    Attributes
-    ----------
-    figure : Figure
-        A skeleton without a mesh.
-    clip : SampledClip
-        Motion of the figure.
-    unit_note : Phrase or None
-        Explains how the figure's unit was estimated; None if it was not estimated.
-    up_notes : tuple of Phrase
-        Explain how the up axis was estimated, and state any contrary evidence.
-    expressions : mapping of str to (N,)
-        Weights of facial expressions at each row of the clip, by their names in VRM 1.0.
-    """
+    """Contents of a motion capture file with its own hierarchy."""
 
     figure: Figure
+    """A skeleton without a mesh."""
     clip: SampledClip
+    """Motion of the figure."""
     unit_note: Phrase | None = None
+    """Explains how the figure's unit was estimated; None if it was not estimated."""
     up_notes: tuple[Phrase, ...] = ()
+    """Explain how the up axis was estimated, and state any contrary evidence."""
     expressions: Mapping[str, Floats] = field(default_factory=dict)
+    """mapping of str to (N,). Weights of facial expressions at each row of the clip, by their names
+    in VRM 1.0."""

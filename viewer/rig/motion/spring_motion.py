@@ -39,11 +39,8 @@ class SpringMotion:
     Copies of an actor may share it. Results are cached until the clip, or the part of the pose that
     the clip does not animate, changes.
 
-    Parameters
-    ----------
-    up : (3,), optional
-        Up direction of the clip's world in figure space; the up axis of the figure if omitted.
-        Gravity is rotated with it.
+    ``up``: (3,), up direction of the clip's world in figure space; the up axis of the figure if
+    omitted. Gravity is rotated with it.
     """
 
     def __init__(self, up: Floats | None = None) -> None:
@@ -53,12 +50,7 @@ class SpringMotion:
     def swing(self, actor: Actor, time: float) -> None:
         """Rotate the spring joints of an actor that has just been posed by its clip, in place.
 
-        Parameters
-        ----------
-        actor : Actor
-            Actor with a pose; nothing happens without springs or a motion of joints.
-        time : float
-            Seconds on the clip's own clock.
+        ``actor``: actor with a pose; nothing happens without springs or a motion of joints.
         """
         clip, skeleton = actor.clip, actor.figure.skeleton
         if not isinstance(clip, JointMotion) or skeleton is None or skeleton.springs is None:
@@ -105,12 +97,7 @@ class SpringMotion:
 def springs_for(actor: Actor, up: str) -> SpringMotion | None:
     """Return the simulation of an actor in a scene; None without spring joints.
 
-    Parameters
-    ----------
-    actor : Actor
-        Actor placed in the scene.
-    up : "y" or "z"
-        Up axis of the scene.
+    ``up``: either "y" or "z", up axis of the scene.
     """
     if not has_springs(actor):
         return None
@@ -135,17 +122,8 @@ def release_springs(actor: Actor) -> None:
 def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     """Return an actor's motion as frames that include the rotations of its spring joints.
 
-    Parameters
-    ----------
-    actor : Actor
-        Actor with spring joints and a motion of joints.
-    rate : float, optional
-        Frames per second; if omitted, the motion's rate, or the simulation's rate for DOF curves.
-
-    Raises
-    ------
-    RigError
-        If the actor has no motion of joints.
+    ``rate``: frames per second; if omitted, the motion's rate, or the simulation's rate for DOF
+    curves. Raises ``RigError`` if the actor has no motion of joints.
     """
     clip, skeleton = actor.clip, actor.figure.require_skeleton()
     if not isinstance(clip, JointMotion) or skeleton.springs is None:

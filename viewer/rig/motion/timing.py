@@ -51,28 +51,19 @@ def frame_times(start: float, end: float, rate: float) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timing:
-    """A fixed frame rate, and the data row of each frame.
-
-    Attributes
-    ----------
-    frame_rate : float
-        Frames per second.
-    rows : (F,) int32
-        Row of each frame in the data, -1 for a missing frame.
-    first_frame : int
-        Number of the first frame in the file.
-    start : float
-        Seconds of the first frame.
-    holds : bool
-        Behaviour before the first and after the last frame: True holds the end frames, False means
-        absent.
-    """
+    """A fixed frame rate, and the data row of each frame."""
 
     frame_rate: float
+    """Frames per second."""
     rows: Ints
+    """(F,) int32. Row of each frame in the data, -1 for a missing frame."""
     first_frame: int = 0
+    """Number of the first frame in the file."""
     start: float = 0.0
+    """Seconds of the first frame."""
     holds: bool = True
+    """Behaviour before the first and after the last frame: True holds the end frames, False means
+    absent."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rows", frozen("rows", self.rows, (None,), np.int32))
@@ -101,19 +92,8 @@ class Timing:
     def locate(self, times: Floats, interpolate: bool = False) -> tuple[Ints, Ints, Floats]:
         """Return the rows on either side of each time, and the interpolation fraction.
 
-        Parameters
-        ----------
-        times : (T,)
-            Seconds.
-        interpolate : bool
-            Interpolate across gaps, and hold the end frames.
-
-        Returns
-        -------
-        before, after : (T,)
-            Rows; both are -1 if there is no data.
-        fraction : (T,)
-            0 at ``before``, 1 at ``after``; exactly 0 on a frame.
+        ``times``: (T,), seconds. Returns ``before``, ``after``: (T,), rows; both are -1 if there is
+        no data; ``fraction``: (T,), 0 at ``before``, 1 at ``after``; exactly 0 on a frame.
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         nothing = np.full(len(times), -1, dtype=np.int32)

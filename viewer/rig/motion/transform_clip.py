@@ -31,34 +31,24 @@ class TransformChannel:
 
     Before its first key and after its last key, a channel has the value of that key (glTF 2.0,
     section 3.11).
-
-    Attributes
-    ----------
-    joint : int
-        Joint that moves; -1 for ``"weights"``.
-    path : str
-        Entry of ``TRANSFORM_PATHS``.
-    times : (N,)
-        Seconds, increasing; N > 0.
-    values : (N, C)
-        Translation relative to the parent joint (rest translation included), quaternion
-        (x, y, z, w) including the rest rotation, scale factors, or shape weights.
-    interpolation : str
-        Entry of ``INTERPOLATIONS``. Linear rotations follow the shorter arc; cubic ones are
-        normalised after interpolation.
-    tangents : (N, 2, C) or None
-        Incoming and outgoing slopes, per second; only for ``"cubic"``.
-    shapes : (C,) int32 or None
-        Blend shape of each component; only for ``"weights"``.
     """
 
     joint: int
+    """Joint that moves; -1 for ``"weights"``."""
     path: TransformPath
+    """Entry of ``TRANSFORM_PATHS``."""
     times: Floats
+    """(N,). Seconds, increasing; N > 0."""
     values: Floats
+    """(N, C). Translation relative to the parent joint (rest translation included), quaternion (x,
+    y, z, w) including the rest rotation, scale factors, or shape weights."""
     interpolation: Interpolation = "linear"
+    """Entry of ``INTERPOLATIONS``. Linear rotations follow the shorter arc; cubic ones are
+    normalised after interpolation."""
     tangents: Floats | None = None
+    """(N, 2, C) or None. Incoming and outgoing slopes, per second; only for ``"cubic"``."""
     shapes: Ints | None = None
+    """(C,) int32 or None. Blend shape of each component; only for ``"weights"``."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -91,28 +81,20 @@ class TransformChannel:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class TransformClip:
-    """A motion of one figure, as keys of joint transforms and shape weights.
-
-    Attributes
-    ----------
-    name : str
-        Display name.
-    channels : tuple of TransformChannel
-        At most one per joint and path; properties without a channel have their values in the pose.
-    start, end : float
-        Playback range in seconds.
-    extras : Any
-        Application data of its file, as parsed from JSON; None if there is none.
-    number : int
-        Index of its animation in the file, which may move several figures; -1 if unknown.
-    """
+    """A motion of one figure, as keys of joint transforms and shape weights."""
 
     name: str
+    """Display name."""
     channels: tuple[TransformChannel, ...]
+    """At most one per joint and path; properties without a channel have their values in the pose.
+    At most one per joint and path; properties without a channel have their values in the pose."""
     start: float
     end: float
+    """Playback range in seconds."""
     extras: Any = None
+    """Application data of its file, as parsed from JSON; None if there is none."""
     number: int = -1
+    """Index of its animation in the file, which may move several figures; -1 if unknown."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", float(self.start))
@@ -124,18 +106,10 @@ class TransformClip:
 class Animation:
     """An animation of a figure.
 
-    Parameters
-    ----------
-    name : str
-        As in the file; may repeat or be empty.
-    start, end : float
-        Playback range in seconds.
-    read : callable
-        Returns the keys, or raises a ``FormatError``; called at most once.
-    place : str
-        JSON pointer to the animation in the file; empty if unknown.
-    number : int
-        Index of the animation in its file, which may move several figures; -1 if unknown.
+    ``name``: as in the file; may repeat or be empty. ``start``, ``end``: playback range in seconds.
+    ``read``: returns the keys, or raises a ``FormatError``; called at most once. ``place``: JSON
+    pointer to the animation in the file; empty if unknown. ``number``: index of the animation in
+    its file, which may move several figures; -1 if unknown.
     """
 
     __slots__ = ("_clip", "_read", "end", "name", "number", "place", "start")
@@ -160,10 +134,7 @@ class Animation:
     def clip(self) -> TransformClip:
         """Return the motion; always the same object.
 
-        Raises
-        ------
-        FormatError
-            If the file's keys are invalid, or the file can no longer be read.
+        Raises ``FormatError`` if the file's keys are invalid, or the file can no longer be read.
         """
         if self._clip is None:
             self._clip = self._read()

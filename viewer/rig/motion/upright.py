@@ -34,19 +34,8 @@ _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
     """Return the up axis of an actor's own world, before its placement.
 
-    Parameters
-    ----------
-    scene : Scene
-        Provides the up axis.
-    actor : Actor
-        Actor placed in the scene.
-
-    Returns
-    -------
-    up : "y" or "z"
-        The axis that is mapped to the scene's up axis; the scene's up axis if that is x.
-    hangs : bool
-        Whether that axis points down.
+    Returns ``up``: the axis that is mapped to the scene's up axis; the scene's up axis if that is
+    x; ``hangs``: whether that axis points down.
     """
     along = np.zeros(3)
     along["xyz".index(scene.up)] = 1.0
@@ -62,18 +51,8 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
 
     A body in a z-up capture is upright along z, regardless of the up axis of its model.
 
-    Parameters
-    ----------
-    scene : Scene
-        Provides the up axis.
-    actor : Actor
-        Actor in the scene; not modified.
-
-    Returns
-    -------
-    Actor
-        Actor with the same placement, which no longer applies to it; the given actor if nothing
-        changes.
+    ``actor``: actor in the scene; not modified. Returns actor with the same placement, which no
+    longer applies to it; the given actor if nothing changes.
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
@@ -97,17 +76,9 @@ def upright_placement(scene: Scene, actor: Actor) -> Floats:
 def guess_up(actors: Iterable[Actor]) -> str:
     """Return the axis along which heads are above pelvises, on average.
 
-    Parameters
-    ----------
-    actors : iterable of Actor
-        Bodies with sampled clips, and captured keypoints; only frames read so far are used, and
-        other actors and all placements are ignored.
-
-    Returns
-    -------
-    str
-        ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``; ``_CUSTOM`` if there is no evidence, or people lie
-        along x.
+    ``actors``: bodies with sampled clips, and captured keypoints; only frames read so far are used,
+    and other actors and all placements are ignored. Returns ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``;
+    ``_CUSTOM`` if there is no evidence, or people lie along x.
     """
     directions = [np.zeros((0, 3))]
     for actor in actors:

@@ -14,16 +14,7 @@ _MOST_DIGITS = 9  # maximum number of decimals; more would show rounding errors 
 def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:
     """Return a DOF value as text: ``"28.6°"``, or a length ``"0.25"``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    dof : int
-        Row of the DOF.
-    value : float
-        Radians, or a length in the figure's unit.
-    digits : int
-        Decimals of angles; lengths have three more.
+    ``value``: radians, or a length in the figure's unit.
     """
     if skeleton.dof_kinds[dof] >= FIRST_ROTATION:
         return f"{number_text(math.degrees(value), f'.{digits}f')}\N{DEGREE SIGN}"
@@ -33,16 +24,8 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
 def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str = "") -> Phrase:
     """Return a message for a DOF beyond its limits: ``"a.x is 0.0°; its limits are …"``.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    dof : int
-        Row of the DOF.
-    value : float
-        Radians, or a length in the figure's unit; outside the limits.
-    when : Phrase or str
-        Inserted after the value: ``" in frame 3"``.
+    ``value``: radians, or a length in the figure's unit; outside the limits. ``when``: inserted
+    after the value: ``" in frame 3"``.
     """
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
     limit = low if value < low else high

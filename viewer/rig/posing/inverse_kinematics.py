@@ -30,39 +30,21 @@ _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # limits of the damping, relative to 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """Result of a reach for a target.
-
-    Attributes
-    ----------
-    dofs : (D,)
-        DOFs of the whole skeleton; only rotations of the chain have changed.
-    distance : float
-        Remaining distance between the joint and its target, figure units.
-    limited : (N,) int32
-        DOFs of the chain that are at one of their limits.
-    """
+    """Result of a reach for a target."""
 
     dofs: Floats
+    """(D,). DOFs of the whole skeleton; only rotations of the chain have changed."""
     distance: float
+    """Remaining distance between the joint and its target, figure units."""
     limited: Ints
+    """(N,) int32. DOFs of the chain that are at one of their limits."""
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
     """Return the joints that may rotate to move a joint: the nearest ancestors with free rotations.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the hierarchy and the DOF table.
-    joint : int
-        The joint to move; its rotations do not move its origin.
-    length : int
-        Maximum number of joints, not counting joints without a free rotation.
-
-    Returns
-    -------
-    (N,) int32
-        N <= length, the nearest first.
+    ``length``: maximum number of joints, not counting joints without a free rotation. Returns (N,)
+    int32, N <= length, the nearest first.
     """
     rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
     able = set(skeleton.dof_joints[rotates].tolist())
@@ -82,23 +64,8 @@ def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, ro
     are applied later) and the vector y from the rotating joint to the moved joint, the column of a
     DOF is A (a x A^-1 y); this also holds with scales.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    pose : Pose
-        Lengths and radians.
-    world : (J, 4, 4)
-        ``world_matrices`` of that pose.
-    joint : int
-        The joint whose origin moves.
-    rows : (N,)
-        Rotation DOFs of its ancestors.
-
-    Returns
-    -------
-    (3, N)
-        Figure units per radian.
+    ``pose``: lengths and radians. ``world``: (J, 4, 4), ``world_matrices`` of that pose. ``rows``:
+    (N,), rotation DOFs of its ancestors. Returns (3, N), figure units per radian.
     """
     columns = np.zeros((3, len(rows)))
     end = world[joint, :3, 3]
@@ -115,19 +82,7 @@ def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, ro
 def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
     """Return the current rotation axis of each rotation DOF of a joint.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    pose : Pose
-        Radians; DOFs that are applied later rotate the axes of earlier ones.
-    joint : int
-        The joint that has the DOFs.
-
-    Returns
-    -------
-    dict of int to (3,)
-        Unit vectors in the parent's frame, by row of the DOF table.
+    Returns dict of int to (3,), unit vectors in the parent's frame, by row of the DOF table.
     """
     own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
     after = quaternion_to_matrix(pose.rotations[joint])
@@ -144,31 +99,9 @@ def reach(
 ) -> Reach:
     """Return the DOFs that move a joint as close to a target as its chain allows.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the hierarchy, the DOFs and their limits.
-    pose : Pose
-        Start of the search; not modified.
-    joint : int
-        The joint to move.
-    target : (3,)
-        Target position, figure units.
-    length : int
-        Maximum number of joints above it that may rotate.
-    rounds : int
-        Maximum number of iterations.
-
-    Returns
-    -------
-    Reach
-        Pose that is not farther from the target than the start. A start outside its limits is
-        clamped first.
-
-    Raises
-    ------
-    RigError
-        If no joint above it can rotate.
+    ``pose``: start of the search; not modified. ``target``: (3,), target position, figure units.
+    Returns pose that is not farther from the target than the start. A start outside its limits is
+    clamped first. Raises ``RigError`` if no joint above it can rotate.
     """
     chain = chain_above(skeleton, joint, length)
     if not len(chain):

@@ -29,39 +29,20 @@ _TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationFit:
-    """Result of fitting a joint's DOFs to a rotation.
-
-    Attributes
-    ----------
-    dofs : (D,)
-        DOFs of the whole skeleton; only rotations of the joint have changed.
-    error : float
-        Angle between the target rotation and the resulting rotation, radians.
-    limited : (N,) int32
-        Rotation DOFs of the joint that are at a limit, if there is an error.
-    """
+    """Result of fitting a joint's DOFs to a rotation."""
 
     dofs: Floats
+    """(D,). DOFs of the whole skeleton; only rotations of the joint have changed."""
     error: float
+    """Angle between the target rotation and the resulting rotation, radians."""
     limited: Ints
+    """(N,) int32. Rotation DOFs of the joint that are at a limit, if there is an error."""
 
 
 def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
     """Return the rows of a joint's rotation DOFs, in order of application.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    joint : int
-        The joint that has the DOFs.
-    free : bool
-        Exclude locked DOFs.
-
-    Returns
-    -------
-    (N,) int32
-        Rows of the DOF table.
+    Returns (N,) int32, rows of the DOF table.
     """
     chosen = (skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION)
     if free:
@@ -79,21 +60,9 @@ def rotates_freely(skeleton: Skeleton, joint: int) -> bool:
 def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> RotationFit:
     """Return the DOFs that rotate a joint as close to a rotation as possible.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOFs and their limits.
-    pose : Pose
-        Current pose, not modified; of equally good solutions, the one closest to its DOFs is used.
-    joint : int
-        The joint to rotate.
-    rotation : (3, 3)
-        Target rotation relative to its parent: R(quaternion) R(DOFs) of ``joint_rotations``.
-
-    Returns
-    -------
-    RotationFit
-        The fit, exact if limits and axes allow it.
+    ``pose``: current pose, not modified; of equally good solutions, the one closest to its DOFs is
+    used. ``rotation``: (3, 3), target rotation relative to its parent: R(quaternion) R(DOFs) of
+    ``joint_rotations``. Returns the fit, exact if limits and axes allow it.
     """
     rows = rotation_dofs(skeleton, joint)
     low, high = skeleton.dof_limits[rows].T

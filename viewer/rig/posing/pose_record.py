@@ -45,64 +45,43 @@ _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseRecord:
-    """Contents of a pose file; missing parts remain at rest.
-
-    Attributes
-    ----------
-    dofs : mapping of str to float
-        Lengths and radians by label, such as ``"left_knee.x"``.
-    vector : (N,) or None
-        The model's own pose vector.
-    parts : mapping of str to array
-        Rotation vectors or hand coefficients by smplx's names: ``global_orient``,
-        ``body_pose``, ``left_hand_pose`` …
-    shape, expression : (N,) or None
-        Weights of the first blend shapes of each group.
-    translation : (3,) or None
-        Translation of the figure, after skinning.
-    scale : float or None
-        Scale of the figure, after skinning.
-    flat_hands : bool or None
-        Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
-        only.
-    hand_coefficients : bool or None
-        Whether hand poses are coefficients; None means True unless there are 45 values.
-    joint_rotations : JointRotations or None
-        Used by figures with different DOFs instead of the DOF values: joints with the same names
-        get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
-        use all other parts, except coefficients of blend shapes that they lack.
-    shape_space : ShapeSpace
-        Model and gender to which the shape coefficients belong, as stated by the file.
-    line_of : callable or None
-        Returns the line in the source file, given a part and the name of a DOF in it, as in
-        ``PosePartError``.
-    """
+    """Contents of a pose file; missing parts remain at rest."""
 
     dofs: Mapping[str, float] = field(default_factory=dict)
+    """Lengths and radians by label, such as ``"left_knee.x"``."""
     vector: Floats | None = None
+    """(N,) or None. The model's own pose vector."""
     parts: Mapping[str, Floats] = field(default_factory=dict)
+    """Rotation vectors or hand coefficients by smplx's names: ``global_orient``, ``body_pose``,
+    ``left_hand_pose`` …."""
     shape: Floats | None = None
     expression: Floats | None = None
+    """(N,) or None. Weights of the first blend shapes of each group."""
     translation: Floats | None = None
+    """(3,) or None. Translation of the figure, after skinning."""
     scale: float | None = None
+    """Scale of the figure, after skinning."""
     flat_hands: bool | None = None
+    """Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
+    only."""
     hand_coefficients: bool | None = None
+    """Whether hand poses are coefficients; None means True unless there are 45 values."""
     joint_rotations: JointRotations | None = None
+    """Used by figures with different DOFs instead of the DOF values: joints with the same names get
+    the same rotations; placement, size and shape are unchanged. Figures with the same DOFs use
+    all other parts, except coefficients of blend shapes that they lack."""
     shape_space: ShapeSpace = ShapeSpace()
+    """Model and gender to which the shape coefficients belong, as stated by the file."""
     line_of: Callable[[str, str], int | None] | None = None
+    """Returns the line in the source file, given a part and the name of a DOF in it, as in
+    ``PosePartError``."""
 
 
 class PosePartError(RigError):
     """A part of a pose that cannot be applied to a figure.
 
-    Parameters
-    ----------
-    problem : RigError
-        The underlying error.
-    part : str
-        ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
-    name : str
-        Name of the DOF; empty for other parts.
+    ``part``: ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
+    ``name``: name of the DOF; empty for other parts.
     """
 
     def __init__(self, problem: RigError, part: str, name: str = "") -> None:

@@ -21,25 +21,17 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseLayout:
-    """Layout of the pose vector in a model's files.
-
-    Attributes
-    ----------
-    n_numbers : int
-        Length of the vector.
-    starts : (J,) int32
-        Index of the first of each joint's three rotation values.
-    is_euler : (J,) bool
-        True for angles about z, y, x with R = Rz Ry Rx, False for a rotation vector.
-    translation, scale : int
-        Index of the figure's translation (three values) and scale (one); -1 for none.
-    """
+    """Layout of the pose vector in a model's files."""
 
     n_numbers: int
+    """Length of the vector."""
     starts: Ints
+    """(J,) int32. Index of the first of each joint's three rotation values."""
     is_euler: Bools
+    """(J,) bool. True for angles about z, y, x with R = Rz Ry Rx, False for a rotation vector."""
     translation: int = -1
     scale: int = -1
+    """Index of the figure's translation (three values) and scale (one); -1 for none."""
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -50,15 +42,8 @@ class PoseLayout:
 def rotation_rows(skeleton: Skeleton) -> Ints:
     """Return the DOF rows of ball joints, about x, y, z in this order.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-
-    Returns
-    -------
-    (J, 3) int32
-        Rows; all three are -1 for a joint that does not have exactly these rotations.
+    Returns (J, 3) int32, rows; all three are -1 for a joint that does not have exactly these
+    rotations.
     """
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
     rotations = np.flatnonzero(skeleton.dof_kinds >= 3)
@@ -77,18 +62,9 @@ def set_joint_rotations(
     A ball joint's DOFs are set to the angles about x, y, z; other joints keep their DOFs as
     close to 0 as the limits allow and store the remaining rotation as a quaternion.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    pose : Pose
-        Modified in place.
-    joints : (N,)
-        Joints to rotate.
-    rotations : (N, 3, 3)
-        Rotation of each of these joints relative to its parent.
-    clamp : bool
-        Whether DOFs are clamped to their limits.
+    ``pose``: modified in place. ``joints``: (N,), joints to rotate. ``rotations``: (N, 3, 3),
+    rotation of each of these joints relative to its parent. ``clamp``: whether DOFs are clamped to
+    their limits.
     """
     joints = np.asarray(joints)
     rows = rotation_rows(skeleton)[joints]
@@ -112,17 +88,8 @@ def set_joint_rotations(
 def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
     """Return each joint's three rotation values in the convention of the model's files.
 
-    Parameters
-    ----------
-    layout : PoseLayout
-        Specifies which joints use Euler angles.
-    rotations : (J, 3, 3)
-        Rotation of each joint relative to its parent.
-
-    Returns
-    -------
-    (J, 3)
-        Radians.
+    ``rotations``: (J, 3, 3), rotation of each joint relative to its parent. Returns (J, 3),
+    radians.
     """
     numbers = matrix_to_rotation_vector(rotations)
     numbers[layout.is_euler] = matrix_to_euler(rotations[layout.is_euler])[:, ::-1]
@@ -132,19 +99,8 @@ def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
 def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> Floats:
     """Return a pose as the model's own pose vector.
 
-    Parameters
-    ----------
-    layout : PoseLayout or None
-        None for a model whose pose vector consists of its DOFs.
-    skeleton : Skeleton
-        The figure's skeleton.
-    pose : Pose
-        The pose to convert.
-
-    Returns
-    -------
-    (N,)
-        Lengths and radians.
+    ``layout``: none for a model whose pose vector consists of its DOFs. Returns (N,), lengths and
+    radians.
     """
     if layout is None:
         return pose.dofs.copy()
@@ -161,21 +117,9 @@ def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> F
 def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vector: Floats) -> None:
     """Set a pose from the model's own pose vector, in place.
 
-    Parameters
-    ----------
-    layout : PoseLayout or None
-        None for a model whose pose vector consists of its DOFs.
-    skeleton : Skeleton
-        The figure's skeleton.
-    pose : Pose
-        Modified, except for its shape.
-    vector : (N,)
-        Lengths and radians.
-
-    Raises
-    ------
-    RigError
-        If the number of values is wrong for the model.
+    ``layout``: none for a model whose pose vector consists of its DOFs. ``pose``: modified, except
+    for its shape. ``vector``: (N,), lengths and radians. Raises ``RigError`` if the number of
+    values is wrong for the model.
     """
     wanted = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) != wanted:

@@ -38,21 +38,14 @@ _STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sol
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnatomicalRest:
-    """A standing pose found from the anatomy.
-
-    Attributes
-    ----------
-    rotations : (J, 3, 3)
-        World rotations of the joints, in the skeleton's axes.
-    unseen : tuple of str
-        Joints of limbs whose roll is assumed, because the motion does not show it.
-    is_parallel : bool
-        Whether the axes of the joints are parallel to the body's.
-    """
+    """A standing pose found from the anatomy."""
 
     rotations: Floats
+    """(J, 3, 3). World rotations of the joints, in the skeleton's axes."""
     unseen: tuple[str, ...]
+    """Joints of limbs whose roll is assumed, because the motion does not show it."""
     is_parallel: bool
+    """Whether the axes of the joints are parallel to the body's."""
 
 
 def upright_frames(postures: Postures) -> Postures | None:
@@ -67,17 +60,7 @@ def upright_frames(postures: Postures) -> Postures | None:
 def anatomical_rest(
     postures: Postures, skeleton: Skeleton, has_stances: bool = True
 ) -> AnatomicalRest:
-    """Return the rotations of the joints in a standing pose.
-
-    Parameters
-    ----------
-    postures : Postures
-        Poses of the motion, upright or rotated upright.
-    skeleton : Skeleton
-        Its skeleton.
-    has_stances : bool
-        Whether the poses are upright and show the soles; otherwise the feet point forwards.
-    """
+    """Return the rotations of the joints in a standing pose."""
     body = _body_axes(postures)
     stands = _stands(postures.up)
     limbs = limb_axes(postures)
@@ -285,11 +268,6 @@ def _has_parallel_axes(limbs: Sequence[LimbAxes]) -> bool:
 
     The bending axis is the same axis of both joints of a limb. Limbs with arbitrary roll, which a
     threshold alone would often accept, therefore differ: about one skeleton in 10,000 is accepted.
-
-    Parameters
-    ----------
-    limbs : sequence of LimbAxes
-        Both legs and both arms.
     """
     bones = np.abs([limb.bones for limb in limbs]).max(axis=-1)
     seen = [limb for limb in limbs if limb.is_seen]
@@ -310,21 +288,9 @@ def _parallel_rest(
 ) -> Floats:
     """Return an estimated rest pose with the axes of trunk and limbs parallel to the body's.
 
-    Parameters
-    ----------
-    estimate : (J, 3, 3)
-        World rotations in the estimated rest pose.
-    postures : Postures
-        Poses of the motion.
-    skeleton : Skeleton
-        Its skeleton.
-    stands : (3, 3)
-        Axes of the standing body as columns: left, up and forward.
-
-    Returns
-    -------
-    (J, 3, 3)
-        World rotations. Joints beyond the last named ones keep their estimated local rotation.
+    ``estimate``: (J, 3, 3), world rotations in the estimated rest pose. ``stands``: (3, 3), axes of
+    the standing body as columns: left, up and forward. Returns (J, 3, 3), world rotations. Joints
+    beyond the last named ones keep their estimated local rotation.
     """
     parents = skeleton.parents
     names = {joint: name for name, joint in postures.joints.items()}
@@ -448,35 +414,21 @@ _COHERENT = 0.7  # minimum ratio of the length of the mean normal to the mean le
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LimbAxes:
-    """Directions of a limb's two bones and its bending axis, in the axes of two joints.
-
-    Attributes
-    ----------
-    upper, lower : str
-        The joints at the start of the two bones, such as ``left_hip`` and ``left_knee``.
-    bones : (2, 3)
-        Unit vectors along the bones, each in the axes of its joint.
-    bends : (2, 3)
-        The bending axis in the axes of both joints.
-    is_seen : bool
-        Whether the motion shows the axis; otherwise it is assumed to be sideways to the body.
-    """
+    """Directions of a limb's two bones and its bending axis, in the axes of two joints."""
 
     upper: str
     lower: str
+    """The joints at the start of the two bones, such as ``left_hip`` and ``left_knee``."""
     bones: Floats
+    """(2, 3). Unit vectors along the bones, each in the axes of its joint."""
     bends: Floats
+    """(2, 3). The bending axis in the axes of both joints."""
     is_seen: bool
+    """Whether the motion shows the axis; otherwise it is assumed to be sideways to the body."""
 
 
 def limb_axes(postures: Postures) -> list[LimbAxes]:
-    """Return the axes of both legs and both arms.
-
-    Parameters
-    ----------
-    postures : Postures
-        Upright poses of the motion.
-    """
+    """Return the axes of both legs and both arms."""
     return [
         _axes_of_limb(postures, tuple(f"{side}_{part}" for part in parts), front)
         for *parts, front in _LIMBS

@@ -12,30 +12,19 @@ from viewer.rig.retargeting.joint_map import JointMap
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A motion that drives a figure with different joints, and the retargeting options.
-
-    Attributes
-    ----------
-    motion : SkeletonMotion
-        The motion of the source.
-    source_rest : int, "zero" or "auto"
-        Rest pose of the motion, see ``viewer.rig.retargeting.source_rest``.
-    joint_map : JointMap or None
-        The requested match of joints; None for the automatic one.
-    keeps_up : bool
-        Whether the result has the up axis of the motion's world instead of the figure's up axis.
-    plants_feet : bool
-        Whether feet stay planted while the source's feet are on the ground.
-    hangs : bool
-        Whether the up axis of the motion points down.
-    finish : callable or None
-        Post-processes the resulting clip, as clean-up does.
-    """
+    """A motion that drives a figure with different joints, and the retargeting options."""
 
     motion: SkeletonMotion
+    """The motion of the source."""
     source_rest: int | str = "zero"
+    """Rest pose of the motion, see ``viewer.rig.retargeting.source_rest``."""
     joint_map: JointMap | None = None
+    """The requested match of joints; None for the automatic one."""
     keeps_up: bool = False
+    """Whether the result has the up axis of the motion's world instead of the figure's up axis."""
     plants_feet: bool = True
+    """Whether feet stay planted while the source's feet are on the ground."""
     hangs: bool = False
+    """Whether the up axis of the motion points down."""
     finish: Callable[[SampledClip], SampledClip] | None = None
+    """Post-processes the resulting clip, as clean-up does."""

@@ -26,24 +26,8 @@ _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's h
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
     """Return the motion of a drive as a clip of a figure, before ``Drive.finish``.
 
-    Parameters
-    ----------
-    drive : Drive
-        The motion and its joint match.
-    figure : Figure
-        Figure with a skeleton.
-
-    Returns
-    -------
-    clip : SampledClip
-        Motion of the figure.
-    notes : list of Diagnostic
-        Messages as returned by ``retarget``.
-
-    Raises
-    ------
-    RigError
-        As ``retarget`` does.
+    Returns ``notes``: messages as returned by ``retarget``. Raises ``RigError``: as ``retarget``
+    does.
     """
     found = retargeted(drive.motion, figure, drive.joint_map, drive.source_rest)
     clip, notes = found.clip, found.notes
@@ -102,17 +86,7 @@ def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip
 
 
 def _feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
-    """Return messages about the changes made by planting the feet.
-
-    Parameters
-    ----------
-    changes : PlantedFeet or None
-        The changes.
-    found : Retargeted
-        The retargeting.
-    figure : Figure
-        The driven figure.
-    """
+    """Return messages about the changes made by planting the feet."""
     if changes is None:
         return []
     called = {"motion": found.source.figure.name, "figure": figure.name}

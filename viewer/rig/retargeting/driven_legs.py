@@ -35,66 +35,45 @@ _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 
 @dataclass(frozen=True, slots=True)
 class LegPair:
-    """A leg of the figure, and the joints of the source's foot that drives it.
-
-    Attributes
-    ----------
-    leg : Leg
-        Joints of the figure.
-    hip, ankle, toe : int
-        Joints of the source; ankle and toe are equal if the foot has no ball joint.
-    is_digitigrade : bool
-        Whether the foot stands on its toes, like an animal's, and never on its heel.
-    """
+    """A leg of the figure, and the joints of the source's foot that drives it."""
 
     leg: Leg
+    """Joints of the figure."""
     hip: int
     ankle: int
     toe: int
+    """Joints of the source; ankle and toe are equal if the foot has no ball joint."""
     is_digitigrade: bool = False
+    """Whether the foot stands on its toes, like an animal's, and never on its heel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrivenLegs:
-    """Legs of a driven figure.
-
-    Attributes
-    ----------
-    chains : Chains
-        Joints of the legs and feet, and their ancestors.
-    legs : tuple of Leg
-        The legs, as indices into ``chains``.
-    soles : Soles
-        Soles of the feet, as indices into ``chains``.
-    heels : (L, 4)
-        A point of the sole below each ankle, in the ankle's space, homogeneous.
-    level : (L, 3)
-        The direction that points up in a standing foot, in the ankle's space.
-    toe_level : (L, 3)
-        The same direction in the ball's space.
-    rests : (2, J, 3)
-        Rest translations and scales of the skeleton.
-    extensions : (L,)
-        Distance from hip to ankle in the rest pose, as a fraction of the leg's length.
-    size : float
-        Approximate height of the body.
-    clearance : float
-        Height of the balls above the soles in the rest pose.
-    travel : (N, 3) or None
-        Translation relative to moving ground in each row; None if the ground does not move.
-    """
+    """Legs of a driven figure."""
 
     chains: Chains
+    """Joints of the legs and feet, and their ancestors."""
     legs: tuple[Leg, ...]
+    """The legs, as indices into ``chains``."""
     soles: Soles
+    """Soles of the feet, as indices into ``chains``."""
     heels: Floats
+    """(L, 4). A point of the sole below each ankle, in the ankle's space, homogeneous."""
     level: Floats
+    """(L, 3). The direction that points up in a standing foot, in the ankle's space."""
     toe_level: Floats
+    """(L, 3). The same direction in the ball's space."""
     rests: Floats
+    """(2, J, 3). Rest translations and scales of the skeleton."""
     extensions: Floats
+    """(L,). Distance from hip to ankle in the rest pose, as a fraction of the leg's length."""
     size: float
+    """Approximate height of the body."""
     clearance: float
+    """Height of the balls above the soles in the rest pose."""
     travel: Floats | None = None
+    """(N, 3) or None. Translation relative to moving ground in each row; None if the ground does
+    not move."""
 
     def worlds(self, clip: SampledClip) -> Floats:
         """Return the world matrices of the chains, moved by the travel: (N, K, 4, 4)."""
@@ -160,16 +139,7 @@ def driven_legs(
 ) -> DrivenLegs | None:
     """Return the legs of a figure; None if they cannot be solved.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    clip : SampledClip
-        Its motion.
-    legs : list of Leg
-        The legs.
-    up : (3,)
-        The up axis of the figure.
+    ``up``: (3,), the up axis of the figure.
     """
     skeleton = figure.require_skeleton()
     weights = figure_pose(figure).shape_weights
@@ -238,19 +208,7 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
 def has_source_proportions(
     found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
 ) -> bool:
-    """Return whether the legs of a figure are as long as the scaled legs of the source.
-
-    Parameters
-    ----------
-    found : Retargeted
-        The retargeting.
-    figure : Figure
-        The driven figure.
-    pairs : list of LegPair
-        The legs.
-    size : float
-        Approximate height of the figure.
-    """
+    """Return whether the legs of a figure are as long as the scaled legs of the source."""
     partners = found.matches.partners
     target, source = figure.require_skeleton(), found.source.figure.require_skeleton()
     joints = [
@@ -275,19 +233,9 @@ def foot_paths(
 ) -> list[FootPath]:
     """Return the paths of the source's feet, in the axes and the unit of the figure.
 
-    Parameters
-    ----------
-    found : Retargeted
-        The retargeting.
-    clip : SampledClip
-        Motion of the source, its rows in the order of the frames.
-    pairs : list of LegPair
-        The legs.
-    vectors : list of ((N, 3), (N, 3))
-        Vectors from the ankles of the figure to its balls and heels; they replace the source's if
-        it has no ball joints or no standing rest pose.
-    up : (3,)
-        The up axis.
+    ``vectors``: list of ((N, 3), (N, 3)), vectors from the ankles of the figure to its balls and
+    heels; they replace the source's if it has no ball joints or no standing rest pose. ``up``:
+    (3,), the up axis.
     """
     skeleton = found.source.figure.require_skeleton()
     chains = _chains_to(
@@ -321,21 +269,14 @@ def foot_paths(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chains:
-    """Some joints of a skeleton and all their ancestors, renumbered.
-
-    Attributes
-    ----------
-    joints : (K,) int32
-        Indices of the joints in the skeleton, parents before children.
-    parents : (K,) int32
-        Parents as indices into ``joints``; -1 for a root.
-    place : (J,) int32
-        Index into ``joints`` of each joint of the skeleton, -1 if it is not included.
-    """
+    """Some joints of a skeleton and all their ancestors, renumbered."""
 
     joints: Ints
+    """(K,) int32. Indices of the joints in the skeleton, parents before children."""
     parents: Ints
+    """(K,) int32. Parents as indices into ``joints``; -1 for a root."""
     place: Ints
+    """(J,) int32. Index into ``joints`` of each joint of the skeleton, -1 if it is not included."""
 
 
 def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
@@ -359,14 +300,8 @@ def _chain_worlds(
 ) -> Floats:
     """Return the world matrices of some joints in every row of a clip: (N, K, 4, 4).
 
-    Parameters
-    ----------
-    clip : SampledClip
-        Motion of the whole skeleton.
-    chains : Chains
-        The joints.
-    translations, scales : (J, 3)
-        Rest translations and local scale factors of all joints; the clip's scales precede these.
+    ``translations``, ``scales``: (J, 3), rest translations and local scale factors of all joints;
+    the clip's scales precede these.
     """
     joints = chains.joints
     local = np.zeros((len(joints), clip.n_rows, 4, 4))

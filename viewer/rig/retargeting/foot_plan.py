@@ -21,33 +21,22 @@ _SUNK = 0.015  # maximum depth of the source's feet below the ground, relative t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FootPlan:
-    """Contacts of all feet, and the heights of the ground.
-
-    Attributes
-    ----------
-    feet : list of FootPath
-        Paths of the source's feet.
-    contacts : list of list of Contact
-        Contacts of each foot, in time order.
-    grounds : list of list of float
-        Height of the ground under the figure during each contact.
-    spans : list of (int, int)
-        Ranges of rows without gaps.
-    rate : float
-        Rows per second.
-    size : float
-        Approximate height of the body.
-    up : (3,)
-        The up axis.
-    """
+    """Contacts of all feet, and the heights of the ground."""
 
     feet: list[FootPath]
+    """Paths of the source's feet."""
     contacts: list[list[Contact]]
+    """Contacts of each foot, in time order."""
     grounds: list[list[float]]
+    """Height of the ground under the figure during each contact."""
     spans: list[tuple[int, int]]
+    """Ranges of rows without gaps."""
     rate: float
+    """Rows per second."""
     size: float
+    """Approximate height of the body."""
     up: Floats
+    """(3,). The up axis."""
 
     def stances(self, foot: int) -> Iterator[tuple[Contact, slice, float]]:
         """Return the contacts of a foot, their rows, and the heights of the ground."""
@@ -57,12 +46,7 @@ class FootPlan:
     def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
         """Return the horizontal displacements of a planted foot from row to row.
 
-        Parameters
-        ----------
-        points : ((N, 3), (N, 3))
-            Paths of the ball and the heel.
-        contact : Contact
-            The contact, which selects one of the two paths in each row.
+        ``points``: ((N, 3), (N, 3)), paths of the ball and the heel.
         """
         rows = slice(contact.start, contact.stop)
         toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
@@ -125,14 +109,8 @@ def foot_plan(
 ) -> FootPlan:
     """Return the contacts of the source, and the heights of the ground under the figure.
 
-    Parameters
-    ----------
-    feet, spans, rate, up
-        As in ``FootPlan``.
-    shape : (float, float)
-        Approximate height of the figure, and height of its balls above its soles at rest.
-    ease : float
-        Duration of the beginning and the end of a contact, as in ``foot_contacts``.
+    ``feet``, ``spans``, ``rate``, ``up``: as in ``FootPlan``. ``ease``: duration of the beginning
+    and the end of a contact, as in ``foot_contacts``.
     """
     size, clearance = shape
     contacts = foot_contacts(feet, spans, rate, size, up, ease)

@@ -24,21 +24,15 @@ class JointMap:
 
     Each target joint is listed at most once; a source joint may drive several. Target joints that
     are not listed are matched automatically.
-
-    Attributes
-    ----------
-    pairs : tuple of (str, str)
-        Labels of a target joint and of its source joint, as in ``joint_labels``; the second is
-        empty for a joint that stays at rest.
-    path : Path or None
-        The file, for messages.
-    lines : tuple of int
-        Line of each pair in the file; empty without a file.
     """
 
     pairs: tuple[tuple[str, str], ...]
+    """Labels of a target joint and of its source joint, as in ``joint_labels``; the second is empty
+    for a joint that stays at rest."""
     path: Path | None = None
+    """The file, for messages."""
     lines: tuple[int, ...] = ()
+    """Line of each pair in the file; empty without a file."""
 
 
 def map_from_pairs(mapping: Mapping[str, str]) -> JointMap:
@@ -49,12 +43,7 @@ def map_from_pairs(mapping: Mapping[str, str]) -> JointMap:
 def joint_map_of(partners: Ints, source: Skeleton, target: Skeleton) -> JointMap:
     """Return a map that lists every joint of a match, including those at rest.
 
-    Parameters
-    ----------
-    partners : (J,)
-        Source joint of each target joint, -1 for none.
-    source, target : Skeleton
-        The two skeletons.
+    ``partners``: (J,), source joint of each target joint, -1 for none.
     """
     sources, targets = joint_labels(source), joint_labels(target)
     pairs = [
@@ -71,19 +60,8 @@ def mapped_partners(
 
     The result is -1 for joints that stay at rest, -2 for joints that the map does not list.
 
-    Parameters
-    ----------
-    joint_map : JointMap
-        The map.
-    source, target : Skeleton
-        The two skeletons.
-    titles : (str, str)
-        Their names in messages.
-
-    Raises
-    ------
-    RigError
-        If a name in the map is missing or ambiguous in a skeleton, or a joint is listed twice.
+    Raises ``RigError`` if a name in the map is missing or ambiguous in a skeleton, or a joint is
+    listed twice.
     """
     partners = np.full(target.n_joints, UNMAPPED, dtype=np.int32)
     joints = _joints_by_label(source), _joints_by_label(target)

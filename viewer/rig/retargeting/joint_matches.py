@@ -25,30 +25,21 @@ _Names = tuple[tuple[str, ...], tuple[str, ...]]  # names of the source, and of 
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """The source joints that drive the joints of a target skeleton.
-
-    Attributes
-    ----------
-    partners : (J,) int32
-        Joint of the source for each joint of the target, -1 for none.
-    names : tuple of J str
-        SMPL names of the target's joints; empty if there is no equivalent.
-    is_hierarchy : bool
-        Whether both skeletons have the same names and hierarchy.
-    notes : tuple of Diagnostic
-        Messages about matched joints, joints at rest, and unused joints.
-    origins : tuple of J str
-        How each joint was matched: ``"map"`` by the joint map, ``"hierarchy"`` with the whole
-        hierarchy, ``"humanoid"`` by the human bones that a file states, ``"name"`` by a known name,
-        ``"place"`` by its position in the hierarchy, ``"same name"`` by an equal name; empty for
-        unmatched joints.
-    """
+    """The source joints that drive the joints of a target skeleton."""
 
     partners: Ints
+    """(J,) int32. Joint of the source for each joint of the target, -1 for none."""
     names: tuple[str, ...]
+    """SMPL names of the target's joints; empty if there is no equivalent."""
     is_hierarchy: bool
+    """Whether both skeletons have the same names and hierarchy."""
     notes: tuple[Diagnostic, ...]
+    """Messages about matched joints, joints at rest, and unused joints."""
     origins: tuple[str, ...]
+    """How each joint was matched: ``"map"`` by the joint map, ``"hierarchy"`` with the whole
+    hierarchy, ``"humanoid"`` by the human bones that a file states, ``"name"`` by a known name,
+    ``"place"`` by its position in the hierarchy, ``"same name"`` by an equal name; empty for
+    unmatched joints."""
 
 
 def match_joints(
@@ -63,24 +54,9 @@ def match_joints(
     A source joint of the mapping is not matched again automatically. A mapping that equals the
     automatic match has the same result as no mapping.
 
-    Parameters
-    ----------
-    source, target : Skeleton
-        The skeleton of the motion, and the skeleton to which it is retargeted.
-    mapping : JointMap, or mapping of str to str, optional
-        Target joints and their source joints; or joint names of the source to joint names of the
-        target.
-    titles : (str, str)
-        Names of the two skeletons in messages.
-    is_complete : bool
-        Whether enough joints must match to drive the target; otherwise the match is a beginning,
-        to be completed by the user.
-
-    Raises
-    ------
-    RigError
-        If too few joints match although enough must, or the mapping names a missing joint or lists
-        a joint twice.
+    ``is_complete``: whether enough joints must match to drive the target; otherwise the match is a
+    beginning, to be completed by the user. Raises ``RigError`` if too few joints match although
+    enough must, or the mapping names a missing joint or lists a joint twice.
     """
     plain = _comparable(source.names), _comparable(target.names)
     meanings = joint_meanings(source), joint_meanings(target)

@@ -129,15 +129,8 @@ _TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "f
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the side and the remaining word of every name, in any program's convention.
 
-    Parameters
-    ----------
-    names : sequence of J str
-        Names as in the file.
-
-    Returns
-    -------
-    list of J (str, str)
-        ``"left"``, ``"right"`` or ``""``, and the remaining word in lower case.
+    Returns list of J (str, str), ``"left"``, ``"right"`` or ``""``, and the remaining word in lower
+    case.
 
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
@@ -154,15 +147,8 @@ def _known_keys(names: tuple[str, ...]) -> tuple[_Key, ...]:
 def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
     """Return the SMPL family's name for each joint, as stated by its file or implied by its name.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Its humanoid, if it has one, takes precedence over its names.
-
-    Returns
-    -------
-    tuple of J str
-        Names as returned by ``canonical_names``.
+    ``skeleton``: its humanoid, if it has one, takes precedence over its names. Returns names as
+    returned by ``canonical_names``.
     """
     if skeleton.humanoid is not None:
         return _stated(skeleton.humanoid, skeleton.n_joints)
@@ -174,11 +160,6 @@ def joints_by_place(skeleton: Skeleton) -> set[int]:
 
     These are the pelvis above two legs, and the head at the end of a spine. A skeleton with a
     humanoid has none.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Names and hierarchy.
     """
     if skeleton.humanoid is not None or skeleton.n_joints > _MOST:
         return set()
@@ -207,17 +188,7 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     the pelvis; if there are more than three, the first, middle and last are used. Without a pelvis,
     the joint above both legs is the pelvis.
 
-    Parameters
-    ----------
-    names : sequence of J str
-        Names as in the file.
-    parents : (J,)
-        -1 for a root.
-
-    Returns
-    -------
-    tuple of J str
-        Unique names; empty for joints without an equivalent.
+    ``parents``: (J,), -1 for a root. Returns unique names; empty for joints without an equivalent.
 
     >>> import numpy as np
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))

@@ -18,21 +18,11 @@ _FEWEST = 4  # minimum number of legs
 def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
     """Return the legs of an animal with at least four legs, left ones first.
 
-    Parameters
-    ----------
-    parents : (J,)
-        -1 for a root.
-    points : (J, 3)
-        Positions of the joints of a standing animal.
-    up : (3,)
-        The up axis.
-
-    Returns
-    -------
-    list of Leg
-        Hip, knee and ankle are the two long bones of a leg, without a scapula. The ankle is the
-        hock of a hind leg and the wrist of a front leg. Chains without a counterpart on the other
-        side, such as a tail, are omitted. Empty if there are fewer than four legs.
+    ``parents``: (J,), -1 for a root. ``points``: (J, 3), positions of the joints of a standing
+    animal. ``up``: (3,), the up axis. Returns hip, knee and ankle are the two long bones of a leg,
+    without a scapula. The ankle is the hock of a hind leg and the wrist of a front leg. Chains
+    without a counterpart on the other side, such as a tail, are omitted. Empty if there are fewer
+    than four legs.
     """
     heights = points @ up - (points @ up).min()
     size = float(heights.max())

@@ -37,16 +37,7 @@ _TILTED = (np.cos(np.radians(55.0)), np.cos(np.radians(35.0)))
 def levelled(clip: SampledClip, body: DrivenLegs, worlds: Floats, plan: FootPlan) -> SampledClip:
     """Return a motion whose standing soles are level.
 
-    Parameters
-    ----------
-    clip : SampledClip
-        The motion, its rows in the order of the frames.
-    body : DrivenLegs
-        Legs of the figure.
-    worlds : (N, K, 4, 4)
-        Their world matrices.
-    plan : FootPlan
-        Contacts of the source.
+    ``worlds``: (N, K, 4, 4), their world matrices.
     """
     legs, up = body.legs, plan.up
     ankles, toes = [leg.ankle for leg in legs], [leg.toe for leg in legs]

@@ -36,10 +36,7 @@ def mirror_axis(figure: Figure) -> int:
 def asymmetry(figure: Figure) -> Floats:
     """Return each rest vertex's distance from its counterpart's mirror image: (V,), figure units.
 
-    Raises
-    ------
-    RigError
-        If the figure has no symmetry map.
+    Raises ``RigError`` if the figure has no symmetry map.
     """
     if figure.symmetry is None or figure.mesh is None:
         raise RigError(f"figure {figure.name} has no symmetry map")
@@ -60,10 +57,7 @@ def joint_partners(figure: Figure) -> Ints:
     The counterpart is the joint nearest to the mirrored position among the joints at the same depth
     of the hierarchy.
 
-    Raises
-    ------
-    RigError
-        If a joint has no counterpart within 2 % of the figure's size.
+    Raises ``RigError`` if a joint has no counterpart within 2 % of the figure's size.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -94,10 +88,7 @@ def posing_partners(figure: Figure) -> Ints:
     joints in the mirror plane are their own counterparts; -1 for joints on one side only, such as a
     sword.
 
-    Raises
-    ------
-    RigError
-        If a joint has no counterpart, and the file states no human bones.
+    Raises ``RigError`` if a joint has no counterpart, and the file states no human bones.
     """
     try:
         return joint_partners(figure)

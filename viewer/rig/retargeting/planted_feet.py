@@ -45,34 +45,24 @@ _STEPS = 2 + 3 * (1 + len(_EASES))  # maximum number of steps reported as progre
 
 @dataclass(frozen=True, slots=True)
 class PlantedFeet:
-    """Changes made by planting feet.
-
-    Attributes
-    ----------
-    n_contacts : int
-        Number of contacts of all feet.
-    source, before, after : float
-        Total distance that feet slide while they are on the ground, in figure units: in the source,
-        scaled to the figure, and in the figure before and after planting.
-    gap_before, gap_after : float
-        Largest distance of a planted sole above or below the ground.
-    lowered : float
-        Largest distance by which the body was lowered.
-    size : float
-        Approximate height of the body.
-    ground_speed : float
-        Speed of the ground on which the feet stand, per second; 0 if it does not move.
-    """
+    """Changes made by planting feet."""
 
     n_contacts: int = 0
+    """Number of contacts of all feet."""
     source: float = 0.0
     before: float = 0.0
     after: float = 0.0
+    """Total distance that feet slide while they are on the ground, in figure units: in the source,
+    scaled to the figure, and in the figure before and after planting."""
     gap_before: float = 0.0
     gap_after: float = 0.0
+    """Largest distance of a planted sole above or below the ground."""
     lowered: float = 0.0
+    """Largest distance by which the body was lowered."""
     size: float = 1.0
+    """Approximate height of the body."""
     ground_speed: float = 0.0
+    """Speed of the ground on which the feet stand, per second; 0 if it does not move."""
 
     @property
     def is_better(self) -> bool:
@@ -96,22 +86,8 @@ def plant_feet(
 ) -> tuple[SampledClip, PlantedFeet | None]:
     """Return the motion of a driven figure with its feet planted.
 
-    Parameters
-    ----------
-    found : Retargeted
-        The retargeting.
-    figure : Figure
-        The driven figure.
-    hangs : bool
-        Whether the motion's up axis points down.
-
-    Returns
-    -------
-    clip : SampledClip
-        The motion; unchanged if it would not improve.
-    changes : PlantedFeet or None
-        Changes made; None if the figure or the source has no recognised legs, or the figure has
-        the source's proportions.
+    Returns ``clip``: the motion; unchanged if it would not improve; ``changes``: changes made; None
+    if the figure or the source has no recognised legs, or the figure has the source's proportions.
     """
     pairs = leg_pairs(found, figure)
     rest_up = np.eye(3)["xyz".index(figure.up)]
@@ -246,23 +222,10 @@ def _foot_shifts(
     A foot is corrected while it is on the ground. The body smoothly follows planted feet on
     straight legs, so that these legs need not bend; other feet follow the body.
 
-    Parameters
-    ----------
-    plan : FootPlan
-        Positions and times at which the feet must be planted, with at least one contact.
-    points : list of ((N, 3), (N, 3))
-        Paths of the balls and the heels.
-    heights : (N, L)
-        Heights of the soles.
-    straight : (N, L)
-        Length of each leg from hip to ankle, as a fraction of its maximum length.
-
-    Returns
-    -------
-    shifts : list of (N, 3)
-        Translations of the feet.
-    sway : (N, 3)
-        Translations of the body.
+    ``plan``: positions and times at which the feet must be planted, with at least one contact.
+    ``points``: list of ((N, 3), (N, 3)), paths of the balls and the heels. ``heights``: (N, L),
+    heights of the soles. ``straight``: (N, L), length of each leg from hip to ankle, as a fraction
+    of its maximum length. Returns ``shifts``: list of (N, 3); ``sway``: (N, 3).
     """
     every = [_wanted(plan, foot, points[foot], heights[:, foot]) for foot in range(len(points))]
     bent = falling((straight - _STRAIGHT[0]) / (_STRAIGHT[1] - _STRAIGHT[0]))
@@ -424,16 +387,8 @@ def _knee_accelerations(
 ) -> Floats:
     """Return the largest angular acceleration of each knee: (L,) in rad/s^2.
 
-    Parameters
-    ----------
-    worlds : (N, K, 4, 4)
-        World matrices of the joints.
-    legs : sequence of Leg
-        The legs.
-    spans : sequence of (int, int)
-        Ranges of rows without gaps.
-    rate : float
-        Rows per second.
+    ``worlds``: (N, K, 4, 4), world matrices of the joints. ``spans``: ranges of rows without gaps.
+    ``rate``: rows per second.
     """
     result = np.zeros(len(legs))
     for number, leg in enumerate(legs):

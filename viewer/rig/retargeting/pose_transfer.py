@@ -44,54 +44,34 @@ _REST_DIGITS = 5  # number of decimals to which equal rest rotations agree
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRotations:
-    """Joint rotations of a posed figure, independent of its DOFs.
-
-    Attributes
-    ----------
-    figure : str
-        Name of the figure.
-    names : tuple of J str
-        Names of the joints.
-    relative : (J, 4)
-        Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
-    shifts : (J, 3)
-        Translations in addition to the DOFs, in the parent joint's frame.
-    up : str
-        The figure's up axis, ``"y"`` or ``"z"``.
-    layout : str
-        Result of ``dof_layout``: figures with the same layout use the DOF values directly.
-    rotations : (J, 4) or None
-        Base rotations, before the DOFs, as in ``Pose``; None for the rest pose's.
-    meanings : tuple of J str
-        For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
-    left : (3,)
-        The figure's left, a horizontal direction; measured for figures with meanings.
-    scales : (J, 3) or None
-        Local scale factors, as in ``Pose``; None for the rest pose's.
-    """
+    """Joint rotations of a posed figure, independent of its DOFs."""
 
     figure: str
+    """Name of the figure."""
     names: tuple[str, ...]
+    """Names of the joints."""
     relative: Floats
+    """(J, 4). Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
+    (J, 4). Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z, w)."""
     shifts: Floats
+    """(J, 3). Translations in addition to the DOFs, in the parent joint's frame."""
     up: str
+    """The figure's up axis, ``"y"`` or ``"z"``."""
     layout: str
+    """Result of ``dof_layout``: figures with the same layout use the DOF values directly."""
     rotations: Floats | None = None
+    """(J, 4) or None. Base rotations, before the DOFs, as in ``Pose``; None for the rest pose's."""
     meanings: tuple[str, ...] = ()
+    """For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
+    For a figure whose file states human bones, their names in the SMPL family; otherwise empty."""
     left: Floats = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    """(3,). The figure's left, a horizontal direction; measured for figures with meanings."""
     scales: Floats | None = None
+    """(J, 3) or None. Local scale factors, as in ``Pose``; None for the rest pose's."""
 
 
 def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
-    """Return the joint rotations of a posed figure.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
-    pose : Pose
-        Pose of that figure.
-    """
+    """Return the joint rotations of a posed figure."""
     skeleton = figure.require_skeleton()
     relative = _figure_rotations(skeleton, pose) @ np.swapaxes(
         _figure_rotations(skeleton, _with_zero_dofs(skeleton)), 1, 2
@@ -114,11 +94,6 @@ def dof_layout(figure: Figure) -> str:
     """Return a digest of the meaning of a figure's DOFs: if equal, values can be exchanged.
 
     Blend shapes are ignored: their number does not change any joint's rotation.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure with a skeleton.
     """
     import hashlib
 
@@ -137,15 +112,7 @@ def dof_layout(figure: Figure) -> str:
 
 
 def has_layout_of(source: JointRotations, figure: Figure) -> bool:
-    """Return whether a pose's DOFs, not only its joint rotations, can be applied to a figure.
-
-    Parameters
-    ----------
-    source : JointRotations
-        Joint rotations of the pose.
-    figure : Figure
-        Figure with a skeleton.
-    """
+    """Return whether a pose's DOFs, not only its joint rotations, can be applied to a figure."""
     skeleton = figure.require_skeleton()
     # Files may be edited by hand: an equal digest does not guarantee lists of the right length.
     return source.layout == dof_layout(figure) and source.names == skeleton.names
@@ -158,17 +125,8 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
     it has no DOFs.
     The stored world rotations are ignored: they are out of date once the DOFs are edited.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton of a figure with the source's layout.
-    pose : Pose
-        Pose whose DOFs are not changed.
-    source : JointRotations
-        Provides the base rotations, translations and scales.
-    is_whole : bool
-        Whether all DOFs of the source's pose are applied: joints that it does not contain are then
-        reset to the rest pose; by default, their values are unchanged.
+    ``is_whole``: whether all DOFs of the source's pose are applied: joints that it does not contain
+    are then reset to the rest pose; by default, their values are unchanged.
     """
     if source.rotations is not None:
         pose.rotations[:] = source.rotations
@@ -185,15 +143,8 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
 def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     """Return the match of each target joint: the source joint with its name.
 
-    Parameters
-    ----------
-    source, target : sequence of str
-        Joint names; empty and repeated names match nothing.
-
-    Returns
-    -------
-    (J,) int32
-        Source joints of the J target joints; -1 for none.
+    ``source``, ``target``: joint names; empty and repeated names match nothing. Returns (J,) int32,
+    source joints of the J target joints; -1 for none.
     """
     counts, others = Counter(source), Counter(target)
     place = {name: joint for joint, name in enumerate(source)}
@@ -208,27 +159,10 @@ def rotate_joints(
 ) -> tuple[Pose, list[Diagnostic]]:
     """Return a figure's pose with its joints rotated like another figure's joints.
 
-    Parameters
-    ----------
-    source : JointRotations
-        Joint rotations of the other figure.
-    target : Figure
-        Figure with a skeleton.
-    start : Pose
-        Pose of the target; not modified. Provides unmatched joints, placement, size, shape
-        and joint translations.
-
-    Returns
-    -------
-    pose : Pose
-        Pose of the target, within the limits.
-    notes : list of Diagnostic
-        Messages about the number of matched joints, unmatched joints, and unreachable rotations.
-
-    Raises
-    ------
-    RigError
-        If the figures have no joint name in common.
+    ``start``: pose of the target; not modified. Provides unmatched joints, placement, size, shape
+    and joint translations. Returns ``pose``: pose of the target, within the limits; ``notes``:
+    messages about the number of matched joints, unmatched joints, and unreachable rotations. Raises
+    ``RigError`` if the figures have no joint name in common.
     """
     other = target.skeleton
     if other is None:

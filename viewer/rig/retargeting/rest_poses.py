@@ -43,21 +43,14 @@ _MOST = 4000  # maximum number of frames; for longer motions, every n-th frame i
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestPose:
-    """Positions and rotations of joints at rest.
-
-    Attributes
-    ----------
-    points : (J, 3)
-        World positions, in the common axes of the two skeletons.
-    rotations : (J, 3, 3)
-        World rotations, in the skeleton's own axes.
-    up : (3,)
-        The up axis in the common axes.
-    """
+    """Positions and rotations of joints at rest."""
 
     points: Floats
+    """(J, 3). World positions, in the common axes of the two skeletons."""
     rotations: Floats
+    """(J, 3, 3). World rotations, in the skeleton's own axes."""
     up: Floats
+    """(3,). The up axis in the common axes."""
 
 
 def up_rotation(source: str, target: str) -> Floats:
@@ -70,14 +63,8 @@ def up_rotation(source: str, target: str) -> Floats:
 def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
     """Return a skeleton's rest pose, with all DOFs at 0.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton.
-    to_common : (3, 3)
-        Rotation from its own axes to the common axes.
-    up : "y" or "z"
-        Up axis of the common axes.
+    ``to_common``: (3, 3), rotation from its own axes to the common axes. ``up``: either "y" or "z",
+    up axis of the common axes.
     """
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
@@ -90,14 +77,7 @@ def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
 def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:
     """Return whether all bones point in nearly the same direction, regardless of their lengths.
 
-    Parameters
-    ----------
-    source, target : RestPose
-        Rest poses of skeletons with the same hierarchy.
-    matches : Matches
-        Matches; every joint has one.
-    parents : (J,)
-        Parents of the target's joints.
+    ``parents``: (J,), parents of the target's joints.
     """
     inner = np.flatnonzero(parents >= 0)
     bones = target.points[inner] - target.points[parents[inner]]
@@ -116,19 +96,8 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     line is also aligned. Trunk and feet only follow the body, unless their directions differ by
     more than 25 degrees. The last joint of a limb follows the joint before it.
 
-    Parameters
-    ----------
-    source, target : RestPose
-        Rest poses in the common axes.
-    matches : Matches
-        Matched joints.
-    parents : (J,)
-        Parents of the target's joints.
-
-    Returns
-    -------
-    (J, 3, 3)
-        Rotations in the common axes; the identity for unmatched joints.
+    ``parents``: (J,), parents of the target's joints. Returns (J, 3, 3), rotations in the common
+    axes; the identity for unmatched joints.
     """
     stands = _standing(source, target, matches)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
@@ -280,27 +249,18 @@ def unit(vectors: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Postures:
-    """Poses of a human body whose limbs have known names.
-
-    Attributes
-    ----------
-    rows : (F,)
-        Row of each pose in the clip.
-    rotations : (F, J, 3, 3)
-        World rotations, in the skeleton's axes.
-    points : (F, J, 3)
-        World positions, relative to the root, in the skeleton's axes.
-    joints : dict of str to int
-        Joints by their names in SMPL.
-    up : (3,)
-        The up axis of the file; the up axis of the body if it is upside down.
-    """
+    """Poses of a human body whose limbs have known names."""
 
     rows: Ints
+    """(F,). Row of each pose in the clip."""
     rotations: Floats
+    """(F, J, 3, 3). World rotations, in the skeleton's axes."""
     points: Floats
+    """(F, J, 3). World positions, relative to the root, in the skeleton's axes."""
     joints: dict[str, int]
+    """Joints by their names in SMPL."""
     up: Floats
+    """(3,). The up axis of the file; the up axis of the body if it is upside down."""
 
     def direction(self, start: str, end: str) -> Floats:
         """Return unit vectors from one joint to another: (F, 3)."""

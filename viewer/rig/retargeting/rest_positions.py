@@ -18,17 +18,7 @@ _SHORT = 1e-6  # minimum distance with a reliable direction, as a fraction of th
 def rest_positions(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
     """Return the joints of the motion and of the figure in the rest poses that are aligned.
 
-    Parameters
-    ----------
-    drive : Drive
-        Motion with the rest pose of its skeleton.
-    figure : Figure
-        Driven figure.
-
-    Returns
-    -------
-    source, target : (S, 3), (J, 3)
-        Positions in the figure's axes, each in its own unit.
+    Returns (S, 3), (J, 3), positions in the figure's axes, each in its own unit.
     """
     motion = with_source_rest(with_upright_rest(drive.motion), drive.source_rest)[0].figure
     axes = up_rotation(motion.up, figure.up)
@@ -41,16 +31,7 @@ def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Fl
 
     The left side of the body is found from known joints; without such joints, it is along x.
 
-    Parameters
-    ----------
-    points : (J, 3)
-        Positions, up along ``up``.
-    matches : Matches
-        Match of the joints.
-    up : "y" or "z"
-        Up axis.
-    is_source : bool
-        Whether the points belong to the motion.
+    ``points``: (J, 3), positions, up along ``up``. ``up``: either "y" or "z", up axis.
     """
     upward = np.eye(3)["xyz".index(up)]
     joints = dict(zip(matches.names, range(len(matches.names)), strict=True))

@@ -71,31 +71,12 @@ def retarget(
     spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
-    Parameters
-    ----------
-    motion : SkeletonMotion
-        Skeleton and clip, up along y or z.
-    figure : Figure
-        Figure with a skeleton; its unmatched joints stay in their rest pose.
-    mapping : JointMap, or mapping of str to str, optional
-        The figure's joints and the motion's joints that drive them; or the motion's joint names to
-        the figure's.
-    source_rest : int, "zero" or "auto"
-        The motion's rest pose, see ``viewer.rig.retargeting.source_rest``; with "auto", a motion of
-        the figure's own skeleton keeps its own rest pose.
-
-    Returns
-    -------
-    clip : SampledClip
-        Clip for this figure. A skinned figure moves as a whole (``figure_translations``), a
-        skeleton without a skin moves at its root.
-    notes : list of Diagnostic
-        Messages about matched and unmatched joints, the rest pose, and the scale of the path.
-
-    Raises
-    ------
-    RigError
-        If too few joints match, the mapping names a missing joint, or a frame is missing.
+    ``source_rest``: the motion's rest pose, see ``viewer.rig.retargeting.source_rest``; with
+    "auto", a motion of the figure's own skeleton keeps its own rest pose. Returns ``clip``: clip
+    for this figure. A skinned figure moves as a whole (``figure_translations``), a skeleton without
+    a skin moves at its root; ``notes``: messages about matched and unmatched joints, the rest pose,
+    and the scale of the path. Raises ``RigError`` if too few joints match, the mapping names a
+    missing joint, or a frame is missing.
     """
     found = retargeted(motion, figure, mapping, source_rest)
     return found.clip, found.notes
@@ -148,48 +129,27 @@ def retargeted(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retargeted:
-    """Result of a retargeting, and how the two skeletons relate.
-
-    Attributes
-    ----------
-    clip : SampledClip
-        Motion of the figure.
-    notes : list of Diagnostic
-        Messages as returned by ``retarget``.
-    source : SkeletonMotion
-        The motion, with the rest pose that was used.
-    matches : Matches
-        Joints of the source for joints of the figure.
-    to_target : (3, 3)
-        Rotation from the source's axes to the figure's.
-    scale : float
-        Scale of the path.
-    """
+    """Result of a retargeting, and how the two skeletons relate."""
 
     clip: SampledClip
+    """Motion of the figure."""
     notes: list[Diagnostic]
+    """Messages as returned by ``retarget``."""
     source: SkeletonMotion
+    """The motion, with the rest pose that was used."""
     matches: Matches
+    """Joints of the source for joints of the figure."""
     to_target: Floats
+    """(3, 3). Rotation from the source's axes to the figure's."""
     scale: float
+    """Scale of the path."""
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
     """Return a skeleton and its motion with all lengths scaled, for instance from cm to m.
 
-    Parameters
-    ----------
-    motion : SkeletonMotion
-        Motion in any unit.
-    factor : float
-        Scale factor, positive.
-    unit : str
-        Unit of the scaled lengths, as in ``Figure.unit``.
-
-    Raises
-    ------
-    RigError
-        If the factor is not positive.
+    ``motion``: motion in any unit. ``unit``: unit of the scaled lengths, as in ``Figure.unit``.
+    Raises ``RigError`` if the factor is not positive.
     """
     if not 0.0 < factor < np.inf:
         raise RigError(f"expected a factor above 0, found {factor:g}")
@@ -289,13 +249,6 @@ def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[f
     """Return the ratio of the target's lengths to the source's, and the kind of lengths compared.
 
     Legs are compared if both have them, otherwise arms, otherwise all matched joints.
-
-    Parameters
-    ----------
-    source, target : RestPose
-        Rest poses in common axes.
-    matches : Matches
-        Joints of the source for joints of the target.
     """
     partners, names = matches.partners, matches.names
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
@@ -465,22 +418,9 @@ def ground_offset(
     The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
     have a different ratio. Without this offset, a body with high ankles sinks into the ground.
 
-    Parameters
-    ----------
-    source, target : (J', 3), (J, 3)
-        Joints of both skeletons in the source's rest pose, in common axes.
-    matches : Matches
-        Joints of the source for joints of the target.
-    up : (3,)
-        The up axis.
-    scale : float
-        Scale of the path.
-
-    Returns
-    -------
-    (3,)
-        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
-        source does not stand in its rest pose.
+    ``source``, ``target``: (J', 3), (J, 3), joints of both skeletons in the source's rest pose, in
+    common axes. ``up``: (3,), the up axis. Returns (3,), offset along the up axis, in the target's
+    unit; 0 if pelvis or feet are unmatched, or the source does not stand in its rest pose.
     """
     place = {
         name: joint for joint, name in enumerate(matches.names) if matches.partners[joint] >= 0
@@ -502,19 +442,9 @@ def expression_weights(
 ) -> tuple[Floats | None, list[Diagnostic]]:
     """Return a figure's blend shape weights over time; other shapes keep their rest weights.
 
-    Parameters
-    ----------
-    expressions : mapping of str to (N,)
-        Weights by the names of VRM 1.0.
-    figure : Figure
-        Its blend shapes may have the names of VRM 0.x.
-
-    Returns
-    -------
-    weights : (N, S) or None
-        None if no expression moves a shape of the figure.
-    notes : list of Diagnostic
-        The expressions that the figure does not have.
+    ``expressions``: mapping of str to (N,), weights by the names of VRM 1.0. Returns ``weights``:
+    (N, S) or None, none if no expression moves a shape of the figure; ``notes``: the expressions
+    that the figure does not have.
     """
     shapes = figure.blend_shapes
     names = () if shapes is None else shapes.names

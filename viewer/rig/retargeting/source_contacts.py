@@ -36,19 +36,13 @@ _TIPTOE = 0.07  # maximum height of the ball of a foot on tiptoe above the groun
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FootPath:
-    """Path of a foot of the source, in the axes and the unit of the driven figure.
-
-    Attributes
-    ----------
-    toe, heel : (N, 3)
-        Positions of the ball and of a point below the ankle; equal if there is no ball.
-    hip : (N, 3)
-        Positions of the hip.
-    """
+    """Path of a foot of the source, in the axes and the unit of the driven figure."""
 
     toe: Floats
     heel: Floats
+    """(N, 3). Positions of the ball and of a point below the ankle; equal if there is no ball."""
     hip: Floats
+    """(N, 3). Positions of the hip."""
 
     def lowest(self, up: Floats) -> Floats:
         """Return the height of the lower of both points: (N,)."""
@@ -57,31 +51,22 @@ class FootPath:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """Contact of one foot with the ground.
-
-    Attributes
-    ----------
-    start, stop : int
-        Half-open range of rows.
-    on_toe : (N,)
-        Rows of the range in which the ball is on the ground; in all others, only the heel is.
-    is_flat : (N,)
-        Rows of the range in which both are on the ground.
-    hold : (N,)
-        1 in rows in which the foot is slow, less at the beginning and end of the contact.
-    height : float
-        Height of the foot's lower point.
-    tilt : float
-        Height of the heel above the ball.
-    """
+    """Contact of one foot with the ground."""
 
     start: int
     stop: int
+    """Half-open range of rows."""
     on_toe: Bools
+    """(N,). Rows of the range in which the ball is on the ground; in all others, only the heel is.
+    (N,). Rows of the range in which the ball is on the ground; in all others, only the heel is."""
     is_flat: Bools
+    """(N,). Rows of the range in which both are on the ground."""
     hold: Floats
+    """(N,). 1 in rows in which the foot is slow, less at the beginning and end of the contact."""
     height: float
+    """Height of the foot's lower point."""
     tilt: float
+    """Height of the heel above the ball."""
 
 
 def foot_contacts(
@@ -94,20 +79,7 @@ def foot_contacts(
 ) -> list[list[Contact]]:
     """Return the contacts of every foot, in time order.
 
-    Parameters
-    ----------
-    feet : sequence of FootPath
-        The feet.
-    spans : sequence of (int, int)
-        Ranges of rows without gaps.
-    rate : float
-        Rows per second.
-    size : float
-        Approximate height of the body.
-    up : (3,)
-        The up axis.
-    ease : float
-        Seconds over which the hold rises at the beginning of a contact, and falls at its end.
+    ``spans``: ranges of rows without gaps. ``rate``: rows per second. ``up``: (3,), the up axis.
     """
     lows = np.array([foot.lowest(up) for foot in feet])
     result = []
@@ -191,14 +163,7 @@ def ground_level(
     This is the height at which feet are on the ground longest or, if the durations are similar, a
     height that is consistent with a ground at height 0, as on the lowest step of stairs.
 
-    Parameters
-    ----------
-    contacts : sequence of sequence of Contact
-        Contacts of every foot, at least one.
-    size : float
-        Approximate height of the body.
-    clearance : float
-        Probable height of a planted foot's lower point above the ground.
+    ``contacts``: contacts of every foot, at least one.
     """
     every = [contact for foot in contacts for contact in foot]
     heights = np.array([contact.height for contact in every])

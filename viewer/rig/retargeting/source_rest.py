@@ -35,15 +35,7 @@ _ROLLED = np.cos(np.radians(60.0))  # maximum roll of the limbs in a T- or A-pos
 
 
 def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
-    """Return a message if a motion lacks the frame that is its rest pose.
-
-    Parameters
-    ----------
-    motion : SkeletonMotion
-        The motion.
-    choice : int, "zero" or "auto"
-        Frame number as in its file.
-    """
+    """Return a message if a motion lacks the frame that is its rest pose."""
     timing = motion.clip.timing
     if isinstance(choice, str) or _row(motion, choice) >= 0:
         return None
@@ -57,27 +49,11 @@ def with_source_rest(
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
     """Return a motion whose skeleton has the requested rest pose; the motion itself is unchanged.
 
-    Parameters
-    ----------
-    motion : SkeletonMotion
-        Skeleton and clip.
-    choice : int, "zero" or "auto"
-        The frame that is the rest pose; the skeleton's own rest pose; or the latter if it is a
-        standing pose or its limbs have no known names, otherwise the T-pose with parallel joint
-        axes, otherwise the best T- or A-pose among the frames, otherwise an estimate from the
-        anatomy.
-
-    Returns
-    -------
-    motion : SkeletonMotion
-        The same clip, with another rest pose of the skeleton.
-    notes : list of Diagnostic
-        The chosen rest pose, unless it is the skeleton's.
-
-    Raises
-    ------
-    RigError
-        If there is no such frame.
+    ``choice``: the frame that is the rest pose; the skeleton's own rest pose; or the latter if it
+    is a standing pose or its limbs have no known names, otherwise the T-pose with parallel joint
+    axes, otherwise the best T- or A-pose among the frames, otherwise an estimate from the anatomy.
+    Returns ``motion``: the same clip, with another rest pose of the skeleton; ``notes``: the chosen
+    rest pose, unless it is the skeleton's. Raises ``RigError`` if there is no such frame.
     """
     fault = rest_fault(motion, choice)
     if fault is not None:

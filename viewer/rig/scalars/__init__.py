@@ -34,45 +34,31 @@ _ZERO = 1e-6  # rounding errors below this are 0
 
 @dataclass(frozen=True, slots=True)
 class _Quantity:
-    """A scalar quantity.
-
-    Attributes
-    ----------
-    title : str
-        Label in menus and the legend.
-    module : str
-        Module of this folder; its function has the name of the quantity's key.
-    needs : str
-        Part that a figure must have, as named in the message if it is missing.
-    kind : str
-        ``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0; ``"discrete"``:
-        counts; ``"categorical"``: indices of named items.
-    unit : str
-        ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
-    moves : bool
-        Whether the values depend on the pose.
-    about : str
-        ``"joint"`` or ``"field"`` if the quantity refers to a joint or field, which its name may
-        specify; empty otherwise.
-    isolines : bool
-        Whether isolines are drawn by default.
-    least : float
-        Minimum upper end of the automatic range.
-    robust : bool
-        Whether the automatic range excludes the largest hundredth of the non-zero values, so that
-        one degenerate triangle does not dominate the colour map.
-    """
+    """A scalar quantity."""
 
     title: str
+    """Label in menus and the legend."""
     module: str
+    """Module of this folder; its function has the name of the quantity's key."""
     needs: str
+    """Part that a figure must have, as named in the message if it is missing."""
     kind: str = "sequential"
+    """``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0; ``"discrete"``:
+    counts; ``"categorical"``: indices of named items."""
     unit: str = "length"
+    """``"length"`` for figure units, otherwise the unit's name; empty if dimensionless."""
     moves: bool = True
+    """Whether the values depend on the pose."""
     about: str = ""
+    """``"joint"`` or ``"field"`` if the quantity refers to a joint or field, which its name may
+    specify; empty otherwise."""
     isolines: bool = False
+    """Whether isolines are drawn by default."""
     least: float = 0.0
+    """Minimum upper end of the automatic range."""
     robust: bool = False
+    """Whether the automatic range excludes the largest hundredth of the non-zero values, so that
+    one degenerate triangle does not dominate the colour map."""
 
     @property
     def takes_joint(self) -> bool:
@@ -133,15 +119,8 @@ SCALARS = {
 def split_name(name: str) -> tuple[str, str]:
     """Split a quantity's name into its key and the joint or field after the colon, if any.
 
-    Parameters
-    ----------
-    name : str
-        ``"stretch"``, ``"weight:left_knee"``.
-
-    Raises
-    ------
-    RigError
-        If there is no such quantity, or a joint or field is given for a quantity without one.
+    ``name``: ``"stretch"``, ``"weight:left_knee"``. Raises ``RigError`` if there is no such
+    quantity, or a joint or field is given for a quantity without one.
     """
     key, colon, about = name.partition(":")
     if key not in SCALARS:
@@ -154,10 +133,7 @@ def split_name(name: str) -> tuple[str, str]:
 def find_quantity(name: str) -> _Quantity:
     """Return the quantity with a name, which may include a joint or field.
 
-    Raises
-    ------
-    RigError
-        As in ``split_name``.
+    Raises ``RigError``: as in ``split_name``.
     """
     return SCALARS[split_name(name)[0]]
 
@@ -165,27 +141,10 @@ def find_quantity(name: str) -> _Quantity:
 def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
     """Return the values of a scalar quantity.
 
-    Parameters
-    ----------
-    name : str
-        A key of ``SCALARS``, with a joint or field if the quantity has one.
-    figure : Figure
-        Figure with a mesh.
-    pose : Pose or None
-        None for the mesh in the bind pose.
-    skinning : Skinning
-        Skinning options of the drawn mesh.
-
-    Returns
-    -------
-    (V,)
-        Values in figure units or the quantity's own unit; if the figure lacks the part that the
-        quantity needs, 0, or -1 for categorical quantities.
-
-    Raises
-    ------
-    RigError
-        If the quantity is unknown, or the figure lacks its joint or field.
+    ``name``: a key of ``SCALARS``, with a joint or field if the quantity has one. ``pose``: none
+    for the mesh in the bind pose. Returns (V,), values in figure units or the quantity's own unit;
+    if the figure lacks the part that the quantity needs, 0, or -1 for categorical quantities.
+    Raises ``RigError`` if the quantity is unknown, or the figure lacks its joint or field.
     """
     key, about = split_name(name)
     quantity = SCALARS[key]
@@ -221,12 +180,7 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
 def menu_title(key: str, skinning: Skinning) -> str:
     """Return the label of a quantity in menus, with the number of influences on which it depends.
 
-    Parameters
-    ----------
-    key : str
-        A key of ``SCALARS``.
-    skinning : Skinning
-        Provides the number of influences.
+    ``key``: a key of ``SCALARS``.
     """
     if key != "pruning":
         return SCALARS[key].title
@@ -237,19 +191,7 @@ def menu_title(key: str, skinning: Skinning) -> str:
 def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
     """Return the title of a quantity of a figure: ``"Weight of left_knee"``.
 
-    Parameters
-    ----------
-    name : str
-        Name of the quantity.
-    figure : Figure
-        Provides the names of joints and fields.
-    skinning : Skinning
-        Skinning options of the drawn mesh.
-
-    Raises
-    ------
-    RigError
-        If the quantity is unknown.
+    Raises ``RigError`` if the quantity is unknown.
     """
     quantity, (key, about) = find_quantity(name), split_name(name)
     title = menu_title(key, skinning)
@@ -264,10 +206,7 @@ def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
 def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
     """Return the factor to a quantity's displayed unit, and that unit's name.
 
-    Raises
-    ------
-    RigError
-        If the quantity is unknown.
+    Raises ``RigError`` if the quantity is unknown.
     """
     quantity, (key, about) = find_quantity(name), split_name(name)
     field = field_of(figure, about, key == "class") if quantity.about == "field" else None
@@ -278,10 +217,7 @@ def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
 def missing_part(name: str, figure: Figure) -> str:
     """Return the name of the part that a figure lacks for a quantity; empty if none is missing.
 
-    Raises
-    ------
-    RigError
-        If the quantity is unknown.
+    Raises ``RigError`` if the quantity is unknown.
     """
     quantity, (key, about) = find_quantity(name), split_name(name)
     lacks = _missing(quantity.needs, figure)

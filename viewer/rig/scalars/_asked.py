@@ -20,27 +20,18 @@ _FOUR = 4  # maximum number of influences per vertex in most engines
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """A figure as it is drawn, and the joint or field of the quantity.
-
-    Attributes
-    ----------
-    figure : Figure
-        Figure with the part that the quantity needs.
-    pose : Pose or None
-        Pose; not None for quantities that depend on it.
-    skinning : Skinning
-        Skinning options of the drawn mesh.
-    joint : int
-        Index of a joint of the skin, -1 for quantities without a joint.
-    about : str
-        Joint or field after the colon of the quantity's name.
-    """
+    """A figure as it is drawn, and the joint or field of the quantity."""
 
     figure: Figure
+    """Figure with the part that the quantity needs."""
     pose: Pose | None
+    """Pose; not None for quantities that depend on it."""
     skinning: Skinning
+    """Skinning options of the drawn mesh."""
     joint: int = -1
+    """Index of a joint of the skin, -1 for quantities without a joint."""
     about: str = ""
+    """Joint or field after the colon of the quantity's name."""
 
     @property
     def skin(self) -> Skin:

@@ -27,32 +27,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Properties of a skinning method that are needed before its module is imported.
-
-    Attributes
-    ----------
-    title : str
-        Label in menus.
-    short : str
-        Label on buttons and in legends.
-    uses_matrices : bool
-        Whether it blends skinning matrices: its shader reads ``u_palette``.
-    uses_quaternions : bool
-        Whether it blends dual quaternions: its shader reads ``u_rigid``.
-    ends : tuple of str
-        The two methods between which ``Skinning.blend_factor`` interpolates; empty for independent
-        methods.
-    result : str
-        Label of the result in the explanation of a vertex; empty if the last sum is already the
-        result. ``{blend_factor}`` is replaced by the number.
-    """
+    """Properties of a skinning method that are needed before its module is imported."""
 
     title: str
+    """Label in menus."""
     short: str
+    """Label on buttons and in legends."""
     uses_matrices: bool = True
+    """Whether it blends skinning matrices: its shader reads ``u_palette``."""
     uses_quaternions: bool = False
+    """Whether it blends dual quaternions: its shader reads ``u_rigid``."""
     ends: tuple[str, ...] = ()
+    """The two methods between which ``Skinning.blend_factor`` interpolates; empty for independent
+    methods."""
     result: str = ""
+    """Label of the result in the explanation of a vertex; empty if the last sum is already the
+    result. ``{blend_factor}`` is replaced by the number."""
 
 
 METHODS = {
@@ -73,28 +63,20 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 
 @dataclass(slots=True)
 class Skinning:
-    """Skinning options; by default, weights are used as stored.
-
-    Attributes
-    ----------
-    method : str
-        A key of ``METHODS``.
-    blend_factor : float or None
-        Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS. None
-        for the fractions that the file states for each vertex; see ``Skin.dqs_fractions``.
-    max_influences : int
-        Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored.
-    normalize : bool
-        Scale each vertex's weights to a sum of 1.
-    correctives : bool
-        Add pose correctives, if the figure has any.
-    """
+    """Skinning options; by default, weights are used as stored."""
 
     method: str = "lbs"
+    """A key of ``METHODS``."""
     blend_factor: float | None = 0.5
+    """Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS. None
+    for the fractions that the file states for each vertex; see ``Skin.dqs_fractions``."""
     max_influences: int = 0
+    """Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored.
+    Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored."""
     normalize: bool = False
+    """Scale each vertex's weights to a sum of 1."""
     correctives: bool = True
+    """Add pose correctives, if the figure has any."""
 
     def unreduced(self) -> Skinning:
         """Return the same method for the figure as it was opened: all of its data, unchanged."""
@@ -164,25 +146,9 @@ def skinned(
 ) -> tuple[Floats, Floats]:
     """Transform vertices by skinning matrices.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Already shaped.
-    skin : Skin
-        As stored.
-    rest : (N, 3)
-        Vertices in the bind pose, with pose correctives.
-    palette : (J, 4, 4)
-        Skinning matrices.
-    skinning : Skinning
-        Method and influences.
-    vertices : (N,), optional
-        Indices of the vertices to transform; all if omitted.
-
-    Returns
-    -------
-    positions, normals : (N, 3)
-        Figure units, before the figure's own scale and translation; unit length.
+    ``rest``: (N, 3), vertices in the bind pose, with pose correctives. ``palette``: (J, 4, 4),
+    skinning matrices. ``vertices``: (N,), indices of the vertices to transform; all if omitted.
+    Returns (N, 3), figure units, before the figure's own scale and translation; unit length.
     """
     from viewer.rig.skin import skin_rows
 
@@ -290,17 +256,8 @@ def skin_used(skin: Skin, skinning: Skinning) -> Skin:
 def posed_mesh(figure: Figure, pose: Pose | None) -> Mesh:
     """Return a figure's mesh with the positions and normals of a pose.
 
-    Parameters
-    ----------
-    figure : Figure
-        A figure with a mesh; without a skin, its mesh is returned as it is.
-    pose : Pose or None
-        Pose of the figure; that of the file if omitted.
-
-    Raises
-    ------
-    RigError
-        If the figure has no mesh.
+    ``figure``: a figure with a mesh; without a skin, its mesh is returned as it is. ``pose``: pose
+    of the figure; that of the file if omitted. Raises ``RigError`` if the figure has no mesh.
     """
     mesh = figure.require_mesh()
     if not figure.is_attached:

@@ -38,23 +38,9 @@ def deform(
     of the strongest influence (eq. 14 and its text: antipodality). Normals are transformed by the
     inverse transpose of the blended stretch, then by the blended rotation.
 
-    Parameters
-    ----------
-    positions, normals : (V, 3)
-        In the bind pose.
-    skin : Skin
-        A vertex without influence stays at its bind position.
-    palette : (J, 4, 4)
-        Skinning matrices, bind to posed; they may scale, uniformly or not.
-    blend_factor : float
-        Unused; part of the signature of every method.
-
-    Returns
-    -------
-    positions : (V, 3)
-        Figure units.
-    normals : (V, 3)
-        Unit length.
+    ``positions``, ``normals``: (V, 3), in the bind pose. ``skin``: a vertex without influence stays
+    at its bind position. ``palette``: (J, 4, 4), skinning matrices, bind to posed; they may scale,
+    uniformly or not. Returns ``positions``: (V, 3), figure units; ``normals``: (V, 3), unit length.
     """
     skin = strongest_first(skin)
     centers = bind_positions(skin)
@@ -74,17 +60,8 @@ def deform(
 def linear_maps(skin: Skin, palette: Floats) -> Floats:
     """Return the linear part of each vertex's motion: the rotation after the stretch.
 
-    Parameters
-    ----------
-    skin : Skin
-        V vertices.
-    palette : (J, 4, 4)
-        Skinning matrices, bind to posed.
-
-    Returns
-    -------
-    (V, 3, 3)
-        The identity for a vertex without influence.
+    ``palette``: (J, 4, 4), skinning matrices, bind to posed. Returns (V, 3, 3), the identity for a
+    vertex without influence.
     """
     skin = strongest_first(skin)
     maps = np.tile(np.eye(3), (skin.n_vertices, 1, 1))
@@ -96,19 +73,9 @@ def linear_maps(skin: Skin, palette: Floats) -> Floats:
 def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
     """Split skinning matrices into a rigid motion after a stretch about each joint, M = D S.
 
-    Parameters
-    ----------
-    palette : (J, 4, 4)
-        Bind to posed.
-    centers : (J, 3)
-        Bind positions of the joints, the fixed points of the stretches.
-
-    Returns
-    -------
-    duals : (J, 8)
-        Unit dual quaternions (x, y, z, w) of D: the real part, then the dual part.
-    stretches : (J, 3, 4)
-        Affine matrices S.
+    ``palette``: (J, 4, 4), bind to posed. ``centers``: (J, 3), bind positions of the joints, the
+    fixed points of the stretches. Returns ``duals``: (J, 8), unit dual quaternions (x, y, z, w) of
+    D: the real part, then the dual part; ``stretches``: (J, 3, 4), affine matrices S.
     """
     linear = palette[:, :3, :3]
     rotations = linear.copy()

@@ -42,23 +42,9 @@ def deform(
     If all joints of a vertex are rigid, its normal uses the blended matrix itself (CSE169 course
     notes). If one of them scales or shears, it uses the inverse transpose, n' = unit(B^-T n).
 
-    Parameters
-    ----------
-    positions, normals : (V, 3)
-        In the bind pose.
-    skin : Skin
-        Weights as stored; a vertex without influence stays at its bind position.
-    palette : (J, 4, 4)
-        Skinning matrices, bind to posed.
-    blend_factor : float
-        Unused; part of the signature of every method.
-
-    Returns
-    -------
-    positions : (V, 3)
-        Figure units.
-    normals : (V, 3)
-        Unit length.
+    ``positions``, ``normals``: (V, 3), in the bind pose. ``skin``: weights as stored; a vertex
+    without influence stays at its bind position. ``palette``: (J, 4, 4), skinning matrices, bind to
+    posed. Returns ``positions``: (V, 3), figure units; ``normals``: (V, 3), unit length.
     """
     moved, rotated = move(positions, skin, palette, normals)
     assert rotated is not None  # normals were given
@@ -73,23 +59,9 @@ def move(
     Frames of a clip are best transformed one by one: their matrices stay in the processor's cache,
     which is twice as fast as one large product (``tests/bench/bench_deform.py``).
 
-    Parameters
-    ----------
-    positions : (V, 3)
-        In the bind pose.
-    skin : Skin
-        Influences of V vertices.
-    palette : (J, 4, 4)
-        Skinning matrices.
-    normals : (V, 3), optional
-        Normals, optional because they double the work.
-
-    Returns
-    -------
-    positions : (V, 3)
-        Figure units.
-    normals : (V, 3) or None
-        Not normalised.
+    ``positions``: (V, 3), in the bind pose. ``palette``: (J, 4, 4), skinning matrices. ``normals``:
+    (V, 3), normals, optional because they double the work. Returns ``positions``: (V, 3), figure
+    units; ``normals``: (V, 3) or None, not normalised.
     """
     moved = np.empty(positions.shape)
     rotated = None if normals is None else np.empty(positions.shape)
@@ -111,17 +83,8 @@ def move(
 def blended_matrices(skin: Skin, palette: Floats) -> Floats:
     """Sum each vertex's joint matrices by weight: sum_i w_i M_i, identity without influence.
 
-    Parameters
-    ----------
-    skin : Skin
-        V vertices.
-    palette : (J, 4, 4)
-        Skinning matrices.
-
-    Returns
-    -------
-    (V, 3, 4)
-        The affine part of the blended matrices.
+    ``palette``: (J, 4, 4), skinning matrices. Returns (V, 3, 4), the affine part of the blended
+    matrices.
     """
     result = np.empty((skin.n_vertices, 3, 4))
     for rows, matrices in _blended(skin, palette):
@@ -166,24 +129,16 @@ def _product(matrices: Floats, vectors: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """The weights of consecutive vertices.
-
-    Attributes
-    ----------
-    rows : slice
-        Indices of the vertices.
-    joints : (B,) int32
-        Joints that influence any of these vertices.
-    weights : (B, n)
-        Weight of each joint for each vertex; 0 without influence.
-    free : (F,) int32
-        Rows within the block without influence, whose matrix is the identity.
-    """
+    """The weights of consecutive vertices."""
 
     rows: slice
+    """Indices of the vertices."""
     joints: Ints
+    """(B,) int32. Joints that influence any of these vertices."""
     weights: Floats
+    """(B, n). Weight of each joint for each vertex; 0 without influence."""
     free: Ints
+    """(F,) int32. Rows within the block without influence, whose matrix is the identity."""
 
 
 _kept: Memo[Skin, tuple[_Block, ...] | None] = Memo()

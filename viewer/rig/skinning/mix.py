@@ -22,23 +22,10 @@ def deform(
 
     Where joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
 
-    Parameters
-    ----------
-    positions, normals : (V, 3)
-        In the bind pose.
-    skin : Skin
-        Influences of V vertices.
-    palette : (J, 4, 4)
-        Skinning matrices, bind to posed.
-    blend_factor : float or None
-        0 for LBS alone, 1 for DQS alone; None for the fractions of the skin at each vertex.
-
-    Returns
-    -------
-    positions : (V, 3)
-        Figure units.
-    normals : (V, 3)
-        Unit length.
+    ``positions``, ``normals``: (V, 3), in the bind pose. ``palette``: (J, 4, 4), skinning matrices,
+    bind to posed. ``blend_factor``: 0 for LBS alone, 1 for DQS alone; None for the fractions of the
+    skin at each vertex. Returns ``positions``: (V, 3), figure units; ``normals``: (V, 3), unit
+    length.
     """
     factor: Floats | float
     if blend_factor is not None:

@@ -68,13 +68,7 @@ class _Level:
 
 
 class Simulation:
-    """Evaluator of the spring joints of one skeleton.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton with springs.
-    """
+    """Evaluator of the spring joints of one skeleton."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         if skeleton.springs is None:
@@ -109,24 +103,10 @@ class Simulation:
     ) -> tuple[Tails, Floats]:
         """Return the points after one step, and the rotations of the spring joints.
 
-        Parameters
-        ----------
-        tails : Tails
-            The points before the step.
-        world, local : (J, 4, 4)
-            Matrices of all joints in the pose at the end of the step, without springs; local ones
-            without scale.
-        scales : (J, 3)
-            Scale factors of the joints.
-        place : (4, 4)
-            Placement of the whole figure.
-
-        Returns
-        -------
-        tails : Tails
-            The points after the step.
-        rotations : (N, 4)
-            Complete rotations relative to the parents: unit quaternions (x, y, z, w).
+        ``world``, ``local``: (J, 4, 4), matrices of all joints in the pose at the end of the step,
+        without springs; local ones without scale. ``scales``: (J, 3), scale factors of the joints.
+        ``place``: (4, 4), placement of the whole figure. Returns ``rotations``: (N, 4), complete
+        rotations relative to the parents: unit quaternions (x, y, z, w).
         """
         springs, world = self._springs, world.copy()
         now = np.empty_like(tails.now)
@@ -310,22 +290,15 @@ def _at_length(points: Floats, origins: Floats, lengths: Floats, rest: Floats) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedJoints:
-    """Joints of a motion without springs at F times.
-
-    Attributes
-    ----------
-    world, local : (F, J, 4, 4)
-        Joint-to-figure matrices, and joint-to-parent matrices without scale.
-    scales : (F, J, 3)
-        Local scale factors.
-    places : (F, 4, 4)
-        Placement of the whole figure, which ``world`` includes.
-    """
+    """Joints of a motion without springs at F times."""
 
     world: Floats
     local: Floats
+    """(F, J, 4, 4). Joint-to-figure matrices, and joint-to-parent matrices without scale."""
     scales: Floats
+    """(F, J, 3). Local scale factors."""
     places: Floats
+    """(F, 4, 4). Placement of the whole figure, which ``world`` includes."""
 
 
 _PosesAt = Callable[[Floats], PosedJoints]
@@ -335,12 +308,8 @@ _PosesAt = Callable[[Floats], PosedJoints]
 class SpringTrack:
     """Rotations of the spring joints of one skeleton during one motion.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Skeleton with springs.
-    start, end : float
-        Range of the motion in seconds; the rotations are constant outside this range.
+    ``start``, ``end``: range of the motion in seconds; the rotations are constant outside this
+    range.
     """
 
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:
@@ -352,17 +321,8 @@ class SpringTrack:
     def rotations(self, times: Floats, poses_at: _PosesAt) -> Floats:
         """Return the complete rotations of the spring joints relative to their parents.
 
-        Parameters
-        ----------
-        times : (F,)
-            Seconds on the motion's own clock.
-        poses_at : callable
-            Returns the joints of the motion; always the same ones for a track.
-
-        Returns
-        -------
-        (F, N, 4)
-            Unit quaternions (x, y, z, w).
+        ``times``: (F,), seconds on the motion's own clock. Returns (F, N, 4), unit quaternions (x,
+        y, z, w).
         """
         steps = np.clip((times - self._start) * STEPS_PER_SECOND, 0.0, self._last)
         before: Ints = np.floor(steps + _ON_STEP).astype(np.int32)

@@ -16,27 +16,19 @@ OUTSIDE, INSIDE, PLANE = 0, 1, 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Colliders:
-    """Spheres, capsules and planes that follow joints.
-
-    Attributes
-    ----------
-    joints : (C,) int32
-        Joint that each shape follows.
-    offsets, tails : (C, 3)
-        Centres of both ends in joint space; equal for a sphere. For a plane, a point on it and the
-        same point moved by its normal.
-    radii : (C,)
-        Scene units; joints do not scale them. 0 for a plane.
-    kinds : (C,) int32
-        ``OUTSIDE``, ``INSIDE`` or ``PLANE``: points stay outside of the shape, inside it, or on the
-        side of a plane to which its normal points. Empty if all are ``OUTSIDE``.
-    """
+    """Spheres, capsules and planes that follow joints."""
 
     joints: Ints
+    """(C,) int32. Joint that each shape follows."""
     offsets: Floats
     tails: Floats
+    """(C, 3). Centres of both ends in joint space; equal for a sphere. For a plane, a point on it
+    and the same point moved by its normal."""
     radii: Floats
+    """(C,). Scene units; joints do not scale them. 0 for a plane."""
     kinds: Ints = ()  # type: ignore[assignment]  # converted to an array below
+    """(C,) int32. ``OUTSIDE``, ``INSIDE`` or ``PLANE``: points stay outside of the shape, inside
+    it, or on the side of a plane to which its normal points. Empty if all are ``OUTSIDE``."""
 
     def __post_init__(self) -> None:
         count = len(self.joints)
@@ -58,42 +50,28 @@ def _no_colliders() -> Colliders:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Springs:
-    """Joints whose rotation is determined by the inertia of a point below them.
-
-    Attributes
-    ----------
-    joints : (N,) int32
-        The spring joints, each listed once.
-    tails : (N, 3)
-        The point that swings, in the rest space of the joint.
-    stiffness : (N,)
-        Speed towards the rest direction, scene units per second.
-    drags : (N,)
-        Fraction of the speed that is lost in each step, 0 to 1.
-    gravities : (N, 3)
-        Constant speed in figure space, per second.
-    radii : (N,)
-        Radius of the colliding sphere around the point.
-    centers : (N,) int32
-        Joint relative to which inertia is evaluated; -1 for figure space.
-    colliders : Colliders
-        Shapes of the figure.
-    obstacles : tuple of N tuple of int
-        Indices of the colliders that each point avoids, in this order.
-    n_chains : int
-        Number of chains in the file.
-    """
+    """Joints whose rotation is determined by the inertia of a point below them."""
 
     joints: Ints
+    """(N,) int32. The spring joints, each listed once."""
     tails: Floats
+    """(N, 3). The point that swings, in the rest space of the joint."""
     stiffness: Floats
+    """(N,). Speed towards the rest direction, scene units per second."""
     drags: Floats
+    """(N,). Fraction of the speed that is lost in each step, 0 to 1."""
     gravities: Floats
+    """(N, 3). Constant speed in figure space, per second."""
     radii: Floats
+    """(N,). Radius of the colliding sphere around the point."""
     centers: Ints
+    """(N,) int32. Joint relative to which inertia is evaluated; -1 for figure space."""
     colliders: Colliders = field(default_factory=_no_colliders)
+    """Shapes of the figure."""
     obstacles: tuple[tuple[int, ...], ...] = ()
+    """Indices of the colliders that each point avoids, in this order."""
     n_chains: int = 1
+    """Number of chains in the file."""
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:

@@ -53,20 +53,10 @@ def move_transform_keys(
 ) -> TransformClip:
     """Return a clip with some keys moved together.
 
-    Parameters
-    ----------
-    clip : TransformClip
-        The motion, which contains these keys.
-    skeleton : Skeleton
-        Defines the angles of rotations.
-    places : iterable of (row, key)
-        Selected keys.
-    dt : float
-        Seconds; reduced if a key would otherwise come closer than ``gap`` to an unmoved key.
-    dv : float
-        Change of the value of each selected component: radians, length, factor or weight.
-    gap : float
-        Minimum distance between keys, seconds, above 0.
+    ``places``: iterable of (row, key), selected keys. ``dt``: seconds; reduced if a key would
+    otherwise come closer than ``gap`` to an unmoved key. ``dv``: change of the value of each
+    selected component: radians, length, factor or weight. ``gap``: minimum distance between keys,
+    seconds, above 0.
     """
     for index, chosen in _by_channel(clip, skeleton, places).items():
         channel = clip.channels[index]
@@ -102,17 +92,9 @@ def add_transform_key(
 ) -> TransformClip:
     """Return a clip with a key added to a channel; an existing key at this time is changed instead.
 
-    Parameters
-    ----------
-    clip : TransformClip
-        The motion.
-    row : TransformRow
-        Any component; if it has no channel, one is added.
-    time : float
-        Seconds.
-    value : (C,), optional
-        Value of the key, a quaternion for rotations; by default the value of the curve, whose shape
-        is then unchanged. Required if the row has no channel.
+    ``row``: any component; if it has no channel, one is added. ``value``: (C,), value of the key, a
+    quaternion for rotations; by default the value of the curve, whose shape is then unchanged.
+    Required if the row has no channel.
     """
     if row.channel >= 0:
         channel = added_key(clip.channels[row.channel], time, value)[0]
@@ -168,18 +150,7 @@ def key_transform_pose(
 
     Properties that differ from the file's pose and have no channel get one.
 
-    Parameters
-    ----------
-    clip : TransformClip
-        The motion; its range is extended to contain the time.
-    figure : Figure
-        Figure of the pose.
-    pose : Pose
-        Its values become the keys.
-    time : float
-        Seconds.
-    only_changed : bool
-        Key only properties that differ from the clip at this time.
+    ``only_changed``: key only properties that differ from the clip at this time.
     """
     skeleton = figure.require_skeleton()
     now, rest = joint_values(skeleton, pose), figure_pose(figure)
@@ -336,15 +307,9 @@ def added_key(
 ) -> tuple[TransformChannel, int]:
     """Return a channel with one more key, and its index.
 
-    Parameters
-    ----------
-    channel : TransformChannel
-        With any interpolation.
-    time : float
-        Seconds. An existing key at this time is changed instead.
-    value : (C,), optional
-        Its value; by default the shape of the curve is unchanged. A cubic key with a value gets the
-        slope between its neighbours.
+    ``time``: seconds. An existing key at this time is changed instead. ``value``: (C,), its value;
+    by default the shape of the curve is unchanged. A cubic key with a value gets the slope between
+    its neighbours.
     """
     there = _key_at(channel, time)
     if there >= 0:

@@ -24,17 +24,9 @@ _known: Memo[TransformClip, float] = Memo()
 def key_rate(clip: TransformClip) -> float:
     """Return the frame rate of a clip's keys.
 
-    Parameters
-    ----------
-    clip : TransformClip
-        A clip whose keys may begin at any time.
-
-    Returns
-    -------
-    float
-        The first usual rate at which all keys lie on frames, counted from the start of the clip.
-        Otherwise the rate of keys at equal distances, multiplied to at least 24 frames per second.
-        ``DEFAULT_RATE`` if the keys are at irregular times.
+    Returns the first usual rate at which all keys lie on frames, counted from the start of the
+    clip. Otherwise the rate of keys at equal distances, multiplied to at least 24 frames per
+    second. ``DEFAULT_RATE`` if the keys are at irregular times.
     """
     return _found(clip) or DEFAULT_RATE
 

@@ -30,27 +30,18 @@ _parts: Memo[TransformClip, TransformClip] = Memo(kept=2)
 
 @dataclass(frozen=True, slots=True)
 class TransformRow:
-    """One curve of a clip.
-
-    Attributes
-    ----------
-    path : str
-        Entry of ``TRANSFORM_PATHS``.
-    joint : int
-        Animated joint; -1 for weights.
-    component : int
-        0 to 2 for x, y, z, or the component of a channel of weights.
-    channel : int
-        Index of the channel; -1 for a rotation without keys.
-    shape : int
-        Index of the blend shape of a weight; -1 for other curves.
-    """
+    """One curve of a clip."""
 
     path: TransformPath
+    """Entry of ``TRANSFORM_PATHS``."""
     joint: int
+    """Animated joint; -1 for weights."""
     component: int
+    """0 to 2 for x, y, z, or the component of a channel of weights."""
     channel: int
+    """Index of the channel; -1 for a rotation without keys."""
     shape: int = -1
+    """Index of the blend shape of a weight; -1 for other curves."""
 
 
 def rows_of(clip: TransformClip, skeleton: Skeleton) -> tuple[TransformRow, ...]:
@@ -103,21 +94,8 @@ def row_values(
 ) -> Floats:
     """Return some curves of a clip at many times.
 
-    Parameters
-    ----------
-    clip : TransformClip
-        The motion.
-    skeleton : Skeleton
-        The skeleton that it moves.
-    chosen : sequence of int
-        Indices into ``rows_of``.
-    times : (T,)
-        Seconds.
-
-    Returns
-    -------
-    (T, C)
-        Radians, lengths, factors or weights; 0 for rotations without keys.
+    ``chosen``: indices into ``rows_of``. ``times``: (T,), seconds. Returns (T, C), radians,
+    lengths, factors or weights; 0 for rotations without keys.
     """
     rows = [rows_of(clip, skeleton)[index] for index in chosen]
     used = tuple(sorted({row.channel for row in rows if row.channel >= 0}))

@@ -32,32 +32,23 @@ _tables: Memo[TransformClip, _TransformTable] = Memo(kept=1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransformSamples:
-    """Values of all channels of a clip at T times.
-
-    Attributes
-    ----------
-    rotated, translated, scaled : (R,), (N,), (M,) int32
-        Joints with channels.
-    weighted : (W,) int32
-        Blend shapes with channels.
-    rotations : (T, R, 4)
-        Relative to the parent joint, rest rotation included: unit quaternions (x, y, z, w).
-    translations : (T, N, 3)
-        Relative to the parent joint, rest translation included.
-    scales : (T, M, 3)
-        Factors.
-    weights : (T, W)
-        Weights of the shapes ``weighted``.
-    """
+    """Values of all channels of a clip at T times."""
 
     rotated: Ints
     translated: Ints
     scaled: Ints
+    """(R,), (N,), (M,) int32. Joints with channels."""
     weighted: Ints
+    """(W,) int32. Blend shapes with channels."""
     rotations: Floats
+    """(T, R, 4). Relative to the parent joint, rest rotation included: unit quaternions (x, y, z,
+    w)."""
     translations: Floats
+    """(T, N, 3). Relative to the parent joint, rest translation included."""
     scales: Floats
+    """(T, M, 3). Factors."""
     weights: Floats
+    """(T, W). Weights of the shapes ``weighted``."""
 
 
 def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
@@ -69,17 +60,8 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
     incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
     first key and after its last key, a channel has the value of that key.
 
-    Parameters
-    ----------
-    clip : TransformClip
-        With any number of channels.
-    times : (T,)
-        Seconds.
-
-    Returns
-    -------
-    TransformSamples
-        At the time of a key, exactly the key's value; rotations are normalised.
+    ``times``: (T,), seconds. Returns at the time of a key, exactly the key's value; rotations are
+    normalised.
     """
     table = _tables.get(clip, (), lambda: _transform_table(clip.channels))
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
@@ -108,17 +90,8 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
 def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
     """Set the values that the channels animate, in place; all others are unchanged.
 
-    Parameters
-    ----------
-    samples : TransformSamples
-        Values of all channels at some times.
-    row : int
-        Index of the time.
-    skeleton : Skeleton
-        Provides the DOF table and the rest pose.
-    pose : Pose
-        Rotations become DOFs of ball joints, and quaternions elsewhere, as in
-        ``set_joint_rotations``.
+    ``pose``: rotations become DOFs of ball joints, and quaternions elsewhere, as in
+    ``set_joint_rotations``.
     """
     if len(samples.rotated):
         rotations = quaternion_to_matrix(samples.rotations[row])
@@ -139,17 +112,9 @@ def _set_joint_translations(
 ) -> None:
     """Set the translations of joints relative to their parents, in place.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Provides the DOF table.
-    pose : Pose
-        A joint's translation DOFs receive the offset from rest, within their limits; the pose's
-        translations receive the remainder.
-    joints : (N,)
-        Joints to move.
-    translations : (N, 3)
-        Relative to the parent joint, rest translation included; lengths.
+    ``pose``: a joint's translation DOFs receive the offset from rest, within their limits; the
+    pose's translations receive the remainder. ``joints``: (N,), joints to move. ``translations``:
+    (N, 3), relative to the parent joint, rest translation included; lengths.
     """
     offsets = translations - skeleton.rest_translations[joints]
     moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
@@ -221,102 +186,68 @@ def _normalised(quaternions: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Timelines:
-    """U distinct lists of key times; most channels of a file share one.
-
-    Attributes
-    ----------
-    times : (K,)
-        Seconds of all keys, one timeline after the other.
-    first : (U,)
-        Index of each timeline's first key.
-    durations : (K,)
-        Seconds until the next key of the timeline, inf after its last key.
-    union : (M,)
-        All distinct times, increasing.
-    ends : (U,) int64
-        u (M + 1) of each timeline u.
-    ranks : (K,) int64
-        For a key of timeline u, ``ends`` + the number of times of ``union`` up to the key. It is
-        increasing, so one search finds the spans of all timelines.
-    """
+    """U distinct lists of key times; most channels of a file share one."""
 
     times: Floats
+    """(K,). Seconds of all keys, one timeline after the other."""
     first: Ints
+    """(U,). Index of each timeline's first key."""
     durations: Floats
+    """(K,). Seconds until the next key of the timeline, inf after its last key."""
     union: Floats
+    """(M,). All distinct times, increasing."""
     ends: NDArray[np.int64]
+    """(U,) int64. u (M + 1) of each timeline u."""
     ranks: NDArray[np.int64]
+    """(K,) int64. For a key of timeline u, ``ends`` + the number of times of ``union`` up to the
+    key. It is increasing, so one search finds the spans of all timelines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Arcs:
-    """R rotations that follow arcs between their keys, or stay at the earlier key.
-
-    Attributes
-    ----------
-    timelines : (R,)
-        Timelines.
-    bases : (R,)
-        Row of each rotation's first key.
-    slopes : (R,)
-        1 for arcs, 0 for steps, which stay at the earlier key.
-    keys : (N, 4)
-        Unit quaternions with signs such that neighbours are less than 180 degrees apart. The last
-        key of each channel is repeated, so that every key has a successor.
-    angles, sines : (N,)
-        Angle of the arc to the next key, and its sine.
-    """
+    """R rotations that follow arcs between their keys, or stay at the earlier key."""
 
     timelines: Ints
+    """(R,)."""
     bases: Ints
+    """(R,). Row of each rotation's first key."""
     slopes: Floats
+    """(R,). 1 for arcs, 0 for steps, which stay at the earlier key."""
     keys: Floats
+    """(N, 4). Unit quaternions with signs such that neighbours are less than 180 degrees apart. The
+    last key of each channel is repeated, so that every key has a successor."""
     angles: Floats
     sines: Floats
+    """(N,). Angle of the arc to the next key, and its sine."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curves:
-    """C components of channels, each a scalar curve of lines, steps or cubic splines.
-
-    Attributes
-    ----------
-    timelines : (C,)
-        Timelines.
-    bases, strides : (C,)
-        Index of each component's first value, and the step from one value to the next.
-    slopes : (C,)
-        1 for lines, 0 for steps; empty for cubic curves.
-    values : (N,)
-        All values; the last key of each channel is repeated.
-    incoming, outgoing : (N,)
-        Slopes per second at the same indices; empty for lines and steps.
-    """
+    """C components of channels, each a scalar curve of lines, steps or cubic splines."""
 
     timelines: Ints
+    """(C,)."""
     bases: Ints
     strides: Ints
+    """(C,). Index of each component's first value, and the step from one value to the next."""
     slopes: Floats
+    """(C,). 1 for lines, 0 for steps; empty for cubic curves."""
     values: Floats
+    """(N,). All values; the last key of each channel is repeated."""
     incoming: Floats
     outgoing: Floats
+    """(N,). Slopes per second at the same indices; empty for lines and steps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Targets:
-    """Joints or shapes animated by one path, in the order of the samples.
-
-    Attributes
-    ----------
-    indices : (N,) int32
-        Joints, or blend shapes.
-    lines, cubics : slice
-        Components among the lines and steps, and among the cubic curves; lines come first.
-    """
+    """Joints or shapes animated by one path, in the order of the samples."""
 
     indices: Ints
+    """(N,) int32. Joints, or blend shapes."""
     lines: slice
     cubics: slice
+    """Components among the lines and steps, and among the cubic curves; lines come first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
