@@ -46,6 +46,7 @@ PARTS = {
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts", "media", "resources"},
+    "examples": {"batching", "models", "rig"},  # otherwise the names of ``viewer.__all__``
     "interrupts": set(),
     "resources": set(),
     "streams": set(),
@@ -98,6 +99,7 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "examples",
         "media/captioned_sheet.py",
         "media/cell_labels.py",
         "media/image.py",

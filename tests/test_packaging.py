@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from viewer.examples import EXAMPLES
 from viewer.manual import PAGES
 
 pytestmark = pytest.mark.slow
@@ -46,6 +47,7 @@ def test_wheel_ships_shaders_assets_and_manual_but_no_generators(wheel: Path) ->
     assert "viewer/assets/samples/fox.skin" in names
     assert "viewer/assets/samples/fox.png" in names
     assert {f"viewer/manual/{topic}.md" for topic in PAGES} <= set(names)
+    assert {f"viewer/examples/{name}.py" for name in EXAMPLES} <= set(names)
     assert not [name for name in names if "assets/" in name and name.endswith(".py")]
     assert not [name for name in names if name.startswith(("tests/", "shaders/", "assets/"))]
 

@@ -10,6 +10,7 @@ import viewer
 from viewer.app.features import ACTIONS, KEYS, PANELS, function_of, panel_module
 from viewer.batching.engines import ENGINES
 from viewer.commands import COMMANDS
+from viewer.examples import EXAMPLES
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.rendering.gpu.program import SHADING
@@ -34,8 +35,9 @@ def modules(folder: str) -> set[str]:
         ("commands", COMMANDS),
         ("export", EXPORTERS),
         ("batching/engines", ENGINES),
+        ("examples", EXAMPLES),
     ],
-    ids=["formats", "skinning", "commands", "export", "engines"],
+    ids=["formats", "skinning", "commands", "export", "engines", "examples"],
 )
 def test_registry_matches_its_folder(folder: str, registry: dict[str, object]) -> None:
     assert modules(folder) == set(registry)

@@ -1,4 +1,4 @@
-"""Locations of ``shaders/``, ``assets/`` and ``manual/``, in a checkout and in a wheel."""
+"""Locations of shaders, assets, manual and examples, in a checkout and in a wheel."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _PACKAGE = Path(__file__).resolve().parent
 def resource(kind: str, *parts: str) -> Path:
     """Return the path of a file or folder that ships with the viewer.
 
-    ``kind``: ``"shaders"``, ``"assets"`` or ``"manual"``. Raises ``ViewerError`` if it is missing
-    from the installation.
+    ``kind``: ``"shaders"``, ``"assets"``, ``"manual"`` or ``"examples"``. Raises ``ViewerError`` if
+    it is missing from the installation.
     """
     # The folders are inside the package in a wheel, and next to it in a checkout.
     for base in (_PACKAGE, _PACKAGE.parent):

@@ -64,7 +64,7 @@ USAGES = {
     "lint": "FILES ... [options]",
     "models": "[list | names | add NAME] [options]",
     "doctor": "[--bench]",
-    "help": "[TOPIC | COMMAND]",
+    "help": "[TOPIC | COMMAND | examples [NAME]]",
     "completion": "bash|zsh|tcsh|fish",
 }
 

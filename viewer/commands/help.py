@@ -1,4 +1,4 @@
-"""Pages of the manual in the terminal."""
+"""Pages of the manual, and example scripts, in the terminal."""
 
 from __future__ import annotations
 
@@ -7,26 +7,47 @@ import sys
 
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
+from viewer.errors import ViewerError
+from viewer.examples import EXAMPLES
 from viewer.manual import PAGES, page_text
+from viewer.resources import resource
+
+_EXAMPLES = "examples"  # the topic of the scripts
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.usage = "%(prog)s [TOPIC | COMMAND]"
+    parser.usage = "%(prog)s [TOPIC | COMMAND | examples [NAME]]"
     parser.add_argument(
         "topic",
         nargs="?",
-        choices=[*PAGES, *COMMANDS],
+        choices=[*PAGES, _EXAMPLES, *COMMANDS],
         metavar="TOPIC",
-        help="a page of the manual, or a command to list its options (default: list the topics)",
+        help="a page of the manual, a command to list its options, or examples to list scripts "
+        "for Python (default: list the topics)",
+    )
+    parser.add_argument(
+        "example",
+        nargs="?",
+        choices=[*EXAMPLES],
+        metavar="NAME",
+        help="a script to print, after examples",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the topics, a page, or a command's options."""
+    """Print the topics, a page, a command's options, or a script."""
     topic: str | None = arguments.topic
-    if topic is None:
+    if arguments.example is not None:
+        if topic != _EXAMPLES:
+            raise ViewerError(f"expected one topic, found {topic} and {arguments.example}")
+        script = resource("examples", f"{arguments.example}.py")
+        print(script.read_text("utf-8"), end="")
+    elif topic is None:
         print(_topics())
+    elif topic == _EXAMPLES:
+        print("viewer help examples NAME prints a script for Python:\n")
+        print("\n".join(_rows(EXAMPLES)))
     elif topic in COMMANDS:
         command_parser(topic).print_help()
     else:
@@ -36,18 +57,23 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _topics() -> str:
     """Return the list of topics."""
-    width = max(map(len, PAGES)) + 2
-    lines = [f"  {name:<{width}}{text}" for name, text in PAGES.items()]
+    scripts = {_EXAMPLES: f"{len(EXAMPLES)} scripts for Python"}
     return "\n".join(
         [
             "viewer help TOPIC shows a page of the manual:",
             "",
-            *lines,
+            *_rows(PAGES | scripts),
             "",
             "viewer help COMMAND lists the options of a command:",
             f"  {', '.join(COMMANDS)}",
         ]
     )
+
+
+def _rows(texts: dict[str, str]) -> list[str]:
+    """Return a line for each name with its text."""
+    width = max(map(len, texts)) + 2
+    return [f"  {name:<{width}}{text}" for name, text in texts.items()]
 
 
 def _print_page(text: str) -> None:
