@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import os
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -94,19 +95,30 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
 _NUMBERS = itertools.count()
 
 
-@pytest.fixture(autouse=True)
-def own_settings(tmp_path_factory, monkeypatch) -> None:
-    """Keep tests from reading or changing the user's settings or those of another test."""
-    folder = tmp_path_factory.getbasetemp() / f"settings{next(_NUMBERS)}"
-    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
-        monkeypatch.setenv(name, str(folder / name))
-    monkeypatch.setenv("VIEWER_CACHE", "off")
-
-
-@pytest.fixture(autouse=True)
-def no_disk_waits(monkeypatch) -> None:
+@pytest.fixture(scope="session", autouse=True)
+def no_disk_waits() -> Iterator[None]:
     """Leave written data in memory: waiting for the disk takes 5 to 40 ms per file."""
-    monkeypatch.setattr("os.fsync", lambda handle: None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("os.fsync", lambda handle: None)
+        patch.setenv("VIEWER_CACHE", "off")
+        yield
+
+
+@pytest.fixture(scope="session")
+def settings_folder(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The folder of the settings of all tests of a process."""
+    return str(tmp_path_factory.mktemp("settings"))
+
+
+@pytest.fixture(autouse=True)
+def own_settings(settings_folder: str) -> None:
+    """Keep tests from reading or changing the user's settings or those of another test.
+
+    Every one of 16,000 tests pays for this fixture, so it creates no folder and undoes nothing.
+    """
+    folder = f"{settings_folder}/{next(_NUMBERS)}"
+    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
+        os.environ[name] = f"{folder}/{name}"
 
 
 @pytest.fixture

@@ -10,41 +10,29 @@ sparse = pytest.importorskip("scipy.sparse")
 ROUNDING = 1e-12
 
 
-def cross(a, b):
-    """Return the cross product of two vectors, without the overhead of numpy's."""
-    (x, y, z), (u, v, w) = a, b
-    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
-
-
-def point_on_triangle(point, a, b, c):
-    """Return the closest point by trying the plane, the edges and the corners one by one."""
-    candidates = [a, b, c]
-    for start, end in ((a, b), (b, c), (c, a)):
-        edge = end - start
-        if edge @ edge > 0:
-            along = (point - start) @ edge / (edge @ edge)
-            if 0 < along < 1:
-                candidates.append(start + along * edge)
-    normal = cross(b - a, c - a)
-    if normal @ normal > 1e-30:
-        foot = point - normal * ((point - a) @ normal) / (normal @ normal)
-        sides = [
-            cross(end - start, foot - start) @ normal for start, end in ((a, b), (b, c), (c, a))
-        ]
-        if min(sides) > 0:
-            candidates.append(foot)
-    return min(candidates, key=lambda candidate: float(np.linalg.norm(candidate - point)))
-
-
 def brute_force(points, positions, triangles):
-    distances = [
-        min(
-            float(np.linalg.norm(point_on_triangle(point, *positions[triangle]) - point))
-            for triangle in triangles
-        )
-        for point in points
-    ]
-    return np.array(distances)
+    """Return the distance of each point to the nearest triangle, trying every pair.
+
+    The closest point of a triangle is a corner, the foot on an edge, or the foot on the plane.
+    """
+    points = points[:, None]  # (P, 1, 3) against (T, 3)
+    corners = [positions[triangles[:, k]] for k in range(3)]
+    edges = [(corners[k], corners[k - 2] - corners[k]) for k in range(3)]
+    best = np.min([np.linalg.norm(points - corner, axis=2) for corner in corners], axis=0)
+    for start, edge in edges:
+        squared = np.einsum("ta,ta->t", edge, edge)
+        along = ((points - start) * edge).sum(axis=2) / np.where(squared > 0, squared, 1.0)
+        gap = np.linalg.norm(points - start - along[..., None] * edge, axis=2)
+        best = np.where((squared > 0) & (along > 0) & (along < 1), np.minimum(best, gap), best)
+    normal = np.cross(edges[0][1], -edges[2][1])
+    squared = np.einsum("ta,ta->t", normal, normal)
+    is_flat = squared <= 1e-30
+    height = ((points - corners[0]) * normal).sum(axis=2) / np.where(is_flat, 1.0, squared)
+    foot = points - height[..., None] * normal
+    sides = [(np.cross(edge, foot - start) * normal).sum(axis=2) for start, edge in edges]
+    inside = (np.min(sides, axis=0) > 0) & ~is_flat
+    gap = np.linalg.norm(foot - points, axis=2)
+    return np.where(inside, np.minimum(best, gap), best).min(axis=1)
 
 
 def soup(rng, count, size):
