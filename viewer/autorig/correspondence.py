@@ -55,8 +55,8 @@ class MatchSettings:
     a coarse mesh are unreliable. Sheets thinner than this are matched on the side whose normal
     agrees."""
     flipped_normals: bool = False
-    """Also accept opposite normals. An island that is entirely inside out is reversed in any case.
-    Also accept opposite normals. An island that is entirely inside out is reversed in any case."""
+    """Also accept opposite normals. An island that is entirely inside out is reversed in any
+    case."""
 
     def __post_init__(self) -> None:
         for name in ("max_distance", "max_angle", "near_distance", "near_angle"):

@@ -19,10 +19,15 @@ _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with sp
 _POINT_LIMIT = 0.02  # noise relative to the median size: triangulated points are noisier
 _WINDOW = 0.5  # seconds over which noise is averaged: a jump is not jitter
 _SLOWEST = 24.0  # minimum frame rate: with less, people move too far between frames
+# A fourth difference is 0 for any cubic in time, so that a motion whose acceleration changes
+# steadily over five frames leaves almost nothing, while noise, which has no memory, stays. Lower
+# orders would still contain the acceleration of quick limbs, higher ones need longer runs.
 _STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 _FRACTION = 0.3  # quantile in a window, low enough to ignore steps and other events
-# The fourth difference of white noise has 70 times its variance. 30 % of the vectors of three
-# normal numbers are shorter than 1.193; their quadratic mean is sqrt(3), for a deviation of 1.
+# From a quantile of fourth differences to the quadratic mean of the noise. Independent errors of
+# deviation s add up in squares, so the fourth difference has the variance
+# (1 + 16 + 36 + 16 + 1) s^2 = 70 s^2 per coordinate. Its length divided by sqrt(70) s has the chi
+# distribution of three coordinates: 30 % are below 1.1932, and the quadratic mean is sqrt(3).
 _RMS = np.sqrt(3.0) / (np.sqrt(70.0) * 1.1932)
 _TOGETHER = 2000  # frames per batch
 
@@ -121,6 +126,8 @@ def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
             count = end - start - 4
             fourth = sum(c * part[k : k + count] for k, c in enumerate(_STENCIL.tolist()))
             lengths = np.linalg.norm(np.asarray(fourth), axis=-1)
+            # A step or a jump makes up to five large differences per window. A low quantile of the
+            # window does not see them; the mean would.
             windows = np.lib.stride_tricks.sliding_window_view(lengths, width, axis=0)
             middle = start + 2 + width // 2
             place = round(_FRACTION * (width - 1))

@@ -47,8 +47,8 @@ class Skeleton:
     dof_limits: Floats
     """(D, 2). Smallest and largest value; -inf and inf if unlimited."""
     boxes: Floats | None = None
-    """(J, 2, 3) or None. Lowest and highest corner of the box drawn for each joint, in joint space.
-    (J, 2, 3) or None. Lowest and highest corner of the box drawn for each joint, in joint space."""
+    """(J, 2, 3) or None. Lowest and highest corner of the box drawn for each joint, in joint
+    space."""
     boxes_from_bones: bool = False
     """Whether a reader made the boxes, each from its joint to the next ones or to the far end of
     the last bone. They are parallel to the joint's axes, so they do not fit oblique bones:
@@ -61,8 +61,8 @@ class Skeleton:
     humanoid: Humanoid | None = None
     """Joints with the standard names of human bones, if the file states them."""
     constraints: tuple[Constraint, ...] = ()
-    """Constraints of joints that follow others, in the order of evaluation; at most one per joint.
-    Constraints of joints that follow others, in the order of evaluation; at most one per joint."""
+    """Constraints of joints that follow others, in the order of evaluation; at most one per
+    joint."""
     springs: Springs | None = None
     """Joints that are simulated as springs while a motion plays."""
     posing: JointPosing | None = None

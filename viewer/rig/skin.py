@@ -28,8 +28,8 @@ class Skin:
     """(V + 1,) int32. Vertex v has the influences from ``starts[v]`` up to, but not including,
     ``starts[v + 1]``."""
     joints: Ints
-    """(N,) int32. Joint of each influence; if a vertex lists a joint twice, the weights are summed.
-    (N,) int32. Joint of each influence; if a vertex lists a joint twice, the weights are summed."""
+    """(N,) int32. Joint of each influence; if a vertex lists a joint twice, the weights are
+    summed."""
     weights: Floats
     """(N,). Weights as stored: not sorted, not normalised, possibly 0."""
     inverse_bind: Floats

@@ -101,8 +101,8 @@ class Alignment:
     similarity: Similarity
     """Template to target, in the target's unit; never a reflection."""
     error: float
-    """Trimmed RMS distance (the best 90 %) of the target from the template, over the target's size.
-    Trimmed RMS distance (the best 90 %) of the target from the template, over the target's size."""
+    """Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
+    size."""
     away: float
     """The same distance of the template from the target; large if the target is only a part of a
     figure."""

@@ -82,8 +82,8 @@ class _ObjParts:
     uvs: Floats
     """(U, 2). Texture coordinates as listed, v = 0 at the bottom row."""
     colors: Floats | None
-    """(V, 4) or None. Linear colours and opacity of the vertices; white for those without a colour.
-    (V, 4) or None. Linear colours and opacity of the vertices; white for those without a colour."""
+    """(V, 4) or None. Linear colours and opacity of the vertices; white for those without a
+    colour."""
     counts: NDArray[np.integer]
     """(F,). Corners of each face."""
     corners: NDArray[np.integer]

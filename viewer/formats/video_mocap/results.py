@@ -124,8 +124,8 @@ class Cameras:
     """(N, 3, 3) or (1, 3, 3). K, pixels."""
     rotations: Floats
     translations: Floats
-    """(N, 3, 3), (N, 3), or (1, 3, 3), (1, 3). R and T; a single row if the camera does not move.
-    (N, 3, 3), (N, 3), or (1, 3, 3), (1, 3). R and T; a single row if the camera does not move."""
+    """(N, 3, 3), (N, 3), or (1, 3, 3), (1, 3). R and T; a single row if the camera does not
+    move."""
     size: tuple[int, int] | None = None
     """Width and height of the video, pixels."""
 
@@ -147,8 +147,8 @@ class Results:
     model: str
     """The member of the SMPL family, or ``"MHR"``; empty if there are no bodies."""
     people: Mapping[str, Mapping[int, Track]]
-    """``"world"`` and ``"camera"``, or only the space that the file has; the first is the default.
-    ``"world"`` and ``"camera"``, or only the space that the file has; the first is the default."""
+    """``"world"`` and ``"camera"``, or only the space that the file has; the first is the
+    default."""
     ups: Mapping[str, str]
     """The axis that points up; empty if it is unknown."""
     cameras: Mapping[str, Cameras] = field(default_factory=dict)

@@ -194,8 +194,8 @@ class _BoneLinks:
     """(N, 3) int32. Joint; its child, -1 for an end; the joint's axis that is most perpendicular to
     the bone."""
     ends: Floats
-    """(N, 4). For an end, its direction in joint space and its length in figure units; otherwise 0.
-    (N, 4). For an end, its direction in joint space and its length in figure units; otherwise 0."""
+    """(N, 4). For an end, its direction in joint space and its length in figure units; otherwise
+    0."""
     longest: Floats
     """(J,). Length of the longest bone at each joint, figure units."""
     axis_lengths: Floats

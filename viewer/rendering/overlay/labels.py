@@ -62,8 +62,8 @@ class LabelLayout:
     ends: Floats
     """(M, 2). Point on each label that is nearest to the labelled point, pixels."""
     has_line: Bools
-    """(M,) bool. Whether the label needs a leader line because there was no room next to its point.
-    (M,) bool. Whether the label needs a leader line because there was no room next to its point."""
+    """(M,) bool. Whether the label needs a leader line because there was no room next to its
+    point."""
 
 
 def lay_out(

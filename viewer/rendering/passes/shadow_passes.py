@@ -162,8 +162,8 @@ class ContactShadows:
     """A field of contact shadows."""
 
     texture: moderngl.Texture
-    """Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1.
-    Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1."""
+    """Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to
+    1."""
     low: Floats
     high: Floats
     """(2,). Opposite corners of the field, along the ground's axes."""

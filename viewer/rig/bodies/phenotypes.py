@@ -130,8 +130,8 @@ class TargetSpace:
     targets: TargetRows
     """Targets of the phenotypes, then of the facial actions, then pairs for the local changes."""
     masks: Bools
-    """(R, N) bool. Variations of the targets of the phenotypes, from ``phenotypes.target_masks``.
-    (R, N) bool. Variations of the targets of the phenotypes, from ``phenotypes.target_masks``."""
+    """(R, N) bool. Variations of the targets of the phenotypes, from
+    ``phenotypes.target_masks``."""
     n_actions: int
     """Number of facial actions."""
     vertices: Ints

@@ -69,8 +69,8 @@ class CameraMount:
     joint: int
     """Index of the joint; -1 if the camera moves in the space of the figure."""
     matrix: Floats
-    """(4, 4). Camera to joint space at rest; here the camera looks along -z with y up, as in glTF.
-    (4, 4). Camera to joint space at rest; here the camera looks along -z with y up, as in glTF."""
+    """(4, 4). Camera to joint space at rest; here the camera looks along -z with y up, as in
+    glTF."""
     path: CameraPath | None = None
     """The nodes that move the camera; None if they are still."""
 

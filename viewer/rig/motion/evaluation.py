@@ -41,8 +41,8 @@ class Frames:
     times: Floats
     """(F,). Seconds."""
     present: Bools
-    """(F,) bool. Whether the actor is present; otherwise the row is undefined in the other arrays.
-    (F,) bool. Whether the actor is present; otherwise the row is undefined in the other arrays."""
+    """(F,) bool. Whether the actor is present; otherwise the row is undefined in the other
+    arrays."""
     rotations: Floats
     """(F, J, 4). Each joint's complete rotation relative to its parent: unit quaternions (x, y, z,
     w)."""
@@ -52,8 +52,8 @@ class Frames:
     """(F, J, 3) or (1, J, 3). Local scale factors of the joints; a single row applies to all
     frames."""
     shape_weights: Floats
-    """(F, S) or (1, S). Weights of the figure's blend shapes; a single row applies to all frames.
-    (F, S) or (1, S). Weights of the figure's blend shapes; a single row applies to all frames."""
+    """(F, S) or (1, S). Weights of the figure's blend shapes; a single row applies to all
+    frames."""
     figure_translations: Floats
     figure_scales: Floats
     """(F, 3), (F,). Placement of the whole figure."""

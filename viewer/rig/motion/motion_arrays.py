@@ -32,8 +32,8 @@ class MotionArrays:
     frames: Ints
     """(F,) int32. Numbers of the frames in the video or the files, if they are numbered there."""
     present: Bools
-    """(F,) bool. Whether the person is present; the other arrays are held or undefined elsewhere.
-    (F,) bool. Whether the person is present; the other arrays are held or undefined elsewhere."""
+    """(F,) bool. Whether the person is present; the other arrays are held or undefined
+    elsewhere."""
     rotations: Floats
     """(F, J, 4). Quaternions (x, y, z, w) relative to the parent joint."""
     translations: Floats

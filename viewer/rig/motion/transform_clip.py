@@ -86,8 +86,8 @@ class TransformClip:
     name: str
     """Display name."""
     channels: tuple[TransformChannel, ...]
-    """At most one per joint and path; properties without a channel have their values in the pose.
-    At most one per joint and path; properties without a channel have their values in the pose."""
+    """At most one per joint and path; properties without a channel have their values in the
+    pose."""
     start: float
     end: float
     """Playback range in seconds."""

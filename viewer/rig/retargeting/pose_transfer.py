@@ -51,8 +51,8 @@ class JointRotations:
     names: tuple[str, ...]
     """Names of the joints."""
     relative: Floats
-    """(J, 4). Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
-    (J, 4). Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z, w)."""
+    """(J, 4). Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z,
+    w)."""
     shifts: Floats
     """(J, 3). Translations in addition to the DOFs, in the parent joint's frame."""
     up: str
@@ -62,8 +62,8 @@ class JointRotations:
     rotations: Floats | None = None
     """(J, 4) or None. Base rotations, before the DOFs, as in ``Pose``; None for the rest pose's."""
     meanings: tuple[str, ...] = ()
-    """For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
-    For a figure whose file states human bones, their names in the SMPL family; otherwise empty."""
+    """For a figure whose file states human bones, their names in the SMPL family; otherwise
+    empty."""
     left: Floats = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
     """(3,). The figure's left, a horizontal direction; measured for figures with meanings."""
     scales: Floats | None = None

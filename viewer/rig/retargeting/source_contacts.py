@@ -57,8 +57,8 @@ class Contact:
     stop: int
     """Half-open range of rows."""
     on_toe: Bools
-    """(N,). Rows of the range in which the ball is on the ground; in all others, only the heel is.
-    (N,). Rows of the range in which the ball is on the ground; in all others, only the heel is."""
+    """(N,). Rows of the range in which the ball is on the ground; in all others, only the heel
+    is."""
     is_flat: Bools
     """(N,). Rows of the range in which both are on the ground."""
     hold: Floats

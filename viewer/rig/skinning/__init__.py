@@ -71,8 +71,8 @@ class Skinning:
     """Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS. None
     for the fractions that the file states for each vertex; see ``Skin.dqs_fractions``."""
     max_influences: int = 0
-    """Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored.
-    Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored."""
+    """Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as
+    stored."""
     normalize: bool = False
     """Scale each vertex's weights to a sum of 1."""
     correctives: bool = True
