@@ -21,7 +21,6 @@ def runs(monkeypatch):
         return run(parents, local, root)
 
     monkeypatch.setattr("viewer.rig.kinematics.forward_kinematics", count)
-    monkeypatch.setattr("viewer.rig.motion.instances.forward_kinematics", count)
     return counted
 
 

@@ -37,7 +37,6 @@ def runs(monkeypatch):
         return run(*args)
 
     monkeypatch.setattr("viewer.rig.kinematics.forward_kinematics", count)
-    monkeypatch.setattr("viewer.rig.motion.instances.forward_kinematics", count)
     return counted
 
 

@@ -23,7 +23,7 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.hierarchy import depth_first
-from viewer.rig.kinematics import forward_kinematics, world_matrices
+from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.mesh import without_seams
 from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.pose import Pose, rest_pose
@@ -347,12 +347,9 @@ def _unscaled_offsets(
 
     With the product D of the rotations down to the parent: D^-1 (p_j - p_parent).
     """
-    local = np.zeros((2, skeleton.n_joints, 4, 4))
-    local[..., 3, 3] = 1.0
-    local[0, :, :3, :3], local[1, :, :3, :3] = rotations * pose.scales[:, None], rotations
-    local[0, :, :3, 3] = translations
-    places = forward_kinematics(skeleton.parents, local[0])[:, :3, 3]
-    turns = forward_kinematics(skeleton.parents, local[1])[:, :3, :3]
+    scaled = rotations * pose.scales[:, None]
+    places = joint_worlds(skeleton.parents, scaled, translations)[:, :3, 3]
+    turns = joint_worlds(skeleton.parents, rotations, np.zeros(3))[:, :3, :3]
     inner = skeleton.parents >= 0
     offsets = translations.copy()
     above = skeleton.parents[inner]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.pose import Pose, PosedSkeleton, local_matrices
+from viewer.rig.geometry.transform import affine_matrices
+from viewer.rig.pose import Pose, PosedSkeleton, joint_rotations, local_transforms
 from viewer.rig.skeleton import Skeleton
 
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
@@ -53,6 +54,21 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     return world if root is None else root @ world
 
 
+def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:
+    """Return the joint-to-figure matrices of one or many poses: (J, 4, 4) or (F, J, 4, 4).
+
+    ``linear`` (..., J, 3, 3): rotation and scale relative to the parent. ``offsets`` (..., J, 3):
+    place relative to the parent. Both are broadcast.
+    """
+    shape = np.broadcast_shapes(linear.shape[:-2], offsets.shape[:-1])
+    if len(shape) == 1:
+        return forward_kinematics(parents, affine_matrices(linear, offsets))
+    # With the joint axis first, a joint's matrices of all poses lie together.
+    linear = np.swapaxes(np.broadcast_to(linear, (*shape, 3, 3)), 0, 1)
+    offsets = np.swapaxes(np.broadcast_to(offsets, (*shape, 3)), 0, 1)
+    return np.swapaxes(forward_kinematics(parents, affine_matrices(linear, offsets)), 0, 1)
+
+
 def _passes(parents: Ints) -> Iterator[tuple[Indices, Indices]]:
     """Yield the ancestors and joints whose matrices are multiplied in each pass."""
     ancestors = parents.astype(np.intp)
@@ -74,7 +90,9 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
     ``pose``: DOFs in lengths and radians. Returns (J, 4, 4), joint-to-figure matrices.
     """
-    return forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
+    turns = joint_rotations(skeleton, pose)
+    parts = local_transforms(skeleton, turns, pose.dofs, pose.translations, pose.scales)
+    return joint_worlds(skeleton.parents, *parts)
 
 
 def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:

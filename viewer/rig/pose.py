@@ -12,6 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.memo import Memo, NumberKey
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 
@@ -99,10 +100,7 @@ def pose_of(key: PoseKey) -> Pose:
 
 def placement_matrix(pose: Pose) -> Floats:
     """Return T(figure_translation) S(figure_scale): (4, 4), applied after skinning."""
-    matrix = np.eye(4)
-    matrix[:3, :3] *= pose.figure_scale
-    matrix[:3, 3] = pose.figure_translation
-    return matrix
+    return affine_matrices(pose.figure_scale * np.eye(3), pose.figure_translation)
 
 
 def rest_pose(skeleton: Skeleton) -> Pose:
@@ -135,21 +133,39 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
     ``pose``: DOFs in lengths and radians. Returns (J, 4, 4), joint-to-parent matrices.
     """
-    local = np.zeros((skeleton.n_joints, 4, 4))
-    local[:, 3, 3] = 1.0
-    local[:, :3, 3] = skeleton.rest_translations + pose.translations
+    turns = joint_rotations(skeleton, pose)
+    return affine_matrices(
+        *local_transforms(skeleton, turns, pose.dofs, pose.translations, pose.scales)
+    )
+
+
+def local_transforms(
+    skeleton: Skeleton, rotations: Floats, dofs: Floats, translations: Floats, scales: Floats
+) -> tuple[Floats, Floats]:
+    """Return each joint's linear part (..., J, 3, 3) and place (..., J, 3), relative to the parent.
+
+    ``rotations`` (..., J, 3, 3) are those of ``joint_rotations``, the other arrays those of poses.
+    """
+    places = skeleton.rest_translations + joint_offsets(skeleton, dofs, translations)
+    if skeleton.constraints:
+        first = (np.moveaxis(part, -2, 0) for part in (places, scales))
+        turned = constrained_matrices(skeleton, np.moveaxis(rotations, -3, 0), *first)
+        rotations = np.moveaxis(turned, 0, -3)
+    return rotations * scales[..., None, :], places
+
+
+def joint_offsets(skeleton: Skeleton, dofs: Floats, translations: Floats) -> Floats:
+    """Return the joints' offsets from their rest translations, DOFs included: (..., J, 3)."""
+    offsets = translations.copy()
     moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
     if len(moves):
         # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
         entries = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
-        np.add.at(local[:, :3, 3], entries, pose.dofs[moves])
+        first = np.moveaxis(offsets, (-2, -1), (0, 1))
+        np.add.at(first, entries, np.moveaxis(dofs[..., moves], -1, 0))
     if skeleton.posing is not None:
-        local[:, :3, 3] += skeleton.posing.translations(pose.dofs)
-    rotations = constrained_matrices(
-        skeleton, joint_rotations(skeleton, pose), local[:, :3, 3], pose.scales
-    )
-    local[:, :3, :3] = rotations * pose.scales[:, None, :]
-    return local
+        offsets += skeleton.posing.translations(dofs)
+    return offsets
 
 
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:

@@ -19,6 +19,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
@@ -142,9 +143,7 @@ def changing(frames: Frames, still: Floats) -> Rows:
 
 def anchored(palette: Floats, scales: Floats) -> Floats:
     """Return skinning matrices (F, J, 4, 4), followed by the matrix of the whole figure."""
-    whole = np.zeros((len(palette), 1, 4, 4))
-    whole[:, 0, [0, 1, 2], [0, 1, 2]] = scales[:, None]
-    whole[..., 3, 3] = 1.0
+    whole = affine_matrices(scales[:, None, None, None] * np.eye(3), np.zeros(3))
     return np.concatenate([palette, whole], axis=1)
 
 

@@ -22,7 +22,7 @@ from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.kinematics import forward_kinematics, world_matrices
+from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 from viewer.rig.skeleton import Skeleton
@@ -172,8 +172,7 @@ def _positions(
     parents = figure.require_skeleton().parents
     inner = (parents >= 0)[:, None]
     places = _places(figure, frames, weights, scale) @ space.world.T * space.factor
-    local = np.ascontiguousarray(np.swapaxes(rotations, 0, 1))
-    world = np.swapaxes(forward_kinematics(parents, local), 0, 1)
+    world = joint_worlds(parents, rotations, np.zeros(3))[..., :3, :3]
     from_parent = places - np.where(inner, places[:, parents], 0.0)
     within = np.einsum("njba,njb->nja", world[:, parents], from_parent)
     return np.where(inner, within, from_parent)
@@ -182,7 +181,8 @@ def _positions(
 def _parent_axes(skeleton: Skeleton, space: Space) -> Floats:
     """Return the rotation from the axes of each joint's parent at rest to those of the file."""
     parents = skeleton.parents
-    above = forward_kinematics(parents, quaternion_to_matrix(skeleton.rest_rotations))[parents]
+    rest = quaternion_to_matrix(skeleton.rest_rotations)
+    above = joint_worlds(parents, rest, np.zeros(3))[parents, :3, :3]
     above[parents < 0] = np.eye(3)
     return space.rest @ above
 

@@ -28,6 +28,7 @@ from viewer.export._losses.skinned import (
 from viewer.export.bvh.body import Space, rest_matrices
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
@@ -88,10 +89,10 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
             places = joint_positions(motion.figure, read)[:, order] @ space.world / space.factor
             return bare_poses(places, frames_between(frames, rows))
         found = world_frames(motion.figure, read)[:, order]
-        world = np.zeros(found.shape)
-        world[..., 3, 3] = 1.0
-        world[..., :3, 3] = found[..., :3, 3] @ space.world / space.factor
-        world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
+        world = affine_matrices(
+            space.world.T @ found[..., :3, :3] @ own,
+            found[..., :3, 3] @ space.world / space.factor,
+        )
         places = world[..., :3, 3].copy()
         shifts = frames_between(frames, rows).figure_translations
         world[..., :3, 3] -= shifts[:, None]

@@ -23,7 +23,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import joint_worlds
 from viewer.rig.skin import Skin, influence_counts, skin_from_entries
 
 Keys: TypeAlias = dict[tuple[int, str], Floats]
@@ -164,12 +164,9 @@ def _world(nodes: list[dict[str, Any]], parents: Ints, keys: Keys, rows: Rows) -
         for (node, what), moved in keys.items():
             if what == path:
                 parts[path][node] = moved[rows]
-    local = np.zeros((len(nodes), len(rows), 4, 4))
-    local[..., 3, 3] = 1.0
     rotations = parts["rotation"] / np.linalg.norm(parts["rotation"], axis=-1, keepdims=True)
-    local[..., :3, :3] = quaternion_to_matrix(rotations) * parts["scale"][..., None, :]
-    local[..., :3, 3] = parts["translation"]
-    return np.swapaxes(forward_kinematics(parents, local), 0, 1)
+    linear = quaternion_to_matrix(rotations) * parts["scale"][..., None, :]
+    return joint_worlds(parents, np.swapaxes(linear, 0, 1), np.swapaxes(parts["translation"], 0, 1))
 
 
 def _body(

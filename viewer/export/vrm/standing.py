@@ -19,7 +19,7 @@ from viewer.rig.geometry.rotation import (
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.humanoid import Humanoid
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.pose import Pose, joint_rotations, local_matrices, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
@@ -46,7 +46,7 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
         figure, shapes = shaped(figure, pose.shape_weights), None
     skeleton = figure.require_skeleton()
     local = local_matrices(skeleton, pose)
-    joints = forward_kinematics(skeleton.parents, local)[:, :3, 3]
+    joints = world_matrices(skeleton, pose)[:, :3, 3]
     turn = _axes(figure, joints, bones)
     scale = METRES.get(figure.unit, 1.0)
     matrix = np.eye(4)
@@ -120,8 +120,7 @@ def _transformed(
 def vrm_axes(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Floats:
     """Return the rotation from the axes of a figure in its rest pose to those of VRM: (3, 3)."""
     skeleton = figure.require_skeleton()
-    world = forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
-    return _axes(figure, world[:, :3, 3], bones)
+    return _axes(figure, world_matrices(skeleton, pose)[:, :3, 3], bones)
 
 
 def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
@@ -200,8 +199,5 @@ def unit_rotation(matrix: Floats) -> Floats:
 
 
 def _worlds(skeleton: Skeleton, rotations: Floats) -> Floats:
-    local = np.zeros((skeleton.n_joints, 4, 4))
-    local[:, :3, :3] = quaternion_to_matrix(rotations) * skeleton.rest_scales[:, None, :]
-    local[:, :3, 3] = skeleton.rest_translations
-    local[:, 3, 3] = 1.0
-    return forward_kinematics(skeleton.parents, local)
+    linear = quaternion_to_matrix(rotations) * skeleton.rest_scales[:, None, :]
+    return joint_worlds(skeleton.parents, linear, skeleton.rest_translations)

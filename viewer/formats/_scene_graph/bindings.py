@@ -17,6 +17,7 @@ from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeSkin
 from viewer.formats._scene_graph.joints import Joints
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.transform import affine_matrices
 
 # float32 rounding of the entries of a product of two matrices, relative to the largest
 _SAME = 1e-6
@@ -214,11 +215,8 @@ def _is_identity(matrix: Floats) -> bool:
 
 def _inverse(matrices: Floats) -> Floats:
     """Return the inverses of affine matrices, with exact last rows: (..., 4, 4)."""
-    inverses = np.zeros_like(matrices)
-    inverses[..., 3, 3] = 1.0
-    inverses[..., :3, :3] = np.linalg.inv(matrices[..., :3, :3])
-    inverses[..., :3, 3:] = -inverses[..., :3, :3] @ matrices[..., :3, 3:]
-    return inverses
+    linear: Floats = np.linalg.inv(matrices[..., :3, :3])
+    return affine_matrices(linear, (-linear @ matrices[..., :3, 3:])[..., 0])
 
 
 def _is_regular(matrices: Floats) -> Bools:

@@ -13,7 +13,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.humanoid import Humanoid
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import joint_worlds
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.springs.springs import Colliders, Springs
 
@@ -115,12 +115,10 @@ def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
 
 def rest_worlds(joints: Joints) -> Floats:
     """Return the joint-to-figure matrices of the rest pose: (J, 4, 4)."""
-    local = np.zeros((len(joints.nodes), 4, 4))
-    local[:, 3, 3] = 1.0
-    local[:, :3, 3] = joints.translations
     rotations = quaternion_to_matrix(np.array(joints.rotations))
-    local[:, :3, :3] = rotations * np.array(joints.scales)[:, None, :]
-    return forward_kinematics(np.array(joints.parents, dtype=np.int32), local)
+    linear = rotations * np.array(joints.scales)[:, None, :]
+    parents = np.array(joints.parents, dtype=np.int32)
+    return joint_worlds(parents, linear, np.array(joints.translations))
 
 
 def skeleton_of(

@@ -9,9 +9,9 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraPath, CameraView, extrinsics, view_at
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.transform_clip import Animation, TransformClip
-from viewer.rig.pose import local_matrices, rest_pose
+from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.transform_keys.sampling import apply_transforms, sample_transforms
@@ -67,5 +67,4 @@ def _moved(path: CameraPath, actor: Actor, time: float) -> Floats:
     if animation is not None:
         samples = sample_transforms(animation.clip(), np.array([time - actor.offset]))
         apply_transforms(samples, 0, path.nodes, pose)
-    worlds: Floats = forward_kinematics(path.nodes.parents, local_matrices(path.nodes, pose))
-    return worlds[-1]
+    return np.asarray(world_matrices(path.nodes, pose)[-1])

@@ -30,6 +30,19 @@ def rotation_transform(axis: int, angle: float) -> Floats:
     return matrix
 
 
+def affine_matrices(linear: Floats, offsets: Floats) -> Floats:
+    """Return [A t; 0 1] for linear maps A (..., 3, 3) and translations t (..., 3): (..., 4, 4).
+
+    >>> affine_matrices(2.0 * np.eye(3), np.ones((5, 3))).shape
+    (5, 4, 4)
+    """
+    matrices = np.zeros((*np.broadcast_shapes(linear.shape[:-2], offsets.shape[:-1]), 4, 4))
+    matrices[..., :3, :3] = linear
+    matrices[..., :3, 3] = offsets
+    matrices[..., 3, 3] = 1.0
+    return matrices
+
+
 def apply_transform(matrix: Floats, points: Floats) -> Floats:
     """Transform points: p' = M [p 1].
 

@@ -17,7 +17,7 @@ from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.clip import Clip, evaluate_all, sample
 from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
 from viewer.rig.motion.timing import DEFAULT_RATE
@@ -298,18 +298,12 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     translation.
     """
     skeleton = figure.require_skeleton()
-    frames, count = _constrained(figure, frames), frames.n_frames
-    # The joint axis comes first, as forward_kinematics multiplies a joint's matrices of all frames
-    # together.
-    local = np.zeros((skeleton.n_joints, count, 4, 4))
-    local[..., 3, 3] = 1.0
+    frames = _constrained(figure, frames)
     linear = quaternion_to_matrix(frames.rotations)
     if (frames.scales != 1.0).any():
         linear *= frames.scales[:, :, None, :]
-    local[..., :3, :3] = np.swapaxes(linear, 0, 1)
     offsets = rest_translations_of(figure, frames.shape_weights) + frames.translations
-    local[..., :3, 3] = np.swapaxes(offsets, 0, 1)
-    world = np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
+    world = joint_worlds(skeleton.parents, linear, offsets)
     if (frames.figure_scales != 1.0).any():
         world[..., :3, :] *= frames.figure_scales[:, None, None, None]
     world[..., :3, 3] += frames.figure_translations[:, None]

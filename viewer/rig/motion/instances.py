@@ -10,12 +10,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
+from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.kinematics import (
-    forward_kinematics,
     is_posed,
+    joint_worlds,
     posed_skeleton,
     skinning_matrices,
 )
@@ -23,7 +23,7 @@ from viewer.rig.motion.clip import Clip, evaluate_all
 from viewer.rig.motion.evaluation import place_pose, pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.pose import Pose, PosedSkeleton, dof_rotations
+from viewer.rig.pose import Pose, PosedSkeleton, dof_rotations, local_transforms
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -134,23 +134,11 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
     poses, if already computed. Returns (A, J, 4, 4), joint-to-figure matrices.
     """
     rotations = local_rotations(skeleton, poses) if rotations is None else rotations
-    # The joint axis comes first, as forward_kinematics multiplies whole rows of matrices per joint.
-    local = np.zeros((skeleton.n_joints, len(poses), 4, 4))
-    local[..., 3, 3] = 1.0
-    scales = np.swapaxes(np.stack([pose.scales for pose in poses]), 0, 1)
-    shifts = np.stack([pose.translations for pose in poses])
-    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
-    if len(moves):
-        dofs = np.stack([pose.dofs[moves] for pose in poses])
-        every = np.arange(len(poses))[:, None]
-        np.add.at(shifts, (every, skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), dofs)
-    if skeleton.posing is not None:
-        shifts += skeleton.posing.translations(np.stack([pose.dofs for pose in poses]))
-    local[..., :3, 3] = np.swapaxes(skeleton.rest_translations + shifts, 0, 1)
-    turns = np.swapaxes(rotations, 0, 1)
-    turns = constrained_matrices(skeleton, turns, local[..., :3, 3], scales)
-    local[..., :3, :3] = turns * scales[:, :, None, :]
-    return np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
+    parts = (
+        np.stack([getattr(pose, name) for pose in poses])
+        for name in ("dofs", "translations", "scales")
+    )
+    return joint_worlds(skeleton.parents, *local_transforms(skeleton, rotations, *parts))
 
 
 def posed_worlds(
@@ -186,8 +174,6 @@ def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
 
 def placements(poses: Sequence[Pose]) -> Floats:
     """Return T(figure_translation) S(figure_scale) of poses: (A, 4, 4), applied after skinning."""
-    matrices = np.zeros((len(poses), 4, 4))
-    matrices[:, [0, 1, 2], [0, 1, 2]] = np.array([pose.figure_scale for pose in poses])[:, None]
-    matrices[:, :3, 3] = [pose.figure_translation for pose in poses]
-    matrices[:, 3, 3] = 1.0
-    return matrices
+    scales = np.array([pose.figure_scale for pose in poses])
+    places = np.array([pose.figure_translation for pose in poses])
+    return affine_matrices(scales[:, None, None] * np.eye(3), places)

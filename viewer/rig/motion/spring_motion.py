@@ -10,6 +10,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.motion.animation_choice import still_pose
 from viewer.rig.motion.clip import Clip
@@ -185,12 +186,12 @@ def _posed(figure: Figure, clip: JointMotion, times: Floats, base: Pose) -> Pose
     """Return the joints of a motion without springs."""
     frames = frames_of(figure, clip, times, base, interpolate=True)
     world, count = world_frames(figure, frames), frames.n_frames
-    local = np.zeros_like(world)
-    local[..., 3, 3] = 1.0
-    local[..., :3, :3] = quaternion_to_matrix(frames.rotations)
-    local[..., :3, 3] = rest_translations_of(figure, frames.shape_weights) + frames.translations
-    places = np.tile(np.eye(4), (count, 1, 1))
-    places[:, :3, :3] *= frames.figure_scales[:, None, None]
-    places[:, :3, 3] = frames.figure_translations
+    local = affine_matrices(
+        quaternion_to_matrix(frames.rotations),
+        rest_translations_of(figure, frames.shape_weights) + frames.translations,
+    )
+    places = affine_matrices(
+        frames.figure_scales[:, None, None] * np.eye(3), frames.figure_translations
+    )
     scales = np.broadcast_to(frames.scales, (count, *frames.scales.shape[1:]))
     return PosedJoints(world, local, scales, places)

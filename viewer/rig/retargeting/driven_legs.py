@@ -15,7 +15,7 @@ from viewer.rig.cleanup.leg_ik import Leg, reach
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.inspection.soles import Soles, extent, soles_of_feet
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
@@ -304,16 +304,12 @@ def _chain_worlds(
     the clip's scales precede these.
     """
     joints = chains.joints
-    local = np.zeros((len(joints), clip.n_rows, 4, 4))
-    local[..., 3, 3] = 1.0
     factors = scales[None, joints] if clip.scales is None else clip.scales[:, joints]
     linear = quaternion_to_matrix(clip.rotations[:, joints]) * factors[:, :, None, :]
-    local[..., :3, :3] = np.swapaxes(linear, 0, 1)
     offsets = translations[joints]
     if clip.translations is not None:
         offsets = offsets + clip.translations[:, joints]
-    local[..., :3, 3] = np.swapaxes(np.broadcast_to(offsets, (clip.n_rows, len(joints), 3)), 0, 1)
-    world = np.swapaxes(forward_kinematics(chains.parents, local), 0, 1).copy()
+    world = joint_worlds(chains.parents, linear, offsets)
     if clip.figure_scales is not None:
         world[..., :3, :] *= clip.figure_scales[:, None, None, None]
     if clip.figure_translations is not None:

@@ -14,7 +14,7 @@ from viewer.rig.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rig.kinematics import forward_kinematics, world_matrices
+from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.pose import rest_pose
 from viewer.rig.retargeting.joint_matches import Matches
@@ -71,7 +71,8 @@ def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
     points = world_matrices(skeleton, pose)[:, :3, 3]
     local = quaternion_to_matrix(skeleton.rest_rotations)
     axis = np.eye(3)["xyz".index(up)]
-    return RestPose(points @ to_common.T, forward_kinematics(skeleton.parents, local), axis)
+    worlds = joint_worlds(skeleton.parents, local, np.zeros(3))[:, :3, :3]
+    return RestPose(points @ to_common.T, worlds, axis)
 
 
 def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:

@@ -26,7 +26,7 @@ from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
-from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_map import JointMap
@@ -355,12 +355,8 @@ def _source_places(job: _Job, worlds: Floats) -> Floats:
 
 def _scaled_places(job: _Job, offsets: Floats, scales: Floats) -> Floats:
     """Return the positions of joints below scaled ones, from offsets to their parents."""
-    local = np.zeros((job.source.n_joints, len(offsets), 4, 4))
     linear = quaternion_to_matrix(job.clip.rotations) * scales[:, :, None, :]
-    local[..., :3, :3] = np.swapaxes(linear, 0, 1)
-    local[..., :3, 3] = np.swapaxes(offsets, 0, 1)
-    local[..., 3, 3] = 1.0
-    return np.swapaxes(forward_kinematics(job.source.parents, local)[..., :3, 3], 0, 1).copy()
+    return joint_worlds(job.source.parents, linear, offsets)[..., :3, 3].copy()
 
 
 def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:
@@ -400,12 +396,10 @@ def _dropped_translations(job: _Job) -> list[Diagnostic]:
 def _ground_offset(job: _Job, scale: float) -> Floats:
     """Return ``ground_offset`` of the two skeletons, both in the source's rest pose."""
     still = matrix_to_quaternion(job.rests[0].rotations)[None]
-    local = np.zeros((job.target.n_joints, 4, 4))
     rotations = quaternion_to_matrix(_target_rotations(job, still)[0])
-    local[:, :3, :3] = rotations * job.target.rest_scales[:, None, :]
-    local[:, :3, 3] = job.target.rest_translations
-    local[:, 3, 3] = 1.0
-    points = forward_kinematics(job.target.parents, local)[:, :3, 3]
+    linear = rotations * job.target.rest_scales[:, None, :]
+    worlds = joint_worlds(job.target.parents, linear, job.target.rest_translations)
+    points = worlds[:, :3, 3]
     source, _ = job.rests
     return ground_offset(source.points, points, job.matches, source.up, scale)
 
