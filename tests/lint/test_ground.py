@@ -12,7 +12,7 @@ from lint.sound import FRAMES, RATE, legs, scene_of, standing
 
 from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
-from viewer.rig.inspection.ground_height import Ground, ground_of
+from viewer.rig.feet.ground import Ground, ground_of
 from viewer.rig.motion.timing import Timing
 
 Change = Callable[[np.ndarray], np.ndarray]

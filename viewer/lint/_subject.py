@@ -22,8 +22,8 @@ from viewer.lint._finding import NO_INDICES, NO_TIMES, Finding, LintOptions
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
+from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.soles import soles_of
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.motion.clip import Clip

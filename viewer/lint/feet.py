@@ -9,9 +9,9 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject, Track, track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.feet.ground import Ground, ground_of, resting_frames
+from viewer.rig.feet.soles import extent
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.ground_height import Ground, ground_of, resting_frames
-from viewer.rig.inspection.soles import extent
 from viewer.rig.skeleton import joint_labels
 
 # Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm if it is a guess.

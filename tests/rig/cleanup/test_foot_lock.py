@@ -10,8 +10,8 @@ from lint.sound import FRAMES, RATE, legs, standing
 from numpy.testing import assert_allclose
 
 from viewer.rig.cleanup.foot_contacts import contacts
-from viewer.rig.cleanup.foot_lock import legs_of, lock_feet
-from viewer.rig.cleanup.leg_ik import Leg, bend, hinges, reach
+from viewer.rig.cleanup.foot_lock import lock_feet
+from viewer.rig.feet.legs import Leg, bend, hinges, legs_of, reach
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.evaluation import frames_of, world_frames

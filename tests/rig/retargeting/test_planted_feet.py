@@ -11,15 +11,15 @@ from rig.retargeting.two_people import figure_of, places
 from rig.retargeting.walking import N_WALK, RATE, stands, walk
 
 from viewer.rig.arrays import Floats
+from viewer.rig.feet.contacts import FootPath, foot_contacts
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.retargeting.planted_feet import plant_feet
+from viewer.rig.retargeting.feet import plant_feet
 from viewer.rig.retargeting.retarget import retargeted
-from viewer.rig.retargeting.source_contacts import FootPath, foot_contacts
 from viewer.rig.shape import rest_joints
 
 SIDES = ("Left", "Right")

@@ -171,7 +171,7 @@ def _lies(posed: Floats, along: str, up: str, size: float) -> bool:
 def _stands_on_four_legs(skeleton: Skeleton, points: Floats) -> bool:
     """Return whether a skeleton has an animal's legs if y is up, but not if z is."""
     # Imported here because few files need it.
-    from viewer.rig.retargeting.leg_chains import animal_legs
+    from viewer.rig.feet.legs import animal_legs
 
     joints = points[: skeleton.n_joints]
     return [bool(animal_legs(skeleton.parents, joints, up)) for up in np.eye(3)[1:]] == [

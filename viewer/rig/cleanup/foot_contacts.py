@@ -6,12 +6,12 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.feet.contacts import mean_speeds
 
 # Heights and speeds are relative to the figure's height at rest: 0.02 is 34 mm for a person.
 _LOW, _HIGH = 0.02, 0.035  # heights above the lowest positions at which a contact begins and ends
 _SLOW, _FAST = 0.3, 0.5  # speeds per second at which a contact begins and ends
 _LOWEST = 0.05  # fraction of the frames that are below the ground level
-_WINDOW = 0.1  # seconds over which the speed is averaged
 _SHORTEST = 0.1  # minimum duration of a contact, seconds
 
 
@@ -36,12 +36,3 @@ def contacts(positions: Floats, present: Bools, rate: float, size: float, up: in
             if is_long and begins[first:last].any():
                 result[start + first : start + last] = True
     return result
-
-
-def mean_speeds(places: Floats, rate: float) -> Floats:
-    """Return speeds (N,) averaged over a window around each frame."""
-    half = max(1, round(0.5 * _WINDOW * rate))
-    frames = np.arange(len(places))
-    before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
-    moved = np.linalg.norm(places[after] - places[before], axis=1)
-    return moved * rate / np.maximum(after - before, 1)

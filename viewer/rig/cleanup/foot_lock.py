@@ -10,18 +10,16 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.curves import EASE, faded
 from viewer.rig.cleanup.foot_contacts import contacts
 from viewer.rig.cleanup.frames import in_frame_order, runs_of
-from viewer.rig.cleanup.leg_ik import Leg, leg_rotations, lowering
+from viewer.rig.feet.curves import EASE, faded
+from viewer.rig.feet.legs import Leg, leg_rotations, legs_of, lowering
+from viewer.rig.feet.soles import extent
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.soles import extent
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton
 
 _FARTHEST = 0.15  # maximum horizontal correction of a foot, relative to the figure's height at rest
 
@@ -40,19 +38,6 @@ class FootLock:
     n_glides: int = 0
     """Number of contacts in which a foot is not held because it glides too far, as on skates or
     where the whole body drifts."""
-
-
-def legs_of(skeleton: Skeleton) -> list[Leg]:
-    """Return the legs of a skeleton, found by the names of its joints."""
-    names = joint_meanings(skeleton)
-    legs = []
-    for side in ("left", "right"):
-        joints = [f"{side}_{part}" for part in ("hip", "knee", "ankle")]
-        if all(name in names for name in joints):
-            hip, knee, ankle = (names.index(name) for name in joints)
-            toe = names.index(f"{side}_foot") if f"{side}_foot" in names else ankle
-            legs.append(Leg(hip, knee, ankle, toe))
-    return legs
 
 
 def lock_feet(

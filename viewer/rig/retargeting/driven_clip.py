@@ -13,14 +13,12 @@ from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.feet import feet_notes, plant_feet
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
-from viewer.rig.retargeting.planted_feet import PlantedFeet, plant_feet
-from viewer.rig.retargeting.retarget import Retargeted, retargeted
-from viewer.rig.scalars import length_text
+from viewer.rig.retargeting.retarget import retargeted
 
 _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
-_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
@@ -33,7 +31,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     clip, notes = found.clip, found.notes
     if drive.plants_feet:
         clip, changes = plant_feet(found, figure, drive.hangs)
-        notes = notes + _feet_notes(changes, found, figure)
+        notes = notes + feet_notes(changes, found, figure)
     up = drive.motion.figure.up
     if not drive.keeps_up or up == figure.up:
         return clip, notes
@@ -83,35 +81,3 @@ def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip
         translations=shifts if shifts.any() else None,
         figure_translations=place,
     )
-
-
-def _feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
-    """Return messages about the changes made by planting the feet."""
-    if changes is None:
-        return []
-    called = {"motion": found.source.figure.name, "figure": figure.name}
-    if not changes.is_better:
-        key = "F007.feet-kept" if changes.n_contacts else "F007.feet-no-contacts"
-        return [Diagnostic(key, values=called)]
-
-    def text(length: float) -> str:
-        return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
-
-    values = {
-        **called,
-        "n": changes.n_contacts,
-        "source": text(changes.source),
-        "before": text(changes.before),
-        "after": text(changes.after),
-    }
-    notes = [Diagnostic("F007.feet-planted", values=values)]
-    own = {"figure": figure.name}
-    gaps = own | {"gap_before": text(changes.gap_before), "gap": text(changes.gap_after)}
-    notes.append(Diagnostic("F007.feet-gap", values=gaps))
-    if changes.lowered > _ROUNDING * changes.size:
-        length = text(changes.lowered)
-        notes.append(Diagnostic("F007.feet-lowered", values=own | {"length": length}))
-    if changes.ground_speed:
-        speed = f"{text(changes.ground_speed)}/s"
-        notes.append(Diagnostic("F007.feet-ground", values=own | {"speed": speed}))
-    return notes

@@ -9,8 +9,8 @@ from rig.retargeting.trotting import PAWS, animal, other_animal, stands, trot
 from rig.retargeting.two_people import BODY, HIK, figure_of, places
 
 from viewer.loading import load
-from viewer.rig.retargeting.leg_chains import animal_legs
-from viewer.rig.retargeting.planted_feet import plant_feet
+from viewer.rig.feet.legs import animal_legs
+from viewer.rig.retargeting.feet import plant_feet
 from viewer.rig.retargeting.retarget import retargeted
 from viewer.rig.shape import rest_joints
 

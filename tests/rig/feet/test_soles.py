@@ -8,8 +8,8 @@ from lint.sound import legs, scene_of, standing
 
 import viewer
 from viewer.loading import bundled_body
+from viewer.rig.feet.soles import extent, soles_of
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.inspection.soles import extent, soles_of
 from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.skinning import deform, joint_matrices

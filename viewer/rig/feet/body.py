@@ -1,4 +1,4 @@
-"""Legs of a driven figure and of its source, in every frame."""
+"""Legs and soles of a body in every frame of its motion."""
 
 from __future__ import annotations
 
@@ -9,47 +9,26 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.cleanup.foot_lock import legs_of
 from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.cleanup.leg_ik import Leg, reach
+from viewer.rig.feet.legs import Leg, reach
+from viewer.rig.feet.soles import Soles, extent, soles_of_feet
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.inspection.soles import Soles, extent, soles_of_feet
 from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.leg_chains import animal_legs
-from viewer.rig.retargeting.rest_poses import rest_of
-from viewer.rig.retargeting.retarget import Retargeted
-from viewer.rig.retargeting.source_contacts import FootPath
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-_ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
 _UNEVEN = 1e-3  # maximum relative difference of a joint's scale factors
 _FOLDED = 1e-3  # extension at rest below which a leg is folded
-_STEEP = 0.9  # maximum sine of the slope of a standing person's foot
-
-
-@dataclass(frozen=True, slots=True)
-class LegPair:
-    """A leg of the figure, and the joints of the source's foot that drives it."""
-
-    leg: Leg
-    """Joints of the figure."""
-    hip: int
-    ankle: int
-    toe: int
-    """Joints of the source; ankle and toe are equal if the foot has no ball joint."""
-    is_digitigrade: bool = False
-    """Whether the foot stands on its toes, like an animal's, and never on its heel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DrivenLegs:
-    """Legs of a driven figure."""
+class BodyLegs:
+    """Legs and soles of a body, and their forward kinematics."""
 
     chains: Chains
     """Joints of the legs and feet, and their ancestors."""
@@ -77,7 +56,7 @@ class DrivenLegs:
 
     def worlds(self, clip: SampledClip) -> Floats:
         """Return the world matrices of the chains, moved by the travel: (N, K, 4, 4)."""
-        found = _chain_worlds(clip, self.chains, *self.rests)
+        found = chain_worlds(clip, self.chains, *self.rests)
         if self.travel is not None:
             found[..., :3, 3] += self.travel[:, None]
         return found
@@ -118,25 +97,7 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
     return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
 
 
-def leg_pairs(found: Retargeted, figure: Figure) -> list[LegPair]:
-    """Return the legs of the figure whose hips and ankles are driven, left before right."""
-    source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
-    partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
-    animal = animal_legs(skeleton.parents, rest_of(skeleton, np.eye(3), figure.up).points, up)
-    toes = {leg.ankle: leg.toe for leg in legs_of(source)}
-    pairs = []
-    for leg in animal or legs_of(skeleton):
-        hip, ankle, toe = (int(partners[joint]) for joint in (leg.hip, leg.ankle, leg.toe))
-        if min(hip, ankle) < 0:
-            continue
-        chosen = (toe if toe >= 0 else ankle) if animal else toes.get(ankle, ankle)
-        pairs.append(LegPair(leg, hip, ankle, chosen, bool(animal)))
-    return pairs
-
-
-def driven_legs(
-    figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats
-) -> DrivenLegs | None:
+def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) -> BodyLegs | None:
     """Return the legs of a figure; None if they cannot be solved.
 
     ``up``: (3,), the up axis of the figure.
@@ -147,14 +108,14 @@ def driven_legs(
         weights = clip.shape_weights[0]
     body = shaped(figure, weights)
     soles = soles_of_feet(body, [[leg.toe, leg.ankle] for leg in legs], figure.is_attached)
-    chains = _chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
+    chains = chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
     constrained = [each.joint for each in skeleton.constraints]
     if (chains.place[constrained] >= 0).any():
         return None
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
     still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
-    world = _chain_worlds(still, chains, *rests)[0]
-    if not _is_solvable(world[:, :3, :3]):
+    world = chain_worlds(still, chains, *rests)[0]
+    if not is_solvable(world[:, :3, :3]):
         return None
     place = chains.place
     own = tuple(
@@ -174,10 +135,10 @@ def driven_legs(
     extensions, size = _extensions(world[None], own)[0], _size(world, own)
     clearance = float(toes.mean() - floor)
     levels = level, toe_level
-    return DrivenLegs(chains, own, moved, heels, *levels, rests, extensions, size, clearance)
+    return BodyLegs(chains, own, moved, heels, *levels, rests, extensions, size, clearance)
 
 
-def _is_solvable(linear: Floats) -> bool:
+def is_solvable(linear: Floats) -> bool:
     """Return whether joints are scaled uniformly and not mirrored: (K, 3, 3)."""
     lengths = np.linalg.norm(linear, axis=-2)
     is_uniform = np.ptp(lengths, axis=-1) <= _UNEVEN * lengths.min(axis=-1)
@@ -205,68 +166,6 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
     return 2.0 * float(max(lengths))
 
 
-def has_source_proportions(
-    found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
-) -> bool:
-    """Return whether the legs of a figure are as long as the scaled legs of the source."""
-    partners = found.matches.partners
-    target, source = figure.require_skeleton(), found.source.figure.require_skeleton()
-    joints = [
-        joint
-        for pair in pairs
-        for joint in (pair.leg.hip, pair.leg.knee, pair.leg.ankle, pair.leg.toe)
-        if partners[joint] >= 0
-    ]
-    bones = []
-    for skeleton, chosen in ((target, joints), (source, partners[joints])):
-        points = rest_of(skeleton, np.eye(3), "y").points[chosen]
-        bones.append(np.linalg.norm(np.diff(points, axis=0), axis=1))
-    return bool(np.abs(bones[0] - found.scale * bones[1]).max() < _ALIKE * size)
-
-
-def foot_paths(
-    found: Retargeted,
-    clip: SampledClip,
-    pairs: list[LegPair],
-    vectors: list[tuple[Floats, Floats]],
-    up: Floats,
-) -> list[FootPath]:
-    """Return the paths of the source's feet, in the axes and the unit of the figure.
-
-    ``vectors``: list of ((N, 3), (N, 3)), vectors from the ankles of the figure to its balls and
-    heels; they replace the source's if it has no ball joints or no standing rest pose. ``up``:
-    (3,), the up axis.
-    """
-    skeleton = found.source.figure.require_skeleton()
-    chains = _chains_to(
-        skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
-    )
-    rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
-    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
-    rest = _chain_worlds(still, chains, *rests)[0]
-    world = _chain_worlds(clip, chains, *rests)
-    axes, result = found.scale * found.to_target, []
-    for pair, own in zip(pairs, vectors, strict=True):
-        ends = (pair.hip, pair.ankle, pair.toe)
-        hip, ankle, toe = (int(chains.place[joint]) for joint in ends)
-        above = world[:, hip, :3, 3] @ axes.T
-        place, ball = (world[:, joint, :3, 3] @ axes.T for joint in (ankle, toe))
-        if pair.is_digitigrade:
-            ball = ball if toe != ankle else place + own[0]
-            result.append(FootPath(ball, ball, above))
-            continue
-        height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
-        length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
-        linear = rest[ankle, :3, :3]
-        if not (0.0 < height < _STEEP * length and _is_solvable(linear)):
-            result.append(FootPath(place + own[0], place + own[1], above))
-            continue
-        upward = np.linalg.solve(linear, found.to_target.T @ up)
-        heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
-        result.append(FootPath(ball, heel @ axes.T, above))
-    return result
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Chains:
     """Some joints of a skeleton and all their ancestors, renumbered."""
@@ -279,7 +178,7 @@ class Chains:
     """(J,) int32. Index into ``joints`` of each joint of the skeleton, -1 if it is not included."""
 
 
-def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
+def chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
     """Return the given joints of a skeleton and all their ancestors."""
     parents = skeleton.parents
     chosen = np.zeros(skeleton.n_joints, dtype=np.bool_)
@@ -295,9 +194,7 @@ def _chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
     return Chains(joints, above, place)
 
 
-def _chain_worlds(
-    clip: SampledClip, chains: Chains, translations: Floats, scales: Floats
-) -> Floats:
+def chain_worlds(clip: SampledClip, chains: Chains, translations: Floats, scales: Floats) -> Floats:
     """Return the world matrices of some joints in every row of a clip: (N, K, 4, 4).
 
     ``translations``, ``scales``: (J, 3), rest translations and local scale factors of all joints;

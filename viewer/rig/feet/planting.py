@@ -1,46 +1,48 @@
-"""Planting of a driven figure's feet during contacts of the source (after Kovar et al. 2002).
+"""Planting of feet while they are on the ground: plan, shifts, legs (after Kovar et al. 2002).
 
-Retargeting preserves the directions of limbs, so feet slide and sink if proportions differ.
-During a contact of the source, the ball or the heel of the figure's foot stays in place and its
-sole on the ground; before and after, the correction fades in and out. Hips and knees rotate so that
-the ankles reach their targets, and the body is lowered if a leg is too short. If a knee then moves
-more suddenly than the source's, feet are held and released more gradually.
+During a contact, the ball or the heel of a foot stays in place and its sole on the ground; before
+and after, the correction fades in and out. Hips and knees rotate so that the ankles reach their
+targets, and the body is lowered if a leg is too short. If a knee then moves more suddenly than
+before, feet are held and released more gradually.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.cleanup.curves import falling, smooth_curves
-from viewer.rig.cleanup.frames import in_frame_order
-from viewer.rig.cleanup.leg_ik import Leg, leg_rotations, lowering
-from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.retargeting.driven_legs import (
-    DrivenLegs,
-    driven_legs,
-    foot_paths,
-    has_source_proportions,
-    leg_pairs,
-    spans_of,
+from viewer.rig.feet.body import BodyLegs, spans_of
+from viewer.rig.feet.contacts import (
+    Contact,
+    FootPath,
+    foot_contacts,
+    ground_level,
+    ground_velocity,
+    on_moving_ground,
+    step_height,
 )
-from viewer.rig.retargeting.foot_plan import FootPlan, foot_plan
-from viewer.rig.retargeting.level_feet import levelled
-from viewer.rig.retargeting.retarget import Retargeted
-from viewer.rig.retargeting.source_contacts import Contact, FootPath
+from viewer.rig.feet.curves import falling, smooth_curves
+from viewer.rig.feet.legs import Leg, leg_rotations, lowering
+from viewer.rig.geometry.quaternion import (
+    align_signs,
+    conjugate,
+    multiply,
+    rotation_vector_to_quaternion,
+)
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.motion.sampled_clip import SampledClip
 
 _EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its length
 _EASES = (0.1, 0.2)  # longer beginnings and ends of contacts, seconds
 _CALM = 1.15  # largest growth of the knees' accelerations that needs no longer ease, a factor
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
-_STEPS = 2 + 3 * (1 + len(_EASES))  # maximum number of steps reported as progress
+STEPS = 2 + 3 * (1 + len(_EASES))
+"""Maximum number of steps reported as progress; the first one is the caller's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,38 +83,27 @@ class _Attempt:
     knees: float  # ratio of the knees' largest accelerations to those before
 
 
-def plant_feet(
-    found: Retargeted, figure: Figure, hangs: bool = False
-) -> tuple[SampledClip, PlantedFeet | None]:
-    """Return the motion of a driven figure with its feet planted.
+def plant(
+    clip: SampledClip, body: BodyLegs, worlds: Floats, feet: list[FootPath], up: Floats
+) -> tuple[SampledClip, PlantedFeet]:
+    """Return a motion with its feet planted during contacts, unchanged if it would not improve.
 
-    Returns ``clip``: the motion; unchanged if it would not improve; ``changes``: changes made; None
-    if the figure or the source has no recognised legs, or the figure has the source's proportions.
+    ``clip``: rows in the order of frames. ``worlds``: its matrices, as of ``body``. ``feet``: the
+    paths of the feet that decide when the feet of the body stand: those of the source of a driven
+    figure. ``up``: (3,).
     """
-    pairs = leg_pairs(found, figure)
-    rest_up = np.eye(3)["xyz".index(figure.up)]
-    up = -rest_up if hangs else rest_up
-    clip = cast("SampledClip", in_frame_order(found.clip))
-    body = driven_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
-    if body is None or body.size <= 0.0 or clip.n_rows == 0:
-        return found.clip, None
-    if has_source_proportions(found, figure, pairs, body.size):
-        return found.clip, None
-    report(1, _STEPS, "steps", "planting the feet")
-    source = cast("SampledClip", in_frame_order(found.source.clip))
-    worlds, timing = body.worlds(clip), clip.timing
-    feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
+    timing = clip.timing
     how = spans_of(timing), timing.frame_rate
-    moves = _ground_velocity(feet, *how, body.size, up)
+    moves = ground_velocity(feet, *how, body.size, up)
     if moves is not None:  # contacts and corrections are found in the axes of the ground
         seconds = np.flatnonzero(timing.present) / timing.frame_rate
         travel = -seconds[:, None] * moves
         body = replace(body, travel=travel)
-        worlds, feet = body.worlds(clip), _on_moving_ground(feet, travel)
+        worlds, feet = body.worlds(clip), on_moving_ground(feet, travel)
     speed = 0.0 if moves is None else float(np.linalg.norm(moves))
     plan = foot_plan(feet, *how, (body.size, body.clearance), up)
     if not any(plan.contacts):
-        return found.clip, PlantedFeet()
+        return clip, PlantedFeet()
     best = _attempt(clip, body, worlds, plan, speed, 2)
     for number, ease in enumerate(_EASES, 1):
         if best.knees <= _CALM:
@@ -121,23 +112,23 @@ def plant_feet(
         tried = _attempt(clip, body, worlds, plan, speed, 2 + 3 * number)
         if tried.knees < best.knees and tried.changes.after <= tried.changes.source:
             best = tried
-    return (best.clip if best.changes.is_better else found.clip), best.changes
+    return (best.clip if best.changes.is_better else clip), best.changes
 
 
 def _attempt(
     clip: SampledClip,
-    body: DrivenLegs,
+    body: BodyLegs,
     worlds: Floats,
     plan: FootPlan,
     ground_speed: float,
     step: int,
 ) -> _Attempt:
     """Return the motion with its feet planted according to a plan; reports progress from a step."""
-    report(step, _STEPS, "steps")
+    report(step, STEPS, "steps")
     level = levelled(clip, body, worlds, plan)
-    report(step + 1, _STEPS, "steps")
+    report(step + 1, STEPS, "steps")
     planted, lowered = _planted(level, body, body.worlds(level), plan)
-    report(step + 2, _STEPS, "steps")
+    report(step + 2, STEPS, "steps")
     after = body.worlds(planted)
     gaps = [plan.gap(body.heights(each, plan.up)) for each in (worlds, after)]
     changes = PlantedFeet(
@@ -158,7 +149,7 @@ def _attempt(
 
 
 def _planted(
-    clip: SampledClip, body: DrivenLegs, worlds: Floats, plan: FootPlan
+    clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan
 ) -> tuple[SampledClip, float]:
     """Return the corrected motion, and how far the body was lowered."""
     up, joints = plan.up, body.chains.joints
@@ -185,6 +176,221 @@ def _translated(clip: SampledClip, drop: Floats, roots: Ints) -> SampledClip:
     shifts[:, roots] += drop[:, None]
     return replace(clip, translations=shifts)
 
+
+# The plan: contacts of all feet, and the heights of the ground under them.
+
+_SUNK = 0.015  # maximum depth of the source's feet below the ground, relative to the body
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootPlan:
+    """Contacts of all feet, and the heights of the ground."""
+
+    feet: list[FootPath]
+    """Paths of the source's feet."""
+    contacts: list[list[Contact]]
+    """Contacts of each foot, in time order."""
+    grounds: list[list[float]]
+    """Height of the ground under the figure during each contact."""
+    spans: list[tuple[int, int]]
+    """Ranges of rows without gaps."""
+    rate: float
+    """Rows per second."""
+    size: float
+    """Approximate height of the body."""
+    up: Floats
+    """(3,). The up axis."""
+
+    def stances(self, foot: int) -> Iterator[tuple[Contact, slice, float]]:
+        """Return the contacts of a foot, their rows, and the heights of the ground."""
+        for contact, ground in zip(self.contacts[foot], self.grounds[foot], strict=True):
+            yield contact, slice(contact.start, contact.stop), ground
+
+    def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
+        """Return the horizontal displacements of a planted foot from row to row.
+
+        ``points``: ((N, 3), (N, 3)), paths of the ball and the heel.
+        """
+        rows = slice(contact.start, contact.stop)
+        toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
+        moved = np.where(contact.on_toe[:, None], toe, heel)
+        return moved - (moved @ self.up)[:, None] * self.up
+
+    def slide(self, feet: Sequence[tuple[Floats, Floats]]) -> float:
+        """Return the total distance that balls and heels slide while they are in contact."""
+        total = 0.0
+        for points, contacts in zip(feet, self.contacts, strict=True):
+            for contact in contacts:
+                total += float(np.linalg.norm(self.steps(points, contact), axis=1).sum())
+        return total
+
+    def holds(self) -> Floats:
+        """Return the degree to which each foot is held on the ground, 0 to 1: (N, L)."""
+        result = np.zeros((len(self.feet[0].toe), len(self.feet)))
+        for foot in range(len(self.contacts)):
+            for contact, rows, _ in self.stances(foot):
+                result[rows, foot] = contact.hold
+        return result
+
+    def gap(self, heights: Floats) -> float:
+        """Return the largest distance of a planted foot from the ground.
+
+        ``heights`` are the heights of the lowest point of each foot, (N, L).
+        """
+        stands, largest = self.holds() >= 1.0, 0.0
+        for foot in range(len(self.contacts)):
+            for _, rows, ground in self.stances(foot):
+                gaps = np.abs(heights[rows, foot] - ground)[stands[rows, foot]]
+                largest = max(largest, float(gaps.max(initial=0.0)))
+        return largest
+
+    def floor(self, foot: int) -> Floats:
+        """Return the height below which a foot with contacts must not sink: (N,).
+
+        This is the ground of the previous or next contact, whichever is lower. If the source's foot
+        sinks below this ground, the limit follows it.
+        """
+        contacts, path = self.contacts[foot], self.feet[foot]
+        rows = np.arange(len(path.toe))
+        after = np.searchsorted([contact.start for contact in contacts], rows, side="right")
+        before = np.maximum(after - 1, 0)
+        after = np.minimum(after, len(contacts) - 1)
+        levels = np.array(self.grounds[foot])
+        stands = np.array([contact.height for contact in contacts])
+        lowest = np.minimum(levels[before], levels[after])
+        sunk = np.minimum(stands[before], stands[after]) - path.lowest(self.up)
+        return lowest - np.maximum(sunk - _SUNK * self.size, 0.0)
+
+
+def foot_plan(
+    feet: list[FootPath],
+    spans: list[tuple[int, int]],
+    rate: float,
+    shape: tuple[float, float],
+    up: Floats,
+    ease: float = 0.0,
+) -> FootPlan:
+    """Return the contacts of the source, and the heights of the ground under the figure.
+
+    ``feet``, ``spans``, ``rate``, ``up``: as in ``FootPlan``. ``ease``: duration of the beginning
+    and the end of a contact, as in ``foot_contacts``.
+    """
+    size, clearance = shape
+    contacts = foot_contacts(feet, spans, rate, size, up, ease)
+    if not any(contacts):
+        return FootPlan(feet, contacts, [[] for _ in feet], spans, rate, size, up)
+    level, is_usual = ground_level(contacts, size, clearance)
+    ground = 0.0 if is_usual else level - clearance
+    grounds = [[ground + step_height(one, level, size) for one in foot] for foot in contacts]
+    return FootPlan(feet, contacts, grounds, spans, rate, size, up)
+
+
+# Level soles.
+#
+# Retargeting preserves the direction from the ankle to the ball. Where ankles have different
+# heights, or the rest pose of a file is inexact, the sole is then tilted. While the ball and the
+# heel of the source stand, the foot rotates until its sole is level; while only the ball stands,
+# the toes rotate instead.
+
+_NOISE = 0.04  # seconds below which changes of a standing foot's rotation are noise
+_LEVELS = 0.06  # seconds over which a correction falls to 40 % outside contacts
+_FLAT = 6.0  # decimal exponent of the weight of a standing foot
+# Cosines of the tilts beyond which a sole is unchanged and below which it is fully levelled.
+_TILTED = (np.cos(np.radians(55.0)), np.cos(np.radians(35.0)))
+
+
+def levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan) -> SampledClip:
+    """Return a motion whose standing soles are level.
+
+    ``worlds``: (N, K, 4, 4), their world matrices.
+    """
+    legs, up = body.legs, plan.up
+    ankles, toes = [leg.ankle for leg in legs], [leg.toe for leg in legs]
+    linear = worlds[..., :3, :3]
+    lengths = np.maximum(np.linalg.norm(linear, axis=-2, keepdims=True), 1e-30)
+    old = matrix_to_quaternion(linear / lengths)
+    holds, flat = _holds(plan, legs)
+    if not (holds > 0.0).any():
+        return clip
+    steady = _steadied(plan, np.stack([old[:, ankles], old[:, toes]]), holds)
+    normals = np.stack([_normals(steady[0], body.level), _normals(steady[1], body.toe_level)])
+    cosines = normals @ up
+    flat *= falling((_TILTED[1] - cosines) / (_TILTED[1] - _TILTED[0]))
+    tilts = _faded_tilts(plan, _tilts(normals, up) * (flat > 0.0)[..., None], flat)
+    return _rotated(clip, body, old, multiply(rotation_vector_to_quaternion(tilts), steady))
+
+
+def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
+    """Return how firmly feet and toes stand, and how firmly with flat soles: (2, N, L) each."""
+    holds = np.zeros((2, len(plan.feet[0].toe), len(legs)))
+    flat = np.zeros_like(holds)
+    for foot, leg in enumerate(legs):
+        if plan.feet[foot].toe is plan.feet[foot].heel:  # animals stand on their toes
+            continue
+        for contact, rows, _ in plan.stances(foot):
+            holds[:, rows, foot] = contact.hold
+            flat[0, rows, foot] = contact.hold * contact.is_flat
+            flat[1, rows, foot] = contact.hold * contact.on_toe * (leg.toe != leg.ankle)
+    return holds, flat
+
+
+def _steadied(plan: FootPlan, rotations: Floats, holds: Floats) -> Floats:
+    """Return rotations, (2, N, L, 4), smoothed over time where feet stand."""
+    rotations = rotations.copy()
+    align_signs(rotations.swapaxes(0, 1))
+    smooth, ones = np.empty_like(rotations), np.ones(holds.shape)
+    for part in (0, 1):
+        smooth[part] = _curves(plan, rotations[part], ones[part], _NOISE)
+    blend = np.stack([_curves(plan, h[..., None], ones[0], _LEVELS)[..., 0] for h in holds])
+    mixed = rotations + np.clip(blend, 0.0, 1.0)[..., None] * (smooth - rotations)
+    return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+
+
+def _normals(rotations: Floats, level: Floats) -> Floats:
+    """Return the unit normals of soles: (N, L, 3)."""
+    found = np.einsum("nlab,lb->nla", quaternion_to_matrix(rotations), level)
+    return found / np.maximum(np.linalg.norm(found, axis=2, keepdims=True), 1e-30)
+
+
+def _tilts(normals: Floats, up: Floats) -> Floats:
+    """Return the smallest rotations from normals to the up axis, as rotation vectors."""
+    axes = np.cross(normals, up)
+    sines = np.linalg.norm(axes, axis=-1, keepdims=True)
+    return axes / np.maximum(sines, 1e-30) * np.arctan2(sines, (normals @ up)[..., None])
+
+
+def _faded_tilts(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
+    """Return corrections, (2, N, L, 3), that fade out where soles are not flat."""
+    weights = 1.0 + holds * 10.0 ** (_FLAT * holds)
+    parts = zip(targets, weights, strict=True)
+    return np.stack([_curves(plan, target, weight, _LEVELS) for target, weight in parts])
+
+
+def _curves(plan: FootPlan, targets: Floats, weights: Floats, seconds: float) -> Floats:
+    """Return smooth curves of all feet, (N, L, C); gaps in time separate them."""
+    result = np.empty_like(targets)
+    for start, stop in plan.spans:
+        part = slice(start, stop)
+        rows = targets[part].swapaxes(0, 1), weights[part].swapaxes(0, 1)
+        result[part] = smooth_curves(*rows, seconds * plan.rate).swapaxes(0, 1)
+    return result
+
+
+def _rotated(clip: SampledClip, body: BodyLegs, old: Floats, new: Floats) -> SampledClip:
+    """Return a motion with new rotations of ankles and toes in the world, (2, N, L, 4)."""
+    rotations, joints, parents = clip.rotations.copy(), body.chains.joints, body.chains.parents
+    for foot, leg in enumerate(body.legs):
+        ankle, above = new[0][:, foot], int(parents[leg.ankle])
+        rotations[:, joints[leg.ankle]] = multiply(conjugate(old[:, above]), ankle)
+        if leg.toe == leg.ankle:
+            continue
+        change = multiply(ankle, conjugate(old[:, leg.ankle]))
+        outer = multiply(change, old[:, int(parents[leg.toe])])
+        rotations[:, joints[leg.toe]] = multiply(conjugate(outer), new[1][:, foot])
+    return replace(clip, rotations=rotations)
+
+
+# Shifts of the feet and of the body.
 
 _EASE = 0.15  # seconds over which a correction falls to 40 % outside contacts
 _JUMP = 0.03  # seconds below which a jump of the recording is sudden
@@ -405,78 +611,3 @@ def _knee_accelerations(
 def _acceleration_ratio(before: Floats, after: Floats) -> float:
     """Return the largest ratio of accelerations, (L,) each; knees at rest do not count."""
     return float((after / np.maximum(before, _STILL)).max(initial=0.0))
-
-
-# Speed of the ground below motions in place, as on a treadmill or with the travel removed.
-#
-# Standing feet then move at a constant velocity while the body stays in place. Contacts are found
-# in the axes of the moving ground.
-
-# Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
-_SAME = 0.08  # tolerance for the speed of standing feet, per second
-_SLOWEST = 0.2  # minimum speed of the ground, per second
-_DRIFT = 0.25  # maximum speed of the body relative to the speed of the ground
-_USUAL = 0.4  # minimum fraction of the rows in which the lowest foot has the ground's velocity
-
-# Minimum ratio of the number of these rows to the number of rows with a resting foot.
-_OFTENER = 3.0
-_WINDOW = 0.1  # seconds over which velocities are averaged
-_MOST = 500  # maximum number of candidates
-
-
-def _ground_velocity(
-    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
-) -> Floats | None:
-    """Return the velocity of the ground, (3,) per second; None if it does not move.
-
-    The parameters are those of ``foot_contacts``.
-    """
-    speeds, body = _speeds(feet, spans, rate, up)
-    if not len(speeds):
-        return None
-    near = _SAME * size
-    candidates = speeds[:: -(-len(speeds) // _MOST)]
-    counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
-    best = candidates[int(np.argmax(counts))]
-    is_alike = np.linalg.norm(speeds - best, axis=1) < near
-    velocity: Floats = np.median(speeds[is_alike], axis=0)
-    n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
-    speed, drift = np.linalg.norm(velocity), np.linalg.norm(body.mean(axis=0))
-    is_moving = speed > _SLOWEST * size and drift < _DRIFT * speed
-    is_usual = is_alike.mean() > _USUAL and is_alike.sum() > _OFTENER * n_resting
-    return velocity if is_moving and is_usual else None
-
-
-def _speeds(
-    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, up: Floats
-) -> tuple[Floats, Floats]:
-    """Return the horizontal velocities of the lowest foot and of the hips, (M, 3) per second."""
-    half = max(1, round(0.5 * _WINDOW * rate))
-    lowest = np.array([foot.lowest(up) for foot in feet]).argmin(axis=0)
-    found, body = [np.zeros((0, 3))], [np.zeros((0, 3))]
-    for first, last in spans:
-        rows = np.arange(first + half, last - half, dtype=np.int32)
-        own = np.zeros((len(rows), 3))
-        for number, foot in enumerate(feet):
-            is_toe = (foot.toe @ up <= foot.heel @ up)[rows, None]
-            moved = np.where(is_toe, *(_velocities(p, rows, half) for p in (foot.toe, foot.heel)))
-            own = np.where((lowest[rows] == number)[:, None], moved, own)
-        found.append(own)
-        body.append(np.mean([_velocities(foot.hip, rows, half) for foot in feet], axis=0))
-    flat = np.eye(3) - np.outer(up, up)
-    return rate * np.concatenate(found) @ flat, rate * np.concatenate(body) @ flat
-
-
-def _velocities(path: Floats, rows: Ints, half: int) -> Floats:
-    """Return the displacement per row around each row."""
-    return (path[rows + half] - path[rows - half]) / (2.0 * half)
-
-
-def _on_moving_ground(feet: Sequence[FootPath], travel: Floats) -> list[FootPath]:
-    """Return the paths of the feet relative to the ground, moved by ``travel`` (N, 3)."""
-    result = []
-    for foot in feet:
-        toe = foot.toe + travel
-        heel = toe if foot.heel is foot.toe else foot.heel + travel
-        result.append(FootPath(toe, heel, foot.hip + travel))
-    return result

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.inspection.soles import extent, soles_of
+from viewer.rig.feet.soles import extent, soles_of
 from viewer.rig.motion.evaluation import JointMotion, frame_rate, frames_of, world_frames
 from viewer.rig.motion.timing import frame_times
 from viewer.rig.scene import Actor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.cleanup.curves import smooth_curves
+from viewer.rig.feet.curves import smooth_curves
 
 SPAN = 4.0
 

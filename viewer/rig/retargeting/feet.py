@@ -1,0 +1,180 @@
+"""Feet of a driven figure: planted while the feet of its source are on the ground.
+
+Retargeting preserves the directions of limbs, so feet slide and sink if proportions differ. The
+contacts are those of the source; see ``viewer.rig.feet.planting``.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
+from viewer.progress import report
+from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.frames import in_frame_order
+from viewer.rig.feet.body import body_legs, chain_worlds, chains_to, is_solvable
+from viewer.rig.feet.contacts import FootPath
+from viewer.rig.feet.legs import Leg, animal_legs, legs_of
+from viewer.rig.feet.planting import STEPS, PlantedFeet, plant
+from viewer.rig.figure import Figure
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.rest_poses import rest_of
+from viewer.rig.retargeting.retarget import Retargeted
+from viewer.rig.scalars import length_text
+
+_ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
+_STEEP = 0.9  # maximum sine of the slope of a standing person's foot
+_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
+
+
+def plant_feet(
+    found: Retargeted, figure: Figure, hangs: bool = False
+) -> tuple[SampledClip, PlantedFeet | None]:
+    """Return the motion of a driven figure with its feet planted.
+
+    Returns ``clip``: the motion; unchanged if it would not improve; ``changes``: changes made; None
+    if the figure or the source has no recognised legs, or the figure has the source's proportions.
+    """
+    pairs = _leg_pairs(found, figure)
+    rest_up = np.eye(3)["xyz".index(figure.up)]
+    up = -rest_up if hangs else rest_up
+    clip = cast("SampledClip", in_frame_order(found.clip))
+    body = body_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
+    if body is None or body.size <= 0.0 or clip.n_rows == 0:
+        return found.clip, None
+    if _has_source_proportions(found, figure, pairs, body.size):
+        return found.clip, None
+    report(1, STEPS, "steps", "planting the feet")
+    source = cast("SampledClip", in_frame_order(found.source.clip))
+    worlds = body.worlds(clip)
+    feet = _source_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
+    planted, changes = plant(clip, body, worlds, feet, up)
+    return (planted if changes.is_better else found.clip), changes
+
+
+@dataclass(frozen=True, slots=True)
+class _LegPair:
+    """A leg of the figure, and the joints of the source's foot that drives it."""
+
+    leg: Leg
+    """Joints of the figure."""
+    hip: int
+    ankle: int
+    toe: int
+    """Joints of the source; ankle and toe are equal if the foot has no ball joint."""
+    is_digitigrade: bool = False
+    """Whether the foot stands on its toes, like an animal's, and never on its heel."""
+
+
+def _leg_pairs(found: Retargeted, figure: Figure) -> list[_LegPair]:
+    """Return the legs of the figure whose hips and ankles are driven, left before right."""
+    source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
+    partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
+    animal = animal_legs(skeleton.parents, rest_of(skeleton, np.eye(3), figure.up).points, up)
+    toes = {leg.ankle: leg.toe for leg in legs_of(source)}
+    pairs = []
+    for leg in animal or legs_of(skeleton):
+        hip, ankle, toe = (int(partners[joint]) for joint in (leg.hip, leg.ankle, leg.toe))
+        if min(hip, ankle) < 0:
+            continue
+        chosen = (toe if toe >= 0 else ankle) if animal else toes.get(ankle, ankle)
+        pairs.append(_LegPair(leg, hip, ankle, chosen, bool(animal)))
+    return pairs
+
+
+def _has_source_proportions(
+    found: Retargeted, figure: Figure, pairs: list[_LegPair], size: float
+) -> bool:
+    """Return whether the legs of a figure are as long as the scaled legs of the source."""
+    partners = found.matches.partners
+    target, source = figure.require_skeleton(), found.source.figure.require_skeleton()
+    joints = [
+        joint
+        for pair in pairs
+        for joint in (pair.leg.hip, pair.leg.knee, pair.leg.ankle, pair.leg.toe)
+        if partners[joint] >= 0
+    ]
+    bones = []
+    for skeleton, chosen in ((target, joints), (source, partners[joints])):
+        points = rest_of(skeleton, np.eye(3), "y").points[chosen]
+        bones.append(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    return bool(np.abs(bones[0] - found.scale * bones[1]).max() < _ALIKE * size)
+
+
+def _source_paths(
+    found: Retargeted,
+    clip: SampledClip,
+    pairs: list[_LegPair],
+    vectors: list[tuple[Floats, Floats]],
+    up: Floats,
+) -> list[FootPath]:
+    """Return the paths of the source's feet, in the axes and the unit of the figure.
+
+    ``vectors``: list of ((N, 3), (N, 3)), vectors from the ankles of the figure to its balls and
+    heels; they replace the source's if it has no ball joints or no standing rest pose. ``up``:
+    (3,), the up axis.
+    """
+    skeleton = found.source.figure.require_skeleton()
+    chains = chains_to(
+        skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
+    )
+    rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
+    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
+    rest = chain_worlds(still, chains, *rests)[0]
+    world = chain_worlds(clip, chains, *rests)
+    axes, result = found.scale * found.to_target, []
+    for pair, own in zip(pairs, vectors, strict=True):
+        ends = (pair.hip, pair.ankle, pair.toe)
+        hip, ankle, toe = (int(chains.place[joint]) for joint in ends)
+        above = world[:, hip, :3, 3] @ axes.T
+        place, ball = (world[:, joint, :3, 3] @ axes.T for joint in (ankle, toe))
+        if pair.is_digitigrade:
+            ball = ball if toe != ankle else place + own[0]
+            result.append(FootPath(ball, ball, above))
+            continue
+        height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
+        length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
+        linear = rest[ankle, :3, :3]
+        if not (0.0 < height < _STEEP * length and is_solvable(linear)):
+            result.append(FootPath(place + own[0], place + own[1], above))
+            continue
+        upward = np.linalg.solve(linear, found.to_target.T @ up)
+        heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
+        result.append(FootPath(ball, heel @ axes.T, above))
+    return result
+
+
+def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
+    """Return messages about the changes made by planting the feet."""
+    if changes is None:
+        return []
+    called = {"motion": found.source.figure.name, "figure": figure.name}
+    if not changes.is_better:
+        key = "F007.feet-kept" if changes.n_contacts else "F007.feet-no-contacts"
+        return [Diagnostic(key, values=called)]
+
+    def text(length: float) -> str:
+        return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
+
+    values = {
+        **called,
+        "n": changes.n_contacts,
+        "source": text(changes.source),
+        "before": text(changes.before),
+        "after": text(changes.after),
+    }
+    notes = [Diagnostic("F007.feet-planted", values=values)]
+    own = {"figure": figure.name}
+    gaps = own | {"gap_before": text(changes.gap_before), "gap": text(changes.gap_after)}
+    notes.append(Diagnostic("F007.feet-gap", values=gaps))
+    if changes.lowered > _ROUNDING * changes.size:
+        length = text(changes.lowered)
+        notes.append(Diagnostic("F007.feet-lowered", values=own | {"length": length}))
+    if changes.ground_speed:
+        speed = f"{text(changes.ground_speed)}/s"
+        notes.append(Diagnostic("F007.feet-ground", values=own | {"speed": speed}))
+    return notes
