@@ -215,7 +215,7 @@ def _is_identity(matrix: Floats) -> bool:
 
 def _inverse(matrices: Floats) -> Floats:
     """Return the inverses of affine matrices, with exact last rows: (..., 4, 4)."""
-    linear: Floats = np.linalg.inv(matrices[..., :3, :3])
+    linear = np.asarray(np.linalg.inv(matrices[..., :3, :3]), dtype=np.float64)
     return affine_matrices(linear, (-linear @ matrices[..., :3, 3:])[..., 0])
 
 
