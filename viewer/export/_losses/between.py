@@ -11,21 +11,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.apart import apart, negligible, with_values
+from viewer.export._losses.apart import REGULAR, evenly, followed_vertices, heights, with_values
 from viewer.export._losses.lines import frames_losses
 from viewer.export._losses.skinned import (
-    Body,
     Rows,
     Side,
-    body_rows,
     changing,
     figure_side,
     linear_as_opened,
-    vertices,
 )
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -47,8 +43,6 @@ _LIKELY = 256  # number of likely spans, for joints and vertices each
 _INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
 _SHORT = 1e-6  # spans shorter than this, in frames, are ignored
 _BLOCK = 1024  # poses per block
-_NAMING = 1024  # approximate number of times at which all vertices are compared
-_GROUPS = 32  # time intervals, each of which contributes its farthest vertex
 _PEAKS = 64  # maximum number of refined peaks
 _HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
 _PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
@@ -213,11 +207,11 @@ def _worst_times(
     steps = min(_STEPS, _MOST // len(spans))
     times = _within(spans, np.linspace(_INSET, 1.0 - _INSET, steps + 1))
     pair = pair.watching(times)
-    heights = pair.heights(times)
+    sampled = pair.heights(times)
     looked += len(times)
     found = []
-    for kind in range(len(heights)):
-        peaks = _peaks(heights[kind])
+    for kind in range(len(sampled)):
+        peaks = _peaks(sampled[kind])
         found.append(_refined(pair, kind, times, peaks))
         looked += _ROUNDS * (_PARTS + 1) * len(peaks)
     return _WorstTimes(np.unique(np.concatenate(found)), looked, is_estimate)
@@ -273,49 +267,30 @@ class _Pair:
     one: _Sampler
     other: _Sampler
     how: Skinning
-    body: tuple[Body, Body] | None = None
+    followed: Rows | None = None
 
-    def _sides(self, times: Floats) -> tuple[Side, Side, Frames]:
+    def _sides(self, times: Floats) -> tuple[Side, Side]:
         first, second = self.one(times), self.other(times)
         still = second.shape_weights[0]
         columns = np.union1d(changing(first, still), changing(second, still))
-        sides = [
-            figure_side(self.figure, frames, self.how, still, columns) for frames in (first, second)
-        ]
-        return sides[0], sides[1], first
+        return (
+            figure_side(self.figure, first, self.how, still, columns),
+            figure_side(self.figure, second, self.how, still, columns),
+        )
 
     def watching(self, times: Floats) -> _Pair:
         """Return the pair restricted to the vertices that are farthest apart at some times."""
-        if self.figure.mesh is None:
+        if self.figure.mesh is None or not self.figure.mesh.n_vertices:
             return self
-        times = times[:: max(1, len(times) // _NAMING)]
-        first, second, frames = self._sides(times)
-        assert first.body is not None and second.body is not None  # both sides have the mesh
-        every = np.arange(len(times))
-        least = negligible(self.figure, frames, every)
-        found = set()
-        for rows in np.array_split(every, min(_GROUPS, len(every))):
-            worst = apart(first, second, rows, least).vertices
-            if worst is not None:
-                found.add(worst.index)
-        chosen = np.array(sorted(found), dtype=np.int32)
-        bodies = body_rows(first.body, chosen), body_rows(second.body, chosen)
-        return replace(self, body=bodies)
-
-    def heights(self, times: Floats) -> NDArray[np.float64]:
-        """Return the largest distances of joints and, if any, vertices: (1 or 2, T)."""
-        blocks = [times[start : start + _BLOCK] for start in range(0, len(times), _BLOCK)]
-        return np.concatenate([np.zeros((self._kinds, 0)), *map(self._block, blocks)], axis=1)
-
-    @property
-    def _kinds(self) -> int:
-        return 1 if self.body is None or len(self.body[0].positions) == 0 else 2
-
-    def _block(self, times: Floats) -> Floats:
-        first, second, _ = self._sides(times)
+        times = times[evenly(len(times), REGULAR)]
         rows = np.arange(len(times))
-        one, other = first.poses(rows), second.poses(rows)
-        off = [one.places - other.places]
-        if self.body is not None and self._kinds == 2:
-            off.append(vertices(self.body[0], one) - vertices(self.body[1], other))
-        return np.stack([np.linalg.norm(each, axis=2).max(axis=1, initial=0.0) for each in off])
+        return replace(self, followed=followed_vertices(*self._sides(times), rows))
+
+    def heights(self, times: Floats) -> Floats:
+        """Return the largest distances of joints and, if any, vertices: (1 or 2, T)."""
+        found = [np.zeros((1 if self.followed is None else 2, 0))]
+        for start in range(0, len(times), _BLOCK):
+            first, second = self._sides(times[start : start + _BLOCK])
+            rows = np.arange(len(times[start : start + _BLOCK]))
+            found.append(heights(first, second, rows, rows, self.followed))
+        return np.concatenate(found, axis=1)
