@@ -10,6 +10,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import Leg, reach
 from viewer.rig.feet.soles import Soles, extent, soles_of_feet
 from viewer.rig.figure import Figure
@@ -80,6 +81,16 @@ class BodyLegs:
         return [
             (toe - ankle, heel - ankle)
             for ankle, (toe, heel) in zip(ankles, self.feet(worlds), strict=True)
+        ]
+
+    def paths(self, worlds: Floats) -> list[FootPath]:
+        """Return the paths of all feet with their hips."""
+        hips = [worlds[:, leg.hip, :3, 3] for leg in self.legs]
+        pairs = zip(self.legs, self.feet(worlds), hips, strict=True)
+        # A foot without a ball stands on its heel only.
+        return [
+            FootPath(toe if leg.toe != leg.ankle else heel, heel, hip)
+            for leg, (toe, heel), hip in pairs
         ]
 
     def feet(self, worlds: Floats) -> list[tuple[Floats, Floats]]:

@@ -1,10 +1,10 @@
-"""Contacts of the feet with the ground in a motion that drives a figure.
+"""Contacts of the feet of a moving body with the ground: the one detector of this program.
 
 A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
 moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A contact
 is valid only if, at some time during it, the foot is the lowest one, not a foot held still in the
 air, and if it is below its hip, not next to it as in a lying person. The ground therefore need not
-be flat: every contact has its own height, as on stairs.
+be flat: every contact has its own height, as on stairs. The limits are those of ``limits``.
 """
 
 from __future__ import annotations
@@ -16,27 +16,13 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.feet import limits
 from viewer.rig.feet.curves import falling
-
-# Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
-_SLOW, _FAST = 0.08, 0.2  # speeds per second at which a contact begins and ends
-# Heights above the foot's lower point at which a contact begins and ends.
-_LOW, _HIGH = 0.015, 0.025
-_LOWEST = 0.02  # maximum height above the other foot of a foot that may be the lowest
-_UPRIGHT = 0.3  # minimum sine of the slope from the heel to the hip of a standing person
-_LOOSE = 0.05  # maximum hold of rows that are removed from both ends of a contact
-_WINDOW = 0.1  # seconds over which speeds are averaged
-_SHORTEST = 0.1  # minimum duration of a contact, seconds
-_LEVEL = 0.015  # maximum difference between heights of one level
-_GROUND = (-0.015, 0.06)  # range of heights of feet on a ground at height 0
-_SIMILAR = 1.0 / 3.0  # minimum fraction of the longest duration for a similar duration
-_TILTED = 0.04  # height of the heel above the ball, or vice versa, of a tilted foot
-_TIPTOE = 0.07  # maximum height of the ball of a foot on tiptoe above the ground
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FootPath:
-    """Path of a foot of the source, in the axes and the unit of the driven figure."""
+    """Path of a foot; that of a source is in the axes and the unit of the driven figure."""
 
     toe: Floats
     heel: Floats
@@ -76,21 +62,25 @@ def foot_contacts(
     size: float,
     up: Floats,
     ease: float = 0.0,
+    slips: float = 1.0,
 ) -> list[list[Contact]]:
     """Return the contacts of every foot, in time order.
 
     ``spans``: ranges of rows without gaps. ``rate``: rows per second. ``up``: (3,), the up axis.
+    ``ease``: seconds over which the hold rises and falls at the ends of a contact. ``slips``: how
+    many times faster along the ground the feet may move, as ``limits.SLIPS``.
     """
     lows = np.array([foot.lowest(up) for foot in feet])
     result = []
     for number, foot in enumerate(feet):
         others = np.delete(lows, number, axis=0)
-        is_lowest = (lows[number] < others + _LOWEST * size).all(axis=0)
+        is_lowest = (lows[number] < others + limits.LOWEST * size).all(axis=0)
         found = []
         for first, last in spans:
             part = slice(first, last)
-            (toe, heel), speeds = _stands(foot, part, lows[number], rate, size, up)
-            hold = falling((np.where(toe, *speeds) / size - _SLOW) / (_FAST - _SLOW))
+            (toe, heel), speeds = _stands(foot, part, lows[number], rate, size, up, slips)
+            slow = (np.where(toe, *speeds) / size - limits.SLOW) / (limits.FAST - limits.SLOW)
+            hold = falling(slow)
             for a, b in runs_of(toe | heel):
                 rows = slice(first + a, first + b)
                 if b - a < _shortest(rate) or not is_lowest[rows].any():
@@ -114,11 +104,11 @@ def _contact(
     toe, heel = stands
     slow = np.flatnonzero(hold >= 1.0) + start
     legs = foot.hip[slow] - foot.heel[slow]
-    if np.median(legs @ up - _UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+    if np.median(legs @ up - limits.UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
         return None
     height = float(np.median(foot.lowest(up)[slow]))
     tilt = float(np.median((foot.heel[slow] - foot.toe[slow]) @ up))
-    firm = np.flatnonzero(hold > _LOOSE)
+    firm = np.flatnonzero(hold > limits.LOOSE)
     a, b = int(firm[0]), int(firm[-1]) + 1
     on_toe, is_flat = toe[a:b], (toe & heel)[a:b]
     return Contact(start + a, start + b, on_toe, is_flat, eased[a:b], height, tilt)
@@ -133,19 +123,28 @@ def _eased(count: int, is_open: tuple[bool, bool], ease: float) -> Floats:
 
 
 def _shortest(rate: float) -> int:
-    return max(2, round(_SHORTEST * rate))
+    return max(2, round(limits.SHORTEST * rate))
 
 
 def _stands(
-    foot: FootPath, part: slice, lows: Floats, rate: float, size: float, up: Floats
+    foot: FootPath,
+    part: slice,
+    lows: Floats,
+    rate: float,
+    size: float,
+    up: Floats,
+    slips: float,
 ) -> tuple[list[Bools], list[Floats]]:
     """Return the rows of a part in which the ball and the heel are in contact, and their speeds."""
     found, paces = [], []
     for points in (foot.toe[part], foot.heel[part]):
-        above = points @ up - lows[part]
-        speeds = mean_speeds(points, rate)
-        begins = (above < _LOW * size) & (speeds < _SLOW * size)
-        lasts = (above < _HIGH * size) & (speeds < _FAST * size)
+        high = points @ up
+        above = high - lows[part]
+        # Speeds in a space whose horizontal axes are compressed, so that sliding counts less.
+        squeezed = points if slips == 1.0 else (points + (slips - 1.0) * high[:, None] * up) / slips
+        speeds = mean_speeds(squeezed, rate)
+        begins = (above < limits.LOW * size) & (speeds < limits.SLOW * size)
+        lasts = (above < limits.HIGH * size) & (speeds < limits.FAST * size)
         stands = np.zeros(len(points), dtype=np.bool_)
         for a, b in runs_of(lasts):
             if b - a >= _shortest(rate) and begins[a:b].any():
@@ -168,10 +167,10 @@ def ground_level(
     every = [contact for foot in contacts for contact in foot]
     heights = np.array([contact.height for contact in every])
     rows = np.array([contact.stop - contact.start for contact in every])
-    near = np.abs(heights[:, None] - heights) < _LEVEL * size
+    near = np.abs(heights[:, None] - heights) < limits.LEVEL * size
     counts = near @ rows
-    is_usual = (heights > _GROUND[0] * size) & (heights < _GROUND[1] * size)
-    is_usual &= counts >= _SIMILAR * counts.max()
+    is_usual = (heights > limits.ON_GROUND[0] * size) & (heights < limits.ON_GROUND[1] * size)
+    is_usual &= counts >= limits.SIMILAR * counts.max()
     best = int(counts.argmax())
     if is_usual.any():
         best = int(np.where(is_usual, np.abs(heights - clearance), np.inf).argmin())
@@ -187,13 +186,13 @@ def step_height(contact: Contact, level: float, size: float) -> float:
     Small differences, and the height of a foot on tiptoe, are treated as 0.
     """
     height = contact.height - level
-    is_tiptoe = abs(contact.tilt) > _TILTED * size and abs(height) < _TIPTOE * size
-    return 0.0 if is_tiptoe or abs(height) < _LEVEL * size else height
+    is_tiptoe = abs(contact.tilt) > limits.TILTED * size and abs(height) < limits.TIPTOE * size
+    return 0.0 if is_tiptoe or abs(height) < limits.LEVEL * size else height
 
 
 def mean_speeds(places: Floats, rate: float) -> Floats:
     """Return speeds (N,) averaged over a window around each frame."""
-    half = max(1, round(0.5 * _WINDOW * rate))
+    half = max(1, round(0.5 * limits.WINDOW * rate))
     frames = np.arange(len(places))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
     moved = np.linalg.norm(places[after] - places[before], axis=1)
@@ -205,14 +204,6 @@ def mean_speeds(places: Floats, rate: float) -> Floats:
 # Standing feet then move at a constant velocity while the body stays in place. Contacts are found
 # in the axes of the moving ground.
 
-# Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
-_SAME = 0.08  # tolerance for the speed of standing feet, per second
-_SLOWEST = 0.2  # minimum speed of the ground, per second
-_DRIFTS = 0.25  # maximum speed of the body relative to the speed of the ground
-_USUAL = 0.4  # minimum fraction of the rows in which the lowest foot has the ground's velocity
-
-# Minimum ratio of the number of these rows to the number of rows with a resting foot.
-_OFTENER = 3.0
 _MOST = 500  # maximum number of candidates
 
 
@@ -226,7 +217,7 @@ def ground_velocity(
     speeds, body = _speeds(feet, spans, rate, up)
     if not len(speeds):
         return None
-    near = _SAME * size
+    near = limits.GROUND_SAME * size
     candidates = speeds[:: -(-len(speeds) // _MOST)]
     counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
     best = candidates[int(np.argmax(counts))]
@@ -234,8 +225,9 @@ def ground_velocity(
     velocity: Floats = np.median(speeds[is_alike], axis=0)
     n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
     speed, drift = np.linalg.norm(velocity), np.linalg.norm(body.mean(axis=0))
-    is_moving = speed > _SLOWEST * size and drift < _DRIFTS * speed
-    is_usual = is_alike.mean() > _USUAL and is_alike.sum() > _OFTENER * n_resting
+    is_moving = speed > limits.GROUND_MOVES * size and drift < limits.BODY_DRIFTS * speed
+    is_usual = is_alike.mean() > limits.GROUND_USUAL
+    is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
     return velocity if is_moving and is_usual else None
 
 
@@ -243,7 +235,7 @@ def _speeds(
     feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, up: Floats
 ) -> tuple[Floats, Floats]:
     """Return the horizontal velocities of the lowest foot and of the hips, (M, 3) per second."""
-    half = max(1, round(0.5 * _WINDOW * rate))
+    half = max(1, round(0.5 * limits.WINDOW * rate))
     lowest = np.array([foot.lowest(up) for foot in feet]).argmin(axis=0)
     found, body = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for first, last in spans:

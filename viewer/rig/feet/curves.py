@@ -1,4 +1,4 @@
-"""Curves of corrections: smooth ones through weighted targets, and ones that fade in and out.
+"""Smooth curves of corrections through weighted targets, and a smooth step.
 
 ``smooth_curves`` are discrete smoothing splines (Whittaker 1923). A curve c with targets t and
 weights w minimises::
@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.arrays import Floats
 
 _BLOCK = 32  # rows that are solved together, with one call for all curves
 
@@ -87,34 +86,6 @@ def _coupling(next_: Floats, second: Floats) -> Floats:
     result = np.zeros((_BLOCK, 2))
     result[-1] = next_[-1], second[-1]
     result[-2, 0] = second[-2]
-    return result
-
-
-EASE = 0.2
-"""Seconds over which a correction begins and ends outside contacts."""
-
-
-def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
-    """Return values that fade in and out around held frames; gaps separate runs.
-
-    ``values``: (F, C), corrections in held frames. ``is_held``, ``present``: (F,), masks of held
-    frames and of existing frames.
-    """
-    result = values.copy()
-    for start, stop in runs_of(present):
-        held = np.flatnonzero(is_held[start:stop]) + start
-        if len(held) == 0:
-            continue
-        frames = np.arange(start, stop)
-        place = np.searchsorted(held, frames, side="right")
-        before, after = held[np.maximum(place - 1, 0)], held[np.minimum(place, len(held) - 1)]
-        left = np.where(place > 0, frames - before, ease + 1)
-        right = np.where(place < len(held), after - frames, ease + 1)
-        first, second = falling(left / (ease + 1)), falling(right / (ease + 1))
-        # Between two close contacts, the value blends from one to the other.
-        total = np.maximum(first + second, 1.0)[:, None]
-        mixed = first[:, None] * values[before] + second[:, None] * values[after]
-        result[start:stop] = np.where(is_held[start:stop, None], values[start:stop], mixed / total)
     return result
 
 

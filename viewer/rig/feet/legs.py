@@ -8,7 +8,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.feet.curves import EASE
 from viewer.rig.geometry.quaternion import between, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.geometry.vectors import unit
@@ -19,6 +18,8 @@ from viewer.rig.skeleton import Skeleton
 # direction of a nearly straight knee is only noise.
 _FORWARDS = 0.1
 _REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
+
+_EASE = 0.2  # seconds over which the body is lowered and raised
 
 # Sine of the bend at which a leg and the direction across the body determine the axis of its knee
 # equally.
@@ -184,7 +185,7 @@ def lowering(
         needed = np.maximum(needed, np.where(is_far, -height - depth, 0.0))
     if not needed.any():
         return needed
-    width = 2 * max(1, round(EASE * rate)) + 1
+    width = 2 * max(1, round(_EASE * rate)) + 1
     padded = np.pad(needed, width - 1, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
     # The moving average of moving maxima is never below the values themselves.

@@ -16,6 +16,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.feet import limits
 from viewer.rig.feet.body import BodyLegs, spans_of
 from viewer.rig.feet.contacts import (
     Contact,
@@ -65,6 +66,9 @@ class PlantedFeet:
     """Approximate height of the body."""
     ground_speed: float = 0.0
     """Speed of the ground on which the feet stand, per second; 0 if it does not move."""
+    n_glides: int = 0
+    """Number of contacts in which a foot is not held because it glides too far, as on skates or
+    where the whole body drifts."""
 
     @property
     def is_better(self) -> bool:
@@ -84,14 +88,20 @@ class _Attempt:
 
 
 def plant(
-    clip: SampledClip, body: BodyLegs, worlds: Floats, feet: list[FootPath], up: Floats
+    clip: SampledClip,
+    body: BodyLegs,
+    worlds: Floats,
+    up: Floats,
+    feet: list[FootPath] | None = None,
 ) -> tuple[SampledClip, PlantedFeet]:
     """Return a motion with its feet planted during contacts, unchanged if it would not improve.
 
-    ``clip``: rows in the order of frames. ``worlds``: its matrices, as of ``body``. ``feet``: the
-    paths of the feet that decide when the feet of the body stand: those of the source of a driven
-    figure. ``up``: (3,).
+    ``clip``: rows in the order of frames. ``worlds``: its matrices, as of ``body``. ``up``: (3,).
+    ``feet``: the paths of the feet that decide when those of the body stand: those of the source of
+    a driven figure; None for the body's own, which may slide.
     """
+    is_own = feet is None
+    feet = body.paths(worlds) if feet is None else feet
     timing = clip.timing
     how = spans_of(timing), timing.frame_rate
     moves = ground_velocity(feet, *how, body.size, up)
@@ -101,15 +111,21 @@ def plant(
         body = replace(body, travel=travel)
         worlds, feet = body.worlds(clip), on_moving_ground(feet, travel)
     speed = 0.0 if moves is None else float(np.linalg.norm(moves))
-    plan = foot_plan(feet, *how, (body.size, body.clearance), up)
+
+    def plan_of(ease: float) -> FootPlan:
+        if is_own:
+            return _own_plan(feet, *how, body.size, up, body.heights(worlds, up), ease)
+        return foot_plan(feet, *how, (body.size, body.clearance), up, ease)
+
+    plan = plan_of(0.0)
     if not any(plan.contacts):
-        return clip, PlantedFeet()
+        return clip, PlantedFeet(n_glides=plan.n_glides)
     best = _attempt(clip, body, worlds, plan, speed, 2)
     for number, ease in enumerate(_EASES, 1):
-        if best.knees <= _CALM:
+        # The knees of a noisy capture move suddenly before anything is changed.
+        if is_own or best.knees <= _CALM:
             break
-        plan = foot_plan(feet, *how, (body.size, body.clearance), up, ease)
-        tried = _attempt(clip, body, worlds, plan, speed, 2 + 3 * number)
+        tried = _attempt(clip, body, worlds, plan_of(ease), speed, 2 + 3 * number)
         if tried.knees < best.knees and tried.changes.after <= tried.changes.source:
             best = tried
     return (best.clip if best.changes.is_better else clip), best.changes
@@ -125,7 +141,7 @@ def _attempt(
 ) -> _Attempt:
     """Return the motion with its feet planted according to a plan; reports progress from a step."""
     report(step, STEPS, "steps")
-    level = levelled(clip, body, worlds, plan)
+    level = clip if plan.is_own else levelled(clip, body, worlds, plan)
     report(step + 1, STEPS, "steps")
     planted, lowered = _planted(level, body, body.worlds(level), plan)
     report(step + 2, STEPS, "steps")
@@ -141,6 +157,7 @@ def _attempt(
         lowered,
         body.size,
         ground_speed,
+        plan.n_glides,
     )
     knees = (
         _knee_accelerations(each, body.legs, plan.spans, plan.rate) for each in (worlds, after)
@@ -179,8 +196,6 @@ def _translated(clip: SampledClip, drop: Floats, roots: Ints) -> SampledClip:
 
 # The plan: contacts of all feet, and the heights of the ground under them.
 
-_SUNK = 0.015  # maximum depth of the source's feet below the ground, relative to the body
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FootPlan:
@@ -200,6 +215,10 @@ class FootPlan:
     """Approximate height of the body."""
     up: Floats
     """(3,). The up axis."""
+    is_own: bool = False
+    """Whether the feet are those of the body itself: clean-up of a capture."""
+    n_glides: int = 0
+    """Number of contacts that are left out because the feet glide too far."""
 
     def stances(self, foot: int) -> Iterator[tuple[Contact, slice, float]]:
         """Return the contacts of a foot, their rows, and the heights of the ground."""
@@ -259,7 +278,7 @@ class FootPlan:
         stands = np.array([contact.height for contact in contacts])
         lowest = np.minimum(levels[before], levels[after])
         sunk = np.minimum(stands[before], stands[after]) - path.lowest(self.up)
-        return lowest - np.maximum(sunk - _SUNK * self.size, 0.0)
+        return lowest - np.maximum(sunk - limits.SUNK * self.size, 0.0)
 
 
 def foot_plan(
@@ -283,6 +302,33 @@ def foot_plan(
     ground = 0.0 if is_usual else level - clearance
     grounds = [[ground + step_height(one, level, size) for one in foot] for foot in contacts]
     return FootPlan(feet, contacts, grounds, spans, rate, size, up)
+
+
+def _own_plan(
+    feet: list[FootPath],
+    spans: list[tuple[int, int]],
+    rate: float,
+    size: float,
+    up: Floats,
+    heights: Floats,
+    ease: float,
+) -> FootPlan:
+    """Return the contacts of a capture's own feet, whose soles keep their heights, (N, L)."""
+    found = foot_contacts(feet, spans, rate, size, up, ease, limits.SLIPS)
+    free = FootPlan(feet, found, [[] for _ in feet], spans, rate, size, up)
+    contacts: list[list[Contact]] = []
+    grounds: list[list[float]] = []
+    for number, (foot, some) in enumerate(zip(feet, found, strict=True)):
+        kept = []
+        for contact in some:
+            path = np.cumsum(free.steps((foot.toe, foot.heel), contact), axis=0)
+            if np.linalg.norm(path - path.mean(axis=0), axis=1).max() <= limits.FARTHEST * size:
+                kept.append(contact)
+        contacts.append(kept)
+        rows = [np.flatnonzero(one.hold > 0.5 * one.hold.max()) + one.start for one in kept]
+        grounds.append([float(np.median(heights[each, number])) for each in rows])
+    n_glides = sum(map(len, found)) - sum(map(len, contacts))
+    return replace(free, contacts=contacts, grounds=grounds, is_own=True, n_glides=n_glides)
 
 
 # Level soles.
@@ -449,14 +495,15 @@ def _foot_shifts(
 def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
     """Return the corrections of a foot.
 
-    At the beginning and end of a contact, the foot follows the source's foot.
+    At the beginning and end of a contact, the foot follows the source's foot. A capture's own foot
+    does not follow itself: there its correction only gets weaker, as its own steps are noise.
     """
     path = plan.feet[foot]
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
     is_flat, holds = np.zeros(len(heights), dtype=np.bool_), np.zeros(len(heights))
     low = path.lowest(plan.up)
     for contact, rows, ground in plan.stances(foot):
-        loose = 1.0 - contact.hold
+        loose = np.zeros_like(contact.hold) if plan.is_own else 1.0 - contact.hold
         wanted = loose[:, None] * plan.steps((path.toe, path.heel), contact)
         steps = np.cumsum(plan.steps(points, contact) - wanted, axis=0)
         flat[rows], is_flat[rows] = steps.mean(axis=0) - steps, True
@@ -493,7 +540,8 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0
         targets[foot] = np.where(wanted.is_flat[:, None], wanted.flat - flat, 0.0)
         targets[count + foot, :, 0] = np.where(wanted.holds > 0.0, wanted.rise - usual, 0.0)
         weights[[foot, count + foot]] = wanted.holds
-    targets = _calmed(plan, targets, weights)
+    if not plan.is_own:
+        targets = _calmed(plan, targets, weights)
     found = _smoothed(plan, targets, _strength(weights))
     result, lifted = [], 1.0 + _LIFTED * (_EASE * plan.rate) ** 4
     for foot, wanted in enumerate(every):

@@ -52,7 +52,7 @@ def plant_feet(
     source = cast("SampledClip", in_frame_order(found.source.clip))
     worlds = body.worlds(clip)
     feet = _source_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
-    planted, changes = plant(clip, body, worlds, feet, up)
+    planted, changes = plant(clip, body, worlds, up, feet)
     return (planted if changes.is_better else found.clip), changes
 
 
