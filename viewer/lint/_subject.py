@@ -22,8 +22,12 @@ from viewer.lint._finding import NO_INDICES, NO_TIMES, Finding, LintOptions
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
+from viewer.rig.feet.body import body_size
+from viewer.rig.feet.contacts import FootPath
+from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.motion.clip import Clip
@@ -201,6 +205,10 @@ class Track:
     feet."""
     soles: Floats
     """(F, N): height of each foot's lowest point in the scene."""
+    paths: tuple[FootPath, ...]
+    """Path of each foot in the scene."""
+    body: float
+    """Size of the body: twice the length of its longest leg, or its height, in scene units."""
 
     @property
     def n_frames(self) -> int:
@@ -244,6 +252,7 @@ def _track(subject: Subject) -> Track | None:
     soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
+    heels = np.empty((count, len(feet), 3))
     axis = actor.placement[2 if subject.up == "z" else 1]
     for start in range(0, count, _TOGETHER):
         part = slice(start, start + _TOGETHER)
@@ -251,7 +260,16 @@ def _track(subject: Subject) -> Track | None:
         joints[part] = world[..., :3, 3]
         if soles is not None:
             lowest[part] = soles.heights(world, axis, scale)
-    placed = joints @ actor.placement[:3, :3].T + actor.placement[:3, 3]
+            heels[part] = np.einsum("fnab,nb->fna", world[:, soles.ankles, :3], soles.heels)
+    placed = apply_transform(actor.placement, joints)
+    hips = {leg.ankle: leg.hip for leg in legs_of(skeleton)}
+    paths = []
+    for number, foot in enumerate(feet.tolist()):
+        heel = apply_transform(actor.placement, heels[:, number])
+        ankle = int(soles.ankles[number]) if soles is not None else foot
+        # Without a hip, the body is assumed to stand.
+        hip = placed[:, hips[ankle]] if ankle in hips else heel + np.eye(3)["xyz".index(subject.up)]
+        paths.append(FootPath(placed[:, foot] if foot != ankle else heel, heel, hip))
     return Track(
         times=times + actor.offset,
         numbers=numbers,
@@ -263,6 +281,8 @@ def _track(subject: Subject) -> Track | None:
         scale=scale,
         feet=feet,
         soles=lowest,
+        paths=tuple(paths),
+        body=scale * body_size(figure),
     )
 
 

@@ -9,6 +9,14 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject, Track, track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
+from viewer.rig.feet import limits
+from viewer.rig.feet.contacts import (
+    foot_contacts,
+    ground_velocity,
+    half_window,
+    on_moving_ground,
+    slowest_points,
+)
 from viewer.rig.feet.ground import Ground, ground_of, resting_frames
 from viewer.rig.feet.soles import extent
 from viewer.rig.figure import Figure
@@ -21,15 +29,6 @@ _FLOATS = 0.03  # height above the ground relative to the height at rest: 51 mm 
 _STEPS = 0.06
 _RESTS = 0.3  # minimum seconds for which the lower foot rests: at the top of a jump, it is 0.1
 _FACTOR = 3.0  # multiple of the limit above which even a single frame is reported
-# Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
-_TOUCHES = 0.02  # maximum height of a foot that touches the ground
-_SLIDES = 0.15  # minimum speed that counts as sliding, per second
-_DRIFTS = 0.5  # per second: a foot that stood still and then moves faster starts to swing
-_LASTS = 0.2  # seconds for which a foot slides; starting and landing take less
-_SWINGS = 1.0  # maximum speed, per second: a faster foot swings just above the ground
-_DRAGS = 1.0  # seconds for which only a dragged foot stays low and moves: swings are shorter
-_FAR = 0.03  # minimum total distance during one contact
-_WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames are noisy
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -167,93 +166,74 @@ def _slipped(
     heights: Floats,
     up: int,
 ) -> list[Finding]:
-    """Report a foot that slides along the ground during contact."""
-    stands = (np.abs(heights) < _TOUCHES * track.size) & track.present[:, None]
+    """Report a foot that slides along the ground, where feet do not stand.
+
+    Contacts are those that clean-up and retargeting hold, so a planted foot never slides.
+    """
     step = float(track.times[1] - track.times[0])
-    width = max(1, round(_WINDOW / step))
-    if len(track.times) <= width + 2:
+    paths, how = list(track.paths), (runs_of(track.present), 1.0 / step, track.body, np.eye(3)[up])
+    velocity = ground_velocity(paths, *how)
+    if velocity is not None:  # a motion in place: standing feet move with the ground
+        paths = on_moving_ground(paths, (track.times[0] - track.times)[:, None] * velocity)
+    speeds = np.stack([slowest_points(path, *how) for path in paths], axis=1)
+    stands = np.zeros(speeds.shape, dtype=np.bool_)
+    for foot, contacts in enumerate(foot_contacts(paths, *how)):
+        for contact in contacts:
+            stands[contact.start : contact.stop, foot] = True
+    touches = (np.abs(heights) < limits.TOUCHES * track.body) & track.present[:, None]
+    # Speeds are averaged over a window, so a foot must touch the ground in all of it.
+    half, n_frames = half_window(1.0 / step) + 1, len(touches)
+    for foot in range(len(feet)):
+        for first, last in runs_of(touches[:, foot]):
+            touches[first : first + half * (first > 0), foot] = False
+            touches[max(last - half * (last < n_frames), 0) : last, foot] = False
+    slides = _sliding(speeds / track.body, touches & ~stands, stands, step)
+    # Distances by the trapezoidal rule; averaged speeds contain less noise than single steps.
+    both = slides[1:] & slides[:-1]
+    distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
+    if not (distances > limits.FAR * track.body).any():
         return []
-    flat = [axis for axis in range(3) if axis != up]
-    along = track.positions[:, feet][..., flat]
-    moved = np.linalg.norm(along[width:] - along[:-width], axis=2)
-    speeds = moved / (width * step)
-    low = _held(stands, width)
-    shortest, longest = (max(1, round(seconds / step)) for seconds in (_LASTS, _DRAGS))
-    slides = _sliding(speeds / track.size, low, shortest, longest)
-    paths = np.array([_path(along[:, foot], slides[:, foot], width) for foot in range(len(feet))])
-    if not (paths > _FAR * track.size).any():
-        return []
-    worst = int(paths.argmax())
-    frames = np.flatnonzero(slides.any(axis=1)) + width
+    worst = int(distances.argmax())
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
-    each = track.of_each(np.concatenate([[fastest + width], frames]))
+    each = track.of_each(np.concatenate([[fastest], np.flatnonzero(slides.any(axis=1))]))
     return [
         subject.found(
             "C007.foot",
             n=len(each),
             all=track.n_frames,
             joint=labels[worst],
-            distance=subject.length(float(paths[worst] / track.scale)),
+            distance=subject.length(float(distances[worst] / track.scale)),
             speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
-            frame=int(track.numbers[fastest + width]),
+            frame=int(track.numbers[fastest]),
             part="clip",
             joints=[feet[worst]],
             frames=track.numbers[each],
             times=track.times[each],
-            at=("frames", fastest + width),
+            at=("frames", fastest),
         )
     ]
 
 
-def _sliding(speeds: Floats, low: Bools, shortest: int, longest: int) -> Bools:
-    """Return the windows in which low feet slide: (W, N).
+def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:
+    """Return the frames in which low feet slide: (F, N).
 
-    A foot swings close to the ground as well, but while another foot stands still and only after
-    speeding up. So a foot slides if it stood still before and does not speed up much, or if no
-    other foot stands still. Starting and landing feet slide only for short times. A foot that stays
+    A foot also swings close to the ground, but while another foot stands, and only after speeding
+    up. So a foot slides if it stood before or stands afterwards and does not speed up much, or if
+    no other foot stands. Starting and landing feet slide only for short times. A foot that stays
     low and moves for longer than any swing is dragged.
 
-    ``speeds``: (W, N), horizontal speeds relative to the size of the skeleton. ``low``: (W, N),
-    Windows in which feet touch the ground. ``shortest``: number of windows that sliding lasts at
-    least. ``longest``: number of windows that a swing lasts at most.
+    ``speeds``: (F, N), body sizes per second. ``low``: (F, N), where feet touch the ground but do
+    not stand. ``step``: seconds between frames.
     """
-    rests = low & (speeds < _SLIDES)
-    drifts = low & (speeds < _DRIFTS)
-    stands = np.zeros_like(low)
-    for foot in range(low.shape[1]):
-        for first, last in runs_of(drifts[:, foot]):
-            stands[first:last, foot] = rests[first:last, foot].any()
-    moves = low & (speeds > _SLIDES) & (speeds < _SWINGS)
-    result = moves & (stands | (stands.sum(axis=1) == 0)[:, None])
-    for foot in range(low.shape[1]):
+    moves = low & (speeds > limits.FAST) & (speeds < limits.SWINGS)
+    result = np.zeros_like(moves)
+    for foot in range(moves.shape[1]):
+        is_alone = ~np.delete(stands, foot, axis=1).any(axis=1)
         for first, last in runs_of(moves[:, foot]):
-            result[first:last, foot] |= last - first > longest
-    for foot in range(low.shape[1]):
+            stood = bool(stands[max(first - 1, 0) : last + 1, foot].any())
+            drifts = stood and bool(speeds[first:last, foot].max() < limits.DRIFTS)
+            is_dragged = (last - first) * step > limits.DRAGS_FOR
+            result[first:last, foot] = is_alone[first:last] | drifts | is_dragged
         for first, last in runs_of(result[:, foot]):
-            result[first:last, foot] &= last - first >= shortest
-    return result
-
-
-def _path(along: Floats, slides: Bools, width: int) -> float:
-    """Return the distance that a foot slides in all windows, in steps of one window.
-
-    Single frames are noisy: their steps would add up to a longer distance.
-    """
-    edges = np.diff(slides.astype(np.int8), prepend=0, append=0)
-    total = 0.0
-    for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
-        end = last - 1 + width  # the last frame of the run's last window
-        knots = np.append(np.arange(first, end, width), end)
-        total += float(np.linalg.norm(np.diff(along[knots], axis=0), axis=1).sum())
-    return total
-
-
-def _held(stands: Bools, width: int) -> Bools:
-    """Return the frames around which a foot is in contact for a window plus a frame at each end."""
-    sums = np.concatenate([np.zeros((1, stands.shape[1]), int), np.cumsum(stands, axis=0)])
-    count = len(stands) - width
-    first = np.maximum(np.arange(count) - 1, 0)
-    last = np.minimum(np.arange(count) + width + 2, len(stands))
-    whole = sums[last] - sums[first] == (last - first)[:, None]
-    result: Bools = np.asarray(whole, dtype=np.bool_)
+            result[first:last, foot] = last - first >= max(1, round(limits.SLIDES_FOR / step))
     return result

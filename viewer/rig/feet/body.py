@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.feet.contacts import FootPath
-from viewer.rig.feet.legs import Leg, reach
+from viewer.rig.feet.legs import Leg, legs_of, reach
 from viewer.rig.feet.soles import Soles, extent, soles_of_feet
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -20,7 +20,7 @@ from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import figure_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import rest_joints, shaped
 from viewer.rig.skeleton import Skeleton
 
 _UNEVEN = 1e-3  # maximum relative difference of a joint's scale factors
@@ -37,8 +37,6 @@ class BodyLegs:
     """The legs, as indices into ``chains``."""
     soles: Soles
     """Soles of the feet, as indices into ``chains``."""
-    heels: Floats
-    """(L, 4). A point of the sole below each ankle, in the ankle's space, homogeneous."""
     level: Floats
     """(L, 3). The direction that points up in a standing foot, in the ankle's space."""
     toe_level: Floats
@@ -97,7 +95,7 @@ class BodyLegs:
         """Return the paths of the balls and the heels of all feet: (N, 3) each."""
         return [
             (worlds[:, leg.toe, :3, 3], worlds[:, leg.ankle, :3] @ heel)
-            for leg, heel in zip(self.legs, self.heels, strict=True)
+            for leg, heel in zip(self.legs, self.soles.heels, strict=True)
         ]
 
 
@@ -133,20 +131,22 @@ def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) ->
         Leg(*(int(place[joint]) for joint in (leg.hip, leg.knee, leg.ankle, leg.toe)))
         for leg in legs
     )
-    moved = replace(soles, joints=place[soles.joints], movers=place[soles.movers])
+    moved = replace(
+        soles,
+        joints=place[soles.joints],
+        movers=place[soles.movers],
+        ankles=place[soles.ankles],
+    )
     ankles = world[[leg.ankle for leg in own]]
     floor = extent(body)[0]
-    below = ankles[:, :3, 3] - (ankles[:, :3, 3] @ up - floor)[:, None] * up
-    inverse = np.linalg.inv(ankles)
-    heels = np.einsum("lab,lb->la", inverse, np.append(below, np.ones((len(own), 1)), axis=1))
-    level = np.einsum("lab,b->la", inverse[:, :3, :3], up)
+    level = np.einsum("lab,b->la", np.linalg.inv(ankles[:, :3, :3]), up)
     balls = world[[leg.toe for leg in own]]
     toe_level = np.einsum("lab,b->la", np.linalg.inv(balls[:, :3, :3]), up)
     toes = balls[:, :3, 3] @ up
-    extensions, size = _extensions(world[None], own)[0], _size(world, own)
+    extensions, size = _extensions(world[None], own)[0], _size(world[:, :3, 3], own)
     clearance = float(toes.mean() - floor)
     levels = level, toe_level
-    return BodyLegs(chains, own, moved, heels, *levels, rests, extensions, size, clearance)
+    return BodyLegs(chains, own, moved, *levels, rests, extensions, size, clearance)
 
 
 def is_solvable(linear: Floats) -> bool:
@@ -166,15 +166,20 @@ def _extensions(worlds: Floats, legs: tuple[Leg, ...]) -> Floats:
     return result
 
 
-def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
+def _size(points: Floats, legs: Sequence[Leg]) -> float:
     """Return the approximate height of a body, twice the length of its longest leg."""
-    points = world[:, :3, 3]
     lengths = [
         np.linalg.norm(points[leg.knee] - points[leg.hip])
         + np.linalg.norm(points[leg.ankle] - points[leg.knee])
         for leg in legs
     ]
     return 2.0 * float(max(lengths))
+
+
+def body_size(figure: Figure) -> float:
+    """Return the size of a figure to which ``limits`` relate; its height if legs have no names."""
+    legs = legs_of(figure.require_skeleton())
+    return _size(rest_joints(figure), legs) if legs else extent(figure)[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

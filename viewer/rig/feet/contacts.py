@@ -190,13 +190,37 @@ def step_height(contact: Contact, level: float, size: float) -> float:
     return 0.0 if is_tiptoe or abs(height) < limits.LEVEL * size else height
 
 
+def half_window(rate: float) -> int:
+    """Return the number of rows before and after a row over which its speed is averaged."""
+    return max(1, round(0.5 * limits.WINDOW * rate))
+
+
 def mean_speeds(places: Floats, rate: float) -> Floats:
     """Return speeds (N,) averaged over a window around each frame."""
-    half = max(1, round(0.5 * limits.WINDOW * rate))
+    half = half_window(rate)
     frames = np.arange(len(places))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
     moved = np.linalg.norm(places[after] - places[before], axis=1)
     return moved * rate / np.maximum(after - before, 1)
+
+
+def slowest_points(
+    foot: FootPath, spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
+) -> Floats:
+    """Return the speed along the ground of a foot: (N,), that of its slowest point on the ground.
+
+    A foot that rolls or turns about its ball or its heel does not slide, although the other end
+    moves.
+    """
+    low, result = foot.lowest(up), np.zeros(len(foot.toe))
+    flat = np.eye(3) - np.outer(up, up)
+    for first, last in spans:
+        part, found = slice(first, last), []
+        for points in (foot.toe[part], foot.heel[part]):
+            is_on = points @ up < low[part] + limits.HIGH * size
+            found.append(np.where(is_on, mean_speeds(points @ flat, rate), np.inf))
+        result[part] = np.minimum(*found)
+    return result
 
 
 # Speed of the ground below motions in place, as on a treadmill or with the travel removed.
@@ -235,7 +259,7 @@ def _speeds(
     feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, up: Floats
 ) -> tuple[Floats, Floats]:
     """Return the horizontal velocities of the lowest foot and of the hips, (M, 3) per second."""
-    half = max(1, round(0.5 * limits.WINDOW * rate))
+    half = half_window(rate)
     lowest = np.array([foot.lowest(up) for foot in feet]).argmin(axis=0)
     found, body = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for first, last in spans:

@@ -71,8 +71,9 @@ a leg could not follow."""
 TOUCHES = 0.027
 """Maximum height of the sole of a foot that touches the ground, 45 mm: captures and guessed grounds
 are inexact."""
-DRIFTS = 0.67
-"""A foot that stood and then moves faster than this, 1.1 m/s, starts to swing."""
+DRIFTS = 0.4
+"""A foot that stood and then moves faster than this, 0.7 m/s, swings; feet of captures skate at up
+to 0.5 m/s while another foot stands."""
 SWINGS = 1.34
 """Minimum speed, 2.3 m/s, of a foot that always swings, however near to the ground."""
 SLIDES_FOR = 0.2

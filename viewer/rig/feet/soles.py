@@ -9,7 +9,9 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
+from viewer.rig.pose import rest_pose
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton
@@ -36,6 +38,10 @@ class Soles:
     """(P, 3). Positions of the points in that joint's space."""
     above: Floats
     """(P,). Height of each point above the sole at rest: 0 on a mesh."""
+    ankles: Ints
+    """(N,) int32. The ankle of each foot, or its ball if the ankle is unknown."""
+    heels: Floats
+    """(N, 4). The point of the sole below each ankle at rest, in the ankle's space, homogeneous."""
 
     def heights(self, world: Floats, axis: Floats, scale: float) -> Floats:
         """Return the height of the lowest point of each foot.
@@ -105,7 +111,16 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
         parts.append((np.full(len(mover), number), mover, place, above))
     every, movers, places, above = (np.concatenate(column) for column in zip(*parts, strict=True))
     nearest = np.array([found[0] for found in feet], dtype=np.int32)
-    return Soles(nearest, every.astype(np.int32), movers.astype(np.int32), places, above)
+    ankles = np.array([found[-1] for found in feet], dtype=np.int32)
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0
+    rest = world_matrices(skeleton, pose)[ankles]
+    below = rest[:, :, 3].copy()
+    below[:, _axis(figure)] = sole
+    # The pseudoinverse also exists for joints with a scale of 0.
+    heels = np.einsum("nab,nb->na", np.linalg.pinv(rest), below)
+    every, movers = every.astype(np.int32), movers.astype(np.int32)
+    return Soles(nearest, every, movers, places, above, ankles, heels)
 
 
 def _whole_foot(skeleton: Skeleton, found: Sequence[int]) -> Bools:

@@ -1,0 +1,59 @@
+"""Feet that were planted or held do not slide: detector and limits are those of the planner."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from rig.retargeting.rest_twins import t_pose, written
+from rig.retargeting.standing_motions import jump, kneel, treadmill
+from rig.retargeting.test_standing_feet import jerky_walk
+from rig.retargeting.walking import RATE, walk
+
+from viewer.export import MotionOptions, export_animation
+from viewer.lint import lint_scene
+from viewer.loading import MotionSettings, bundled_body, load
+from viewer.loading.cleaning import clean_up
+from viewer.loading.settings import CleanUp
+from viewer.rig.motion.sampled_animation import sample_animation
+from viewer.rig.scene import Actor, Scene
+
+MOTIONS = {
+    "walk": walk,
+    "stairs": lambda: walk(rise=8.0),
+    "jump": lambda: jump()[:2],
+    "kneel": kneel,
+    "treadmill": treadmill,
+    "jerky walk": jerky_walk,
+}
+
+
+def path_of(name: str, folder: Path) -> Path:
+    """Write a motion as a BVH file."""
+    path = folder / f"{name}.bvh"
+    motion = written(t_pose(), *MOTIONS[name](), rate=RATE)
+    actor = Actor(motion.figure, clip=motion.clip)
+    export_animation(sample_animation(actor), path, "bvh", MotionOptions())
+    return path
+
+
+def slides(scene: Scene) -> list[str]:
+    return [str(found.diagnostic) for found in lint_scene(scene) if found.code == "C007"]
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_planted_feet_do_not_slide(name: str, tmp_path: Path) -> None:
+    scene = load(path_of(name, tmp_path), bundled_body())
+    assert any(note.key == "F007.feet-planted" for note in scene.diagnostics)
+    assert slides(scene) == []
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_locked_feet_of_a_capture_do_not_slide(name: str, tmp_path: Path) -> None:
+    scene = load(path_of(name, tmp_path), bundled_body(), motion=MotionSettings(feet=False))
+    assert "X006.locked" in {note.key for note in clean_up(scene, CleanUp(locks_feet=True))}
+    assert slides(scene) == []
+
+
+def test_planted_feet_of_shared_motions_do_not_slide(shared_data: Path) -> None:
+    assert slides(load(shared_data / "motion" / "makehuman" / "walk1.bvh", bundled_body())) == []
