@@ -109,6 +109,7 @@ HOMES = {
     },
     "av": {"media/video.py", "media/video_frames.py"},
     "isal": {"media/png.py"},
+    "orjson": {"formats/_text"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
     "pebble": {"batching/engines/processes.py"},

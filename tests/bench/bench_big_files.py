@@ -7,11 +7,6 @@ peaks are those of child processes above their memory after importing the packag
 Text of motions is converted part by part, so its memory peak does not depend on the number of
 frames. To show this, a quarter of the frames is measured too.
 
-Numbers with an exponent are parsed at a lower rate relative to numpy. The profile is flat: finding
-the words takes a third of the time, and each group of digits (before the point, after it, and in
-the exponent) about a fifth. An exponent adds such a group and the search for its mark, whereas
-numpy.fromstring is faster per byte of longer words.
-
 ``--full`` uses files of a size that users notice: 430 MB of .skin, 100,000 frames.
 """
 

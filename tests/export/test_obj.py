@@ -132,7 +132,7 @@ def test_numbers_have_nine_digits(tmp_path):
     obj, _ = write(tmp_path, Actor(figure))
     assert_allclose(obj.v[3:].ravel(), values, rtol=5e-9, atol=0)
     text = (tmp_path / "out.obj").read_text()
-    assert "v 0.333333333 -285714.286 1.23456789e-05\n" in text
+    assert "v 0.333333333 -285714.286 0.0000123456789\n" in text
     assert "v 123456789 0 1e-300\n" in text  # no -0
 
 

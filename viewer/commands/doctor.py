@@ -38,6 +38,7 @@ _PACKAGES = (
     "pyrr",
     "pillow",
     "platformdirs",
+    "orjson",
     "rich",
     "shtab",
 )

@@ -40,7 +40,7 @@ from viewer.export._gaps import kept_gaps, kept_note
 from viewer.export._losses.between import rate_note, resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
-from viewer.formats._text.number_text import fixed, row_texts
+from viewer.formats._text.number_text import fixed_texts
 from viewer.interrupts import hold, poll
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import printable
@@ -254,8 +254,7 @@ class _ReadRecords:
 
 
 def _row_texts(rows: Floats) -> list[str]:
-    parts = row_texts(rows, lambda numbers: fixed(numbers, _DIGITS), b", ")
-    return b"".join(parts).decode("ascii").splitlines()
+    return b"".join(fixed_texts(rows, _DIGITS, b", ")).decode("ascii").splitlines()
 
 
 def _used(rows: Floats, count: int) -> Floats:

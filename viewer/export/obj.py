@@ -20,7 +20,7 @@ from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._losses.posed import PoseLosses, look_at_mesh
 from viewer.export._motion_paths import numbered_paths
 from viewer.formats import Source, all_or_none, free_path, save_bytes, save_parts
-from viewer.formats._text.number_text import Digits, integers, row_texts, shortest, significant
+from viewer.formats._text.number_text import row_texts
 from viewer.media.png import encode_png
 from viewer.phrases import printable
 from viewer.rig.arrays import Bytes, Floats, Ints
@@ -168,12 +168,8 @@ def _colored(positions: Floats, colors: Floats | None) -> Floats:
 
 def _rows(keyword: str, rows: Floats, is_short: bool = True) -> Iterator[bytes]:
     """Yield lines of numbers, with nine digits or with all."""
-
-    def digits(numbers: Floats) -> Digits:
-        return significant(numbers, _DIGITS) if is_short else shortest(numbers)
-
     # Adding 0 makes -0 positive.
-    return row_texts(rows + 0.0, digits, start=f"{keyword} ".encode())
+    return row_texts(rows + 0.0, _DIGITS if is_short else None, start=f"{keyword} ".encode())
 
 
 def _faces(mesh: Mesh, materials: Sequence[str], has_library: bool) -> Iterator[bytes]:
@@ -187,9 +183,8 @@ def _faces(mesh: Mesh, materials: Sequence[str], has_library: bool) -> Iterator[
         uv = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
         corners.append(uv + 1)
     corners.append(mesh.triangles + 1)
-    within = [b"/" if mesh.uvs is not None else b"//"] * (len(corners) - 1)
-    between = [*within, b" ", *within, b" ", *within]
-    table: Ints = np.stack(corners, axis=2).reshape(mesh.n_triangles, 3 * len(corners))
+    within = b"/" if mesh.uvs is not None else b"//"
+    table: Ints = np.stack(corners, axis=2)
     of_material = mesh.material_indices if materials else np.full(mesh.n_triangles, -1)
     kinds = np.stack([mesh.part_indices, of_material], axis=1)
     edges = np.flatnonzero((kinds[1:] != kinds[:-1]).any(axis=1)) + 1
@@ -204,7 +199,7 @@ def _faces(mesh: Mesh, materials: Sequence[str], has_library: bool) -> Iterator[
             name = materials[material] if material >= 0 else _plain_name(materials)
             yield f"usemtl {name}\n".encode("utf-8", "surrogateescape")
         now = [part, material]
-        yield from row_texts(table[first:last], integers, between, start=b"f ")
+        yield from row_texts(table[first:last], within=within, start=b"f ")
 
 
 def _part_name(name: str) -> str:

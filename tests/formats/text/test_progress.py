@@ -5,7 +5,7 @@ import pytest
 
 from viewer.export import export
 from viewer.formats import Source, obj, ply, write
-from viewer.formats._text.number_text import integers, row_texts
+from viewer.formats._text.number_text import row_texts
 from viewer.media.saving import save_parts
 from viewer.progress import Cancelled, receiving, report
 from viewer.rig.scene import Actor
@@ -56,7 +56,7 @@ def test_cancelled_writing_keeps_the_old_file(tmp_path):
 
     (tmp_path / "a.txt").write_text("old")
     with receiving(receive), pytest.raises(Cancelled):
-        save_parts(tmp_path / "a.txt", row_texts(np.zeros((9, 9), np.int32), integers))
+        save_parts(tmp_path / "a.txt", row_texts(np.zeros((9, 9), np.int32)))
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("a.txt", "old")]
 
 

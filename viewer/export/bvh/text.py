@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from viewer.formats._text.number_text import fixed, row_texts
+from viewer.formats._text.number_text import fixed_texts
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
@@ -160,7 +160,7 @@ def frame_texts(
             if joint == order[0] or moves[joint]:
                 columns.append(positions[rows, joint])
             columns.append(degrees[:, joint])
-        yield from row_texts(np.concatenate(columns, axis=1), lambda part: fixed(part, digits))
+        yield from fixed_texts(np.concatenate(columns, axis=1), digits)
 
 
 def _vector(values: Floats, digits: int) -> str:

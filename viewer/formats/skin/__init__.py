@@ -225,9 +225,9 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
 
 
 def _table(name: str, rows: Floats) -> list[Iterable[bytes]]:
-    from viewer.formats._text.number_text import row_texts, shortest
+    from viewer.formats._text.number_text import row_texts
 
-    return _section(name, len(rows), row_texts(rows, shortest, start=b"  "))
+    return _section(name, len(rows), row_texts(rows, start=b"  "))
 
 
 def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[bytes]]:
@@ -237,7 +237,7 @@ def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[byt
 
 def _triangle_runs(mesh: Mesh) -> list[Iterable[bytes]]:
     """Return the triangles sections, each after its material, as assigned by the reader."""
-    from viewer.formats._text.number_text import integers, row_texts
+    from viewer.formats._text.number_text import row_texts
 
     indices = mesh.material_indices
     edges = np.flatnonzero(np.diff(indices)) + 1
@@ -251,7 +251,7 @@ def _triangle_runs(mesh: Mesh) -> list[Iterable[bytes]]:
             parts.append([_material_text(mesh.materials[index])])
             written = index + 1
         rows = mesh.triangles[first:last]
-        parts += _section("triangles", len(rows), row_texts(rows, integers, start=b"  "))
+        parts += _section("triangles", len(rows), row_texts(rows, start=b"  "))
     parts.append(map(_material_text, mesh.materials[written:]))
     return parts
 

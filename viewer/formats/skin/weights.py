@@ -7,6 +7,7 @@ parsed together; otherwise every word is examined, and an unreadable vertex gets
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._source import Source
-from viewer.formats._text.number_text import integers, joined, shortest
+from viewer.formats._text.number_text import dumped
 from viewer.formats._text.numbers import parse_numbers
 from viewer.formats.skin.tables import Block, OffsetOf, to_whole, words_of
 from viewer.rig.arrays import Floats, Ints
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 _LEAP = 16  # number of vertices that each step of the Python loop skips
 _SMALL = 1 << 29  # maximum count of numbers for which three times the count fits into an int32
 _AT_ONCE = 2048  # number of vertices that are formatted together
-_SEPARATORS = (b" ", b"\n  ")
 _Places = NDArray[np.int64]
 Influences = tuple[Ints, Ints, Floats, OffsetOf]
 
@@ -246,22 +246,16 @@ def weights_lines(skin: Skin) -> Iterator[bytes]:
     for first in range(0, skin.n_vertices, _AT_ONCE):
         starts = skin.starts[first : first + _AT_ONCE + 1]
         used = slice(int(starts[0]), int(starts[-1]))
-        text = _lines_text(starts - starts[0], skin.joints[used], skin.weights[used])
-        # The separator of lines ends with the indentation of the next line.
-        yield b"  " + text[:-2]
+        words = [b""] * (2 * (used.stop - used.start))
+        words[0::2] = _words(skin.joints[used])
+        words[1::2] = _words(skin.weights[used])
+        ends = (2 * (starts - starts[0])).tolist()
+        lines = [
+            b" ".join([b"  %d" % ((last - begin) // 2), *words[begin:last]])
+            for begin, last in pairwise(ends)
+        ]
+        yield b"\n".join([*lines, b""])
 
 
-def _lines_text(starts: Ints, joints: Ints, weights: Floats) -> bytes:
-    """Return lines of a count followed by pairs of a joint and a weight."""
-    counts = np.diff(starts)
-    heads = 2 * starts[:-1] + np.arange(len(counts))
-    is_count = np.zeros(2 * len(joints) + len(counts), dtype=np.bool_)
-    is_count[heads] = True
-    pairs = np.flatnonzero(~is_count)
-    whole = np.zeros(len(is_count), dtype=np.int64)
-    whole[heads], whole[pairs[0::2]] = counts, joints
-    numbers = integers(whole)
-    numbers.put(shortest(weights), pairs[1::2])
-    which = np.zeros(len(is_count), dtype=np.uint8)
-    which[heads[1:] - 1] = which[-1] = 1
-    return joined(numbers, _SEPARATORS, which)
+def _words(values: Ints | Floats) -> list[bytes]:
+    return dumped(values)[1:-1].split(b",") if len(values) else []
