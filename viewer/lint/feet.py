@@ -170,6 +170,8 @@ def _slipped(
 
     Contacts are those that clean-up and retargeting hold, so a planted foot never slides.
     """
+    if track.body <= 0.0:  # legs without a length
+        return []
     step = float(track.times[1] - track.times[0])
     paths, how = list(track.paths), (runs_of(track.present), 1.0 / step, track.body, np.eye(3)[up])
     velocity = ground_velocity(paths, *how)
@@ -228,7 +230,7 @@ def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:
     moves = low & (speeds > limits.FAST) & (speeds < limits.SWINGS)
     result = np.zeros_like(moves)
     for foot in range(moves.shape[1]):
-        is_alone = ~np.delete(stands, foot, axis=1).any(axis=1)
+        is_alone = np.delete(stands, foot, axis=1).sum(axis=1) == 0
         for first, last in runs_of(moves[:, foot]):
             stood = bool(stands[max(first - 1, 0) : last + 1, foot].any())
             drifts = stood and bool(speeds[first:last, foot].max() < limits.DRIFTS)
