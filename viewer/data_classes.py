@@ -13,7 +13,18 @@ from operator import attrgetter
 from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["dataclass"]
+__all__ = ["dataclass", "setting"]
+
+
+def setting(default: Any, help: str = "", **metadata: Any) -> Any:
+    """Return a field of a settings class, from which options of commands are made.
+
+    ``default``: its only statement; a list is copied. ``help``: text of the option, in which
+    ``{default}`` stands for the default. ``metadata``: other facts, which
+    ``viewer.commands._settings`` lists.
+    """
+    of = {"default_factory": default.copy} if isinstance(default, list) else {"default": default}
+    return dataclasses.field(**of, metadata={"help": help, **metadata})
 
 
 class _Factory:

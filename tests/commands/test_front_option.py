@@ -11,7 +11,8 @@ from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.commands._view import add_camera_arguments, camera_of
+from viewer.commands._settings import settings_of
+from viewer.commands._view import ViewOptions, add_camera_arguments, camera_of
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.offscreen import default_camera
 from viewer.rig.scene import scene_points
@@ -75,7 +76,8 @@ def test_window_has_the_same_first_view(tmp_path):
     parser = argparse.ArgumentParser()
     add_camera_arguments(parser)
     for words, front in (([], 180.0), (["--front=+x"], 90.0)):
-        camera = camera_of(parser.parse_args(words), scene, scene_points(scene), SIZE)
+        view = settings_of(ViewOptions, parser.parse_args(words))
+        camera = camera_of(view, scene, scene_points(scene), SIZE)
         assert camera.front == front
         away = camera.azimuth - front - 35.0
         assert np.cos(np.radians(away)) == pytest.approx(1.0)

@@ -12,8 +12,7 @@ from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.commands._usage import command_parser
-from viewer.commands._view import camera_of
+from viewer.commands._view import ViewOptions, camera_of
 from viewer.rig.scene import scene_points
 
 _SMALL = ("--size", "160x120", "--quality", "draft", "--no-grid", "--background", "white")
@@ -41,15 +40,13 @@ def drawn(tmp_path, rig):
 def test_camera_aims_at_a_joint(rig, name):
     scene = viewer.load(*rig)
     points = scene_points(scene, "skin")
-    arguments = command_parser("render").parse_args(["-o", "x.png", "--look-at", name])
-    aimed = camera_of(arguments, scene, points, (160, 120))
+    aimed = camera_of(ViewOptions(look_at=name), scene, points, (160, 120))
     # The arm is 1 above the root, which the file rotates: R = Rz Ry Rx of (0.25, 0.5, 0.3) rad,
     # with y and z clamped to their limits.
     (sx, sy, sz), (cx, cy, cz) = (f([0.25, 0.5, 0.3]) for f in (np.sin, np.cos))
     wanted = [cz * sy * sx - sz * cx, sz * sy * sx + cz * cx, cy * sx]
     assert_allclose(aimed.target, wanted, atol=1e-12)
-    arguments.look_at = None
-    assert aimed.distance == camera_of(arguments, scene, points, (160, 120)).distance
+    assert aimed.distance == camera_of(ViewOptions(), scene, points, (160, 120)).distance
 
 
 @pytest.mark.slow

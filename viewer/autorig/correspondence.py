@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from viewer.autorig.surface.welding import Welded, edges, weld
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -40,14 +40,28 @@ _CANCELLED = 1e-3
 _CLOSED = 0.25
 _MOST_REVERSED = 0.5  # fraction of the target's area above which an island is reversed
 
+_MAX_ANGLE = 30.0  # usual limit of the angle between matching normals, degrees
+
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
     """Criteria by which a vertex is matched with the template."""
 
-    max_distance: float = 0.05
+    max_distance: float = setting(
+        0.05,
+        "maximum distance of matching points, relative to the target's size (default: {default})",
+        limits=(0.0, math.inf),
+        metavar="X",
+    )
     """Fraction of the target's box diagonal."""
-    max_angle: float = math.radians(30.0)
+    max_angle: float = setting(
+        math.radians(_MAX_ANGLE),
+        f"maximum angle between the normals of matching points (default: {_MAX_ANGLE:g})",
+        given=_MAX_ANGLE,
+        limits=(0.0, 180.0),
+        read=math.radians,
+        metavar="DEG",
+    )
     """Radians between the normals of both surfaces."""
     near_distance: float = 0.005
     near_angle: float = math.radians(60.0)

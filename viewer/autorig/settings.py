@@ -7,7 +7,7 @@ from dataclasses import field
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 
 Report = Callable[[float, str], None]
@@ -28,18 +28,28 @@ JOINTS = ("surface", "alignment")
 class TransferSettings:
     """Options of a rig transfer."""
 
-    method: str = "robust"
-    """A key of ``METHODS``; all other options are for ``"robust"``."""
+    method: str = setting(
+        "robust", "; ".join(f"{name}: {text}" for name, text in METHODS.items()), choices=METHODS
+    )
+    """All other options are for ``"robust"``."""
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     """Known facts about the alignment."""
     weights: WeightSettings = field(default_factory=WeightSettings)
     """Criteria for matching vertices, smoothing, and number of influences."""
-    joints: str = "surface"
-    """One of ``JOINTS``."""
-    fits: bool = True
+    joints: str = setting(
+        "surface",
+        "place joints by the surface around them, or only by the alignment (default: {default})",
+        choices=JOINTS,
+    )
+    fits: bool = setting(
+        True,
+        "keep the template's pose and proportions, even if rotating its joints and scaling its "
+        "limbs would align it with the mesh much better",
+        flag="--no-fit",
+    )
     """Whether the template's joints are rotated and its limbs scaled, if its pose or its
     proportions differ from the target's."""
-    correctives: bool = True
+    correctives: bool = setting(True, "omit the template's pose correctives")
     """Whether pose correctives of the template are transferred."""
     repairs: bool = True
     """Whether the neighbourhoods of singular vertices are smoothed."""

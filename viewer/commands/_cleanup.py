@@ -6,7 +6,8 @@ import argparse
 import re
 from typing import TYPE_CHECKING
 
-from viewer.commands._sequence.frame_numbers import parse_range, rate
+from viewer.commands._frames import parse_range, rate
+from viewer.commands._settings import add_settings, settings_of
 from viewer.loading.settings import CleanUp
 from viewer.phrases import printable
 
@@ -22,49 +23,10 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "clean-up of captures, applied in this order; changes are printed"
     )
-    group.add_argument(
-        "--merge-ids",
-        type=_people,
-        action="append",
-        default=[],
-        metavar="A,B,…",
-        help="IDs of tracks that belong to one person, who keeps ID A; may be repeated",
-    )
-    group.add_argument(
-        "--smooth",
-        nargs="?",
-        type=_filter,
-        const="savgol",
-        metavar="FILTER",
-        help="smooth rotations and translations: savgol (default), savgol:window=7,order=2 (an odd "
-        "number of frames, the degree), one-euro or one-euro:cutoff=3,beta=2 (Hz; Hz per rad/s and "
-        "per m/s)",
-    )
-    _add_feet(group)
-    group.add_argument(
-        "--trim", metavar="A:B", help="keep frames A to B - 1; A or B may be omitted"
-    )
-    group.add_argument(
-        "--resample",
-        type=rate,
-        metavar="R",
-        help="interpolate at R frames per second (--fps instead changes the speed)",
-    )
-
-
-def _add_feet(group: argparse._ArgumentGroup) -> None:
-    """Add the options that put feet on the ground."""
-    group.add_argument(
-        "--lock-feet",
-        action="store_true",
-        help="hold feet in place while they touch the ground; legs follow, and so does the body if "
-        "they are too short",
-    )
-    group.add_argument(
-        "--ground",
-        action="store_true",
-        help="move people up or down until their feet rest at height 0, z = 0 or y = 0",
-    )
+    add_settings(group, CleanUp, "merged", type=_people)
+    add_settings(group, CleanUp, "smoothing", nargs="?", type=_filter, const="savgol")
+    add_settings(group, CleanUp, "locks_feet", "grounds", "frames")
+    add_settings(group, CleanUp, "rate", type=rate)
 
 
 def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
@@ -78,16 +40,8 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
     if arguments.trim is not None:
         span = parse_range(arguments.trim, "--trim", steps=False)
         frames = span.first, span.stop
-    return CleanUp(
-        merged=tuple(arguments.merge_ids),
-        interpolates=arguments.fill_gaps is not None,
-        longest_gap=1.0 if arguments.fill_gaps is None else arguments.fill_gaps,
-        smoothing=arguments.smooth,
-        locks_feet=arguments.lock_feet,
-        grounds=arguments.ground,
-        frames=frames,
-        rate=arguments.resample,
-    )
+    gap = {} if arguments.fill_gaps is None else {"longest_gap": arguments.fill_gaps}
+    return settings_of(CleanUp, arguments, frames=frames, interpolates=bool(gap), **gap)
 
 
 def _people(text: str) -> tuple[int, ...]:

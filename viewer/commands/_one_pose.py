@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._sequence.frame_numbers import numbering_of
+from viewer.commands._frames import numbering_of
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.commands._numbers import number
-from viewer.commands._sequence.frame_numbers import apply_time
+from viewer.commands._frames import Frames, apply_time
+from viewer.commands._settings import add_settings, number
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect, read
@@ -23,7 +24,7 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
-from viewer.rig.skinning import METHODS, Skinning, file_method
+from viewer.rig.skinning import Skinning, file_method
 
 if TYPE_CHECKING:
     from viewer.rig.posing.pose_record import PoseRecord
@@ -32,122 +33,86 @@ _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 _LISTED = 12  # maximum number of names listed in a message
 
 
-def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that shape and pose."""
-    group = parser.add_argument_group("shape and pose, applied in this order")
-    group.add_argument(
-        "--hands", choices=("flat", "mean"), help="hand pose to which hand parameters are added"
+@dataclass(slots=True)
+class PoseOptions:
+    """How the scene is shaped and posed."""
+
+    hands: str | None = setting(
+        None, "hand pose to which hand parameters are added", choices=("flat", "mean")
     )
-    group.add_argument(
-        "--pose",
+    pose: str | None = setting(
+        None,
+        "a pose file (.json, .npz, .txt), or the numbers of the model's pose vector",
         metavar="FILE|A,B,…",
-        help="a pose file (.json, .npz, .txt), or the numbers of the model's pose vector",
     )
-    group.add_argument(
-        "--shape",
+    shape: str | None = setting(
+        None,
+        "shape coefficients (betas) of a body model, or weights of morphs (1: the full target); a "
+        "list in order, or some by name, such as open=0.5,wide=1",
         metavar="A,B,…|NAME=A,…",
-        help="shape coefficients (betas) of a body model, or weights of morphs (1: the "
-        "full target); a list in order, or some by name, such as open=0.5,wide=1",
     )
-    group.add_argument(
-        "--expression", metavar="A,B,…", help="expression coefficients of a body model"
+    expression: str | None = setting(
+        None, "expression coefficients of a body model", metavar="A,B,…"
     )
-    group.add_argument(
-        "--dof",
-        action="append",
-        default=[],
-        metavar="NAME.X=VALUE",
-        help="set a DOF: joint (or #index) and x, y, z for a rotation (radians as in the file, or "
+    dof: list[str] = setting(
+        [],
+        "set a DOF: joint (or #index) and x, y, z for a rotation (radians as in the file, or "
         "30deg) or tx, ty, tz for the root's translation; figure.tx, .ty, .tz, .scale place a "
         "whole figure; may be repeated",
+        metavar="NAME.X=VALUE",
     )
-    group.add_argument("--mirror", action="store_true", help="swap left and right")
+    mirror: bool = setting(False, "swap left and right")
+
+    @property
+    def files(self) -> list[str]:
+        """The pose file, an input that must not be overwritten."""
+        return [self.pose] if self.pose and not _is_numbers(self.pose) else []
+
+
+def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that shape and pose."""
+    add_settings(parser.add_argument_group("shape and pose, applied in this order"), PoseOptions)
 
 
 def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of skinning."""
-    group = parser.add_argument_group("skinning")
-    group.add_argument(
-        "--method",
-        choices=METHODS,
-        help="; ".join(f"{key}: {method.title}" for key, method in METHODS.items())
-        + " (default: as an FBX file states, else lbs)",
-    )
-    group.add_argument(
-        "--blend-factor",
-        type=number,
-        metavar="F",
-        help="blend factor of dual quaternions with --method mix, 0 to 1 (default: that of each "
-        "vertex if an FBX file states them, else 0.5)",
-    )
-    group.add_argument(
-        "--influences",
-        type=int,
-        default=0,
-        metavar="N",
-        help="use only each vertex's N strongest influences (default: all)",
-    )
-    group.add_argument(
-        "--normalize", action="store_true", help="normalise each vertex's weights to a sum of 1"
-    )
-    group.add_argument("--no-correctives", action="store_true", help="omit pose correctives")
+    add_settings(parser.add_argument_group("skinning"), Skinning)
 
 
-def skinning_of(arguments: argparse.Namespace) -> Skinning:
-    """Return the requested skinning; see also ``use_file_method``."""
-    factor = 0.5 if arguments.blend_factor is None else arguments.blend_factor
-    if not 0.0 <= factor <= 1.0:
-        raise ViewerError(f"--blend-factor: expected 0 to 1, found {factor:g}")
-    if arguments.influences < 0:
-        raise ViewerError(f"--influences: expected 0 or more, found {arguments.influences}")
-    return Skinning(
-        method=arguments.method or "lbs",
-        blend_factor=factor,
-        max_influences=arguments.influences,
-        normalize=arguments.normalize,
-        correctives=not arguments.no_correctives,
-    )
-
-
-def use_file_method(arguments: argparse.Namespace, scene: Scene, skinning: Skinning) -> None:
-    """Set the method that the files of a scene ask for, unless options state another."""
+def use_file_method(scene: Scene, skinning: Skinning, given: Collection[str]) -> None:
+    """Set the method that the files of a scene ask for, unless ``given`` has it or its factor."""
     method, factor = file_method(actor.figure for actor in scene.actors)
-    if arguments.method is None:
+    if "method" not in given:
         skinning.method = method
-    if arguments.blend_factor is None and skinning.method == method:
+    if "blend_factor" not in given and skinning.method == method:
         skinning.blend_factor = factor
 
 
-def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:
+def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Diagnostic]:
     """Shape and pose a scene as requested.
 
     Returns: messages about what could not be applied exactly.
     Raises ViewerError if an option does not apply to the scene.
     """
-    notes = apply_time(scene, arguments)
-    if arguments.hands:
-        _apply_hands(scene, arguments.hands)
-    if arguments.pose:
-        record, source = _pose(arguments.pose)
+    notes = apply_time(scene, frames)
+    if pose.hands:
+        _apply_hands(scene, pose.hands)
+    if pose.pose:
+        record, source = _pose(pose.pose)
         notes += [] if source is None else source.diagnostics.warnings
         notes += _apply_record("--pose", record, scene, source)
     # Options take precedence over a pose file.
-    if arguments.shape is not None:
-        notes += _apply_shape(scene, arguments.shape)
-    expression = _numbers("--expression", arguments.expression)
+    if pose.shape is not None:
+        notes += _apply_shape(scene, pose.shape)
+    expression = _numbers("--expression", pose.expression)
     if expression is not None:
         from viewer.rig.posing.pose_record import PoseRecord
 
         notes += _apply_record("--expression", PoseRecord(expression=expression), scene)
-    notes += apply_dofs(scene, arguments.dof)
-    if arguments.mirror:
+    notes += apply_dofs(scene, pose.dof)
+    if pose.mirror:
         _mirror(scene)
     return notes
-
-
-def pose_files(arguments: argparse.Namespace) -> list[str]:
-    """Return the requested pose file, an input that must not be overwritten."""
-    return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
 
 
 def _pose(text: str) -> tuple[PoseRecord, Source | None]:
@@ -263,11 +228,11 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
     Raises ViewerError if the text, the joint or the value is invalid.
     """
     notes: list[str] = []
-    for setting in settings:
-        label, equals, text = setting.partition("=")
+    for asked in settings:
+        label, equals, text = asked.partition("=")
         if not equals:
-            raise ViewerError(f'--dof: expected NAME.X=VALUE, found "{setting}"')
-        if label.lower().startswith(_FIGURE) and _place(scene, label, setting, text):
+            raise ViewerError(f'--dof: expected NAME.X=VALUE, found "{asked}"')
+        if label.lower().startswith(_FIGURE) and _place(scene, label, asked, text):
             continue
         actor, dof, note = _find(scene, label)
         skeleton = actor.figure.require_skeleton()
@@ -275,7 +240,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
         notes += note
         is_rotation = skeleton.dof_kinds[dof] >= 3
         wanted = pose.dofs.copy()
-        wanted[dof] = _dof_value(setting, text, is_rotation)
+        wanted[dof] = _dof_value(asked, text, is_rotation)
         clamped = clamp_dofs(skeleton, wanted)
         if clamped[dof] != wanted[dof]:
             low, high = skeleton.dof_limits[dof]
@@ -290,7 +255,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
     return notes
 
 
-def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
+def _place(scene: Scene, label: str, asked: str, text: str) -> bool:
     """Move or scale the first posed figure as a whole; return whether the label refers to it."""
     from viewer.rig.posing.pose_record import PoseRecord, apply_record
 
@@ -298,7 +263,7 @@ def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
     actor = next((actor for actor in scene.actors if actor.pose is not None), None)
     if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:
         return False
-    value = _dof_value(setting, text, False)
+    value = _dof_value(asked, text, False)
     place = actor.pose.figure_translation.copy()
     if part != "scale":
         place["xyz".index(part[1])] = value
@@ -335,13 +300,13 @@ def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
     return (*found[0], note)
 
 
-def _dof_value(setting: str, text: str, is_rotation: bool) -> float:
+def _dof_value(asked: str, text: str, is_rotation: bool) -> float:
     found = re.fullmatch(r"(.*?)(rad|deg)?", text.strip())
     assert found is not None  # the pattern matches any text
     try:
         value = number(found[1])
     except (ValueError, argparse.ArgumentTypeError):
-        raise ViewerError(f'--dof: expected a number after "=", found "{setting}"') from None
+        raise ViewerError(f'--dof: expected a number after "=", found "{asked}"') from None
     return math.radians(value) if found[2] == "deg" and is_rotation else value
 
 

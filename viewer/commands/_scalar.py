@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Collection
 
 import numpy as np
 
+from viewer.commands._settings import add_settings
 from viewer.errors import RigError, ViewerError
 from viewer.phrases import printable
-from viewer.rendering.options import COLORMAPS, DisplayOptions
+from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.number_text import number_text
@@ -35,32 +37,12 @@ _WHOLE = ("discrete", "categorical")
 
 def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
     """Add the options of scalar quantities."""
-    group.add_argument(
-        "--scalar",
-        type=_quantity_name,
-        metavar="NAME[:JOINT]",
-        help=f"show a scalar quantity as colours: weight:JOINT, {', '.join([*SCALARS][1:])}",
-    )
-    group.add_argument(
-        "--scalar-range",
-        metavar="A:B",
-        help="range of the colour map, in the legend's unit (default: all values); write "
-        "--scalar-range=-20:20 if A is below 0",
-    )
-    group.add_argument(
-        "--colormap",
-        choices=COLORMAPS,
-        metavar="NAME",
-        help=f"colours of a continuous quantity, as in matplotlib: {', '.join([*COLORMAPS][1:])} "
-        "(default: auto, dark violet to yellow, or blue through white to red if values have a "
-        "sign)",
-    )
-    group.add_argument(
-        "--isolines",
-        action=argparse.BooleanOptionalAction,
-        help="isolines at every tenth of the range (default: for weights only)",
-    )
-    group.add_argument("--legend", action="store_true", help="draw a colour legend")
+    names = f"weight:JOINT, {', '.join([*SCALARS][1:])}"
+    text = f"show a scalar quantity as colours: {names}"
+    add_settings(group, DisplayOptions, "scalar", type=_quantity_name, help=text)
+    add_settings(group, DisplayOptions, "scalar_range", "colormap")
+    add_settings(group, DisplayOptions, "isolines", action=argparse.BooleanOptionalAction)
+    add_settings(group, DisplayOptions, "legend")
 
 
 def _quantity_name(text: str) -> str:
@@ -72,27 +54,29 @@ def _quantity_name(text: str) -> str:
     return text
 
 
-def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
-    """Set the requested options of a scalar quantity.
+def set_scalar(options: DisplayOptions, given: Collection[str], values: str | None) -> None:
+    """Show the requested scalar quantity.
 
+    ``options``: as stated. ``given``: the fields that were stated. ``values``: the range.
     Raises ViewerError if options need a scalar quantity and none is given, or the range is
     invalid.
     """
-    if arguments.scalar:
-        options.shading, options.scalar = "scalar", arguments.scalar
-    for name in ("legend", "scalar_range", "isolines", "colormap"):
-        if getattr(arguments, name) not in (None, False) and options.shading != "scalar":
-            option = f"--{name.replace('_', '-')}"
-            raise ViewerError(f"{option}: expected --scalar NAME, to which it applies")
-    options.legend, options.isolines = arguments.legend, arguments.isolines
-    if arguments.colormap is not None:
-        if find_quantity(options.scalar).kind in _WHOLE:
-            raise ViewerError(f"--colormap: {options.scalar} has one colour per integer")
-        options.colormap = arguments.colormap
-    if arguments.scalar_range is not None:
-        if find_quantity(options.scalar).kind in _WHOLE:
-            raise ViewerError(f"--scalar-range: {options.scalar} has one colour per integer")
-        options.scalar_range = _parse_range(arguments.scalar_range)
+    if "scalar" in given:
+        options.shading = "scalar"
+    needing = {
+        "legend": options.legend,
+        "scalar-range": values is not None,
+        "isolines": options.isolines,
+        "colormap": "colormap" in given,
+    }
+    for option, is_given in needing.items():
+        if is_given and options.shading != "scalar":
+            raise ViewerError(f"--{option}: expected --scalar NAME, to which it applies")
+    for option in ("colormap", "scalar-range"):
+        if needing[option] and find_quantity(options.scalar).kind in _WHOLE:
+            raise ViewerError(f"--{option}: {options.scalar} has one colour per integer")
+    if values is not None:
+        options.scalar_range = _parse_range(values)
 
 
 def _parse_range(text: str) -> tuple[float, float]:

@@ -10,13 +10,16 @@ import argparse
 import re
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from viewer.commands._cleanup import clean_up_of
-from viewer.commands._pose import add_pose_arguments, apply_pose
+from viewer.commands._frames import Frames, add_frame_arguments, frames_of
+from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
-from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._settings import add_settings, settings_of
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, ViewerError
@@ -26,19 +29,17 @@ from viewer.loading.settings import CleanUp
 from viewer.models import named_files, resolve
 from viewer.phrases import printable
 from viewer.progress import report
-from viewer.rig.bodies.smpl_family import GENDERS
 from viewer.rig.scene import Scene
-from viewer.rig.units import METRES
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
     from viewer.rig.retargeting.joint_map import JointMap
 
-_LAYOUTS = ("body19", "panoptic", "coco", "h36m")
-"""Keypoint layouts with the same number of points as another one."""
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # maximum number of names in a message
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
+"""Suffixes of writable image formats."""
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}  # suffixes of sizes, bytes
 # Values of --gaps, by the use of the command: pattern, help and metavariable.
 _ONE_SECOND = 1.0  # the longest gap if the deprecated --fill-gaps has no value
@@ -61,6 +62,57 @@ _METAVAR = {
     "check": "interpolate",
     "write": "hold|split|interpolate[:N|:Ns]",
 }
+
+
+@dataclass(slots=True)
+class SceneOptions:
+    """The files to open, and how they are read, cleaned up and posed."""
+
+    files: list[str]
+    """As given: files, folders, and names of models."""
+    body: bool = setting(
+        False, "the bundled human body: next to FILES, or moved by a motion among them"
+    )
+    model_path: str | None = setting(
+        None, "folder of body models; the viewer remembers it", metavar="FOLDER"
+    )
+    max_size: str = setting(
+        "2G", "maximum size of a file, with suffix k, M or G (default: {default})", metavar="SIZE"
+    )
+    no_cache: bool = setting(
+        False, "parse all files again instead of using cached arrays (see viewer doctor)"
+    )
+    motion_files: list[str] = setting(
+        [],
+        "a file whose motion or animation drives a figure, such as a glTF or FBX file that "
+        "contains another figure; may be repeated",
+        flag="--motion",
+        metavar="FILE",
+    )
+    joint_map: str | None = setting(
+        None,
+        "joints of the driven figure and the joints that drive them, one pair per line, as in "
+        "LeftUpLeg = lThigh; others are matched by name (convert --save-joint-map writes such a "
+        "file)",
+        metavar="FILE",
+    )
+    motion: MotionSettings = MotionSettings()
+    changes: CleanUp = CleanUp()
+    frames: Frames = field(default_factory=Frames)
+    pose: PoseOptions = field(default_factory=PoseOptions)
+    output: str | None = None
+    """The file that the command writes, if it has one."""
+
+    @property
+    def size_limit(self) -> int:
+        """File size limit in bytes."""
+        return parse_bytes(self.max_size)
+
+    @property
+    def paths(self) -> list[str | Path]:
+        """The files to open: as given or found by name, and the bundled body."""
+        files: list[str | Path] = [path for file in self.files for path in named_files(file)]
+        return [*files, bundled_body()] if self.body else files
 
 
 def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
@@ -87,31 +139,9 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "formats"
         f"{f' (default: {default})' if default else ''}",
     )
-    add_animation_argument(group)
+    add_settings(group, MotionSettings, "animation", "rig", "lod")
     parser.set_defaults(springs="off")
-    group.add_argument(
-        "--rig", metavar="NAME", help="rig of Anny: default, mixamo, game_engine, cmu_mb"
-    )
-    group.add_argument("--lod", metavar="N", help="level of detail of MHR, 0 (fine) to 6 (coarse)")
-    group.add_argument(
-        "--body",
-        action="store_true",
-        help="the bundled human body: next to FILES, or moved by a motion among them",
-    )
-    group.add_argument(
-        "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
-    )
-    group.add_argument(
-        "--max-size",
-        default="2G",
-        metavar="SIZE",
-        help="maximum size of a file, with suffix k, M or G (default: 2G)",
-    )
-    group.add_argument(
-        "--no-cache",
-        action="store_true",
-        help="parse all files again instead of using cached arrays (see viewer doctor)",
-    )
+    add_settings(group, SceneOptions, "body", "model_path", "max_size", "no_cache")
 
 
 def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
@@ -121,105 +151,14 @@ def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") 
     ``gaps``: how the command handles gaps, see ``add_gap_arguments``.
     """
     group = parser.add_argument_group("captures and BVH")
-    _add_driving_arguments(group)
-    group.add_argument(
-        "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
-    )
-    group.add_argument(
-        "--unit", choices=METRES, help="length unit of BVH files (default: estimated)"
-    )
-    _add_video_arguments(group)
-    group.add_argument(
-        "--layout",
-        choices=_LAYOUTS,
-        help="layout of captured keypoints, if their number is ambiguous",
-    )
-    group.add_argument(
-        "--legacy-expression",
-        action="store_true",
-        help="apply expressions to SMPL-X columns 10 to 19, as EasyMocap does",
-    )
-    group.add_argument(
-        "--beside",
-        action="store_true",
-        help="show a BVH next to the figures instead of driving one",
-    )
+    add_settings(group, MotionSettings, "model", "gender")
+    add_settings(group, SceneOptions, "motion_files")
+    add_settings(group, MotionSettings, "source_rest", type=_source_rest)
+    add_settings(group, MotionSettings, "feet")
+    add_settings(group, SceneOptions, "joint_map")
+    names = "up", "unit", "images", "video", "space", "average_shape", "layout"
+    add_settings(group, MotionSettings, *names, "legacy_expression", "drives")
     add_gap_arguments(group, gaps)
-
-
-def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
-    """Add the options for motions that drive figures."""
-    group.add_argument(
-        "--model",
-        metavar="FIGURE",
-        help="body model for captured bodies, or figure that a BVH file drives: a file, or a name "
-        "such as smplx, smplx:female, body or fox (default: one of FILES; for captured bodies, "
-        "otherwise their model in the model folder, or the bundled body)",
-    )
-    group.add_argument(
-        "--gender",
-        choices=GENDERS,
-        help="gender of the body model for captured bodies (default: as stated by their files)",
-    )
-    group.add_argument(
-        "--motion",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="a file whose motion or animation drives a figure, such as a glTF or FBX file that "
-        "contains another figure; may be repeated",
-    )
-    group.add_argument(
-        "--source-rest",
-        type=_source_rest,
-        default="auto",
-        metavar="N|zero|auto",
-        help="rest pose of a skeleton that drives a figure: frame N, the file's zero pose, or "
-        "auto: the zero pose if it is a standing pose, otherwise a T-pose if the joint axes "
-        "are parallel to the body's in it, otherwise a frame in a T- or A-pose, otherwise "
-        "estimated from the motion (default: auto)",
-    )
-    group.add_argument(
-        "--feet",
-        choices=("on", "off"),
-        default="on",
-        help="plant the feet of driven figures while the feet of the motion are on the ground "
-        "(default: on)",
-    )
-    group.add_argument(
-        "--joint-map",
-        metavar="FILE",
-        help="joints of the driven figure and the joints that drive them, one pair per line, as in "
-        "LeftUpLeg = lThigh; others are matched by name (convert --save-joint-map writes such a "
-        "file)",
-    )
-
-
-def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
-    """Add the options of video motion capture, and of cameras' images."""
-    group.add_argument(
-        "--images",
-        metavar="FOLDER",
-        help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, next to "
-        "the capture); for a single camera also a folder of its numbered images",
-    )
-    group.add_argument(
-        "--video",
-        metavar="FILE",
-        help="video of a capture's camera, drawn behind the scene when it is seen through that "
-        "camera, as it is by default; also sets the frame rate of captures that have none (needs "
-        "PyAV)",
-    )
-    group.add_argument(
-        "--space",
-        choices=("world", "camera"),
-        help="space of video motion capture (default: the world, if the file has it)",
-    )
-    group.add_argument(
-        "--average-shape",
-        action="store_true",
-        help="average each person's shape over time if the files have one per frame",
-    )
 
 
 def _source_rest(text: str) -> int | str:
@@ -230,61 +169,38 @@ def _source_rest(text: str) -> int | str:
     raise argparse.ArgumentTypeError(f"expected a frame number, zero or auto, found {text}")
 
 
-def add_animation_argument(group: argparse._ArgumentGroup) -> None:
-    """Add ``--animation``."""
-    group.add_argument(
-        "--animation",
-        metavar="NAME",
-        help="animation of a file to play: a name, a number from 1, or none; viewer "
-        "info lists them (default: the first)",
-    )
+def scene_options(arguments: argparse.Namespace) -> SceneOptions:
+    """Return the requested files, and how they are opened and posed.
 
-
-def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
-    """Return the requested settings for reading motions.
-
-    Raises ViewerError if there are both a video and a folder of images.
+    Raises ViewerError if there are both a video and a folder of images, or a joint map cannot be
+    read.
     """
     if arguments.video is not None and arguments.images is not None:
         raise ViewerError("--video and --images: expected one of them, found both")
-    return MotionSettings(
-        model=arguments.model,
-        gender=arguments.gender or "",
-        rig=arguments.rig or "",
-        lod=arguments.lod or "",
+    options = settings_of(SceneOptions, arguments, files=arguments.files)
+    use_models(options.model_path)
+    options.motion = settings_of(
+        MotionSettings,
+        arguments,
         frame_rate=arguments.fps,
-        space=arguments.space or "",
         is_overlay=getattr(arguments, "overlay", None) is not None,
-        average_shape=arguments.average_shape,
-        source_rest=arguments.source_rest,
-        feet=arguments.feet == "on",
-        joint_map=_joint_map(arguments),
-        up=arguments.up or "",
-        unit=arguments.unit or "",
+        joint_map=_joint_map(options),
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",
-        layout=arguments.layout or "",
-        legacy_expression=arguments.legacy_expression,
-        drives=not arguments.beside,
-        images=None if arguments.images is None else Path(arguments.images),
-        video=None if arguments.video is None else Path(arguments.video),
-        animation=arguments.animation or "",
-        motions=tuple(resolve(file) for file in arguments.motion),
-        springs=arguments.springs == "on",
+        motions=tuple(resolve(file) for file in options.motion_files),
     )
+    options.changes, options.frames = clean_up_of(arguments), frames_of(arguments)
+    options.pose = settings_of(PoseOptions, arguments)
+    options.output = getattr(arguments, "output", None)
+    return options
 
 
-def _joint_map(arguments: argparse.Namespace) -> JointMap | None:
+def _joint_map(options: SceneOptions) -> JointMap | None:
     """Return the requested match of joints; raises FormatError if its file cannot be read."""
-    if arguments.joint_map is None:
+    if options.joint_map is None:
         return None
     from viewer.formats._joint_map import read_joint_map
 
-    return read_joint_map(Source.open(arguments.joint_map, size_limit(arguments)))
-
-
-def size_limit(arguments: argparse.Namespace) -> int:
-    """Return the file size limit in bytes."""
-    return parse_bytes(arguments.max_size)
+    return read_joint_map(Source.open(options.joint_map, options.size_limit))
 
 
 def parse_bytes(text: str, option: str = "--max-size") -> int:
@@ -298,24 +214,30 @@ def parse_bytes(text: str, option: str = "--max-size") -> int:
     return int(found[1]) * _UNITS.get(found[2].lower(), 1)
 
 
-def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
-    """Return the files to open: as given or found by name, and the bundled body."""
-    files: list[str | Path] = [path for file in arguments.files for path in named_files(file)]
-    if arguments.body:
-        files.append(bundled_body())
-    return files
+def inputs_of(options: SceneOptions, scene: Scene | None = None) -> list[Path]:
+    """Return all files that are read: the named files, and those they refer to.
+
+    ``scene``: the opened scene; if omitted, only the named files are returned.
+    """
+    motion = options.motion
+    model = [] if motion.model is None else named_files(motion.model, motion.gender)
+    more: list[str | Path] = [*options.pose.files, *model, *motion.motions]
+    more += [] if options.joint_map is None else [options.joint_map]
+    named = [Path(file) for file in (*options.paths, *more)]
+    return named if scene is None else [*named, *scene.files]
 
 
-def open_scene(arguments: argparse.Namespace) -> Scene:
+def open_scene(options: SceneOptions) -> Scene:
     """Load the files completely, print their readers' warnings, and pose them as requested."""
-    changes = clean_up_of(arguments)
-    scene, builders = begin_scene(arguments)
+    changes = options.changes
+    scene, builders = begin_scene(options)
     for builder in builders:
         finish(builder, scene)
     if not changes.is_empty:
-        clean(scene, changes, getattr(arguments, "output", None))
-        arguments.fps = changes.rate or arguments.fps  # frames have this rate from now on
-    print_warnings(apply_pose(scene, arguments))
+        clean(scene, changes, options.output)
+        # Frames have this rate from now on.
+        options.frames.fps = changes.rate or options.frames.fps
+    print_warnings(apply_pose(scene, options.pose, options.frames))
     return scene
 
 
@@ -344,32 +266,30 @@ def finish(builder: Builder, scene: Scene) -> None:
     print_warnings(notes)
 
 
-def use_models(arguments: argparse.Namespace) -> None:
+def use_models(folder: str | None) -> None:
     """Use the folder of body models of ``--model-path``, before any name is looked up in it."""
-    if arguments.model_path is not None:
+    if folder is not None:
         from viewer.models import use_model_folder
 
-        print_warnings(filter(None, [use_model_folder(arguments.model_path)]))
+        print_warnings(filter(None, [use_model_folder(folder)]))
 
 
-def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
+def begin_scene(options: SceneOptions) -> tuple[Scene, list[Builder]]:
     """Load enough for a first image, without posing the scene, and print warnings."""
-    use_models(arguments)
-    files = scene_files(arguments)
-    settings = motion_settings(arguments)
+    files = options.paths
     try:
         with shown_progress("reading"):
-            limit = parse_bytes(arguments.max_size)
-            contents = read_files(files or bundled_files(), limit, settings)
-            scene, builders = begin(contents, settings)
+            contents = read_files(files or bundled_files(), options.size_limit, options.motion)
+            scene, builders = begin(contents, options.motion)
     except FormatError as problem:
-        named = [*arguments.files, *filter(None, [arguments.model])]
+        model = options.motion.model
+        named = [*options.files, *([] if model is None else [model])]
         raise _with_models(problem, named) from None
     print_warnings(scene.diagnostics)
     return scene, builders
 
 
-def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
+def _with_models(problem: FormatError, files: Sequence[str | Path]) -> ViewerError:
     """Add the names of available models to an error about an unknown name."""
     from viewer.models import known_models, load_model_folder
     from viewer.near_names import did_you_mean

@@ -124,12 +124,12 @@ def check_command(word: str) -> None:
         )
 
 
-def require_files(arguments: argparse.Namespace, command: str) -> None:
+def require_files(files: Sequence[str], body: bool, command: str) -> None:
     """Raise if no files are given to a command that does not default to the bundled figure.
 
     Raises ViewerError if there are neither files nor ``--body``.
     """
-    if not arguments.files and not arguments.body:
+    if not files and not body:
         raise ViewerError(
             f"expected FILES, found none (viewer {command} --help lists what can be opened)"
         )

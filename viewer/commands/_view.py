@@ -6,182 +6,102 @@ import argparse
 import re
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from viewer.commands._numbers import number
-from viewer.commands._pose import skinning_of
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
+from viewer.commands._settings import add_settings, settings_of, stated
+from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
+from viewer.loading import MotionSettings
 from viewer.phrases import listed, printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
-from viewer.rendering.options import (
-    BACKGROUNDS,
-    BONES,
-    MATCAPS,
-    QUALITIES,
-    SHOWN,
-    DisplayOptions,
-    parse_color,
-)
+from viewer.rendering.options import BACKGROUNDS, DisplayOptions, parse_color
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
+from viewer.rig.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.rig.captures.cameras import CameraView
 
-_SWITCHES = (
-    ("no-shadows", "omit shadows"),
-    ("flat", "use one normal per triangle"),
-    ("wireframe", "draw triangle edges"),
-    ("normals", "draw vertex normals"),
-    ("no-texture", "use plain colours instead of textures"),
-    ("no-vertex-colors", "omit vertex colours"),
-    ("no-grid", "omit the ground grid"),
-    ("keypoints", "draw a model's keypoints"),
-    ("no-captured-keypoints", "hide the keypoints of captures"),
-    ("reduced", "draw the coarser mesh, if there is one"),
-    ("xray", "draw bones that are visible through the skin"),
-    ("joint-names", "label joints; labels that would overlap are omitted"),
-    ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
-    ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
+_DRAWN = (
+    *("bones", "background", "samples", "quality", "shadows", "flat", "wireframe", "normals"),
+    *("texture", "vertex_colors", "grid", "keypoints", "captured_keypoints", "reduced", "xray"),
+    *("joint_names", "joint_axes", "cameras"),
 )
-
-_DIMMED = 0.6  # brightness of a camera's image
 # Options that ask for a view of their own.
 VIEWS = ("azimuth", "inclination", "distance", "orthographic", "look_at", "follow")
+
+
+@dataclass(slots=True)
+class ViewOptions:
+    """The camera, and what is hidden from it."""
+
+    azimuth: float | None = setting(None, "degrees about the up axis", metavar="A")
+    front: Front | Literal["auto"] = setting(
+        "auto",
+        "the axis that the figures face, as in --front=-z; the initial view looks from there "
+        "(default: {default}, estimated from the figures)",
+        choices=("auto", *FRONTS),
+        metavar="AXIS",
+    )
+    inclination: float | None = setting(None, "degrees above the horizon", metavar="I")
+    distance: float | None = setting(
+        None,
+        "distance from the target, in scene units (default: the whole scene is visible)",
+        metavar="D",
+    )
+    look_at: str | None = setting(
+        None,
+        "aim at a joint or an actor instead of the centre: head, fox/head, or 1:pelvis for a "
+        "captured person; --distance sets how close (in videos: where it is at the start)",
+        metavar="NAME",
+    )
+    orthographic: bool = setting(False, "parallel projection")
+    view: str | None = setting(
+        None,
+        "look through a calibrated camera of a capture, by name or number from 1",
+        metavar="NAME|N",
+    )
+    hide_part: list[str] = setting(
+        [],
+        "hide parts of meshes or bodies, by name or pattern; may be repeated",
+        metavar="NAME|GLOB",
+    )
+    follow: str | None = setting(
+        None,
+        "follow an actor or joint with the camera: fox, head, or fox/head; captured people by "
+        "number: 1 or 1:pelvis (a single picture: aim at it)",
+        metavar="NAME",
+    )
+
+    @property
+    def fits(self) -> bool:
+        """Whether the distance is free: neither it, nor a view or an aim is requested."""
+        return (self.distance, self.view, self.look_at) == (None, None, None)
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the camera; by default it frames the scene."""
     group = parser.add_argument_group("camera")
-    group.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
-    group.add_argument(
-        "--front",
-        choices=("auto", *FRONTS),
-        default="auto",
-        metavar="AXIS",
-        help="the axis that the figures face, as in --front=-z; the initial view looks from there "
-        "(default: auto, estimated from the figures)",
-    )
-    group.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
-    group.add_argument(
-        "--distance",
-        type=number,
-        metavar="D",
-        help="distance from the target, in scene units (default: the whole scene is visible)",
-    )
-    group.add_argument(
-        "--look-at",
-        metavar="NAME",
-        help="aim at a joint or an actor instead of the centre: head, fox/head, or 1:pelvis for a "
-        "captured person; --distance sets how close (in videos: where it is at the start)",
-    )
-    group.add_argument("--orthographic", action="store_true", help="parallel projection")
-    group.add_argument(
-        "--view",
-        metavar="NAME|N",
-        help="look through a calibrated camera of a capture, by name or number from 1",
-    )
-    group.add_argument(
-        "--image-brightness",
-        type=number,
-        metavar="0..1",
-        help="brightness of the camera's image behind the scene, with --view; 0 hides it (default: "
-        "0.6; 1 with --overlay)",
-    )
+    names = "azimuth", "front", "inclination", "distance", "look_at", "orthographic", "view"
+    add_settings(group, ViewOptions, *names)
+    add_settings(group, DisplayOptions, "image_brightness")
 
 
 def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the display."""
     group = parser.add_argument_group("display")
-    group.add_argument(
-        "--show",
-        choices=SHOWN,
-        default="skin",
-        help="parts of the figures; binding is the skin in the bind pose (default: skin)",
-    )
-    _add_shading_arguments(group)
+    add_settings(group, DisplayOptions, "show")
+    add_settings(group, DisplayOptions, "shading", choices=SHADING_CHOICES)
+    add_settings(group, DisplayOptions, "metallic", "roughness", "matcap")
     add_scalar_arguments(group)
-    group.add_argument(
-        "--bones",
-        choices=BONES,
-        default="auto",
-        help="style of skeletons (default: auto, the boxes of files that have them, otherwise "
-        "octahedra)",
-    )
-    group.add_argument(
-        "--background",
-        default="gradient",
-        metavar="NAME|#rrggbb",
-        help="gradient, white, environment (the studio, out of focus), transparent, or a colour "
-        "(default: gradient)",
-    )
-    group.add_argument(
-        "--samples", type=int, default=4, metavar="N", help="samples per pixel (default: 4)"
-    )
-    group.add_argument(
-        "--quality",
-        choices=QUALITIES,
-        metavar="NAME",
-        help="draft: no shadows; normal: shadows; final: soft shadows, ambient occlusion and "
-        "smoother edges (default: final for pictures, normal for videos)",
-    )
-    _add_switches(group)
-    group.add_argument(
-        "--opacity",
-        type=number,
-        default=1.0,
-        metavar="0..1",
-        help="opacity of the figures (default: 1)",
-    )
-    group.add_argument(
-        "--hide-part",
-        action="append",
-        default=[],
-        metavar="NAME|GLOB",
-        help="hide parts of meshes or bodies, by name or pattern; may be repeated",
-    )
-
-
-def _add_switches(group: argparse._ArgumentGroup) -> None:
-    for name, text in _SWITCHES:
-        group.add_argument(f"--{name}", action="store_true", help=text)
-    group.add_argument(
-        "--springs",
-        choices=("on", "off"),
-        default="on",
-        help="simulate spring joints, such as hair in VRM files, while a motion plays "
-        "(default: on)",
-    )
-
-
-def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
-    """Add the options of surfaces."""
-    group.add_argument(
-        "--shading",
-        choices=SHADING_CHOICES,
-        default="auto",
-        help="shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
-        "phong (default: auto)",
-    )
-    for name, default in (("metallic", 0.0), ("roughness", 0.6)):
-        group.add_argument(
-            f"--{name}",
-            type=number,
-            default=default,
-            metavar="0..1",
-            help=f"value for materials that do not specify one, with --shading pbr (default: "
-            f"{default:g})",
-        )
-    group.add_argument(
-        "--matcap",
-        choices=MATCAPS,
-        default="clay",
-        help="picture for --shading matcap (default: clay)",
-    )
+    add_settings(group, DisplayOptions, *_DRAWN)
+    add_settings(group, MotionSettings, "springs")
+    add_settings(group, DisplayOptions, "opacity")
+    add_settings(group, ViewOptions, "hide_part")
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -195,47 +115,45 @@ def parse_size(text: str) -> tuple[int, int]:
     return size
 
 
-def camera_of(
-    arguments: argparse.Namespace, scene: Scene, points: Floats, size: tuple[int, int]
-) -> Camera:
+def camera_of(options: ViewOptions, scene: Scene, points: Floats, size: tuple[int, int]) -> Camera:
     """Return the requested camera; it frames the points unless its distance is given."""
-    if arguments.view is not None:
-        if arguments.look_at is not None:
+    if options.view is not None:
+        if options.look_at is not None:
             raise ViewerError("--view and --look-at: expected one of them, found both")
-        view = _find_view(scene, arguments.view)
+        view = _find_view(scene, options.view)
         from viewer.rig.captures.carried_view import view_in
 
         camera = camera_from_view(view, size, scene.up, seen=view_in(view, scene))
-        camera.front = front_azimuth(_front_of(arguments, scene), scene.up)
+        camera.front = front_azimuth(_front_of(options, scene), scene.up)
         return camera
-    camera = facing_camera(_front_of(arguments, scene), scene.up, arguments.orthographic)
-    if arguments.azimuth is not None:
-        camera.azimuth = arguments.azimuth
-    if arguments.inclination is not None:
-        if not -90 <= arguments.inclination <= 90:
-            raise ViewerError(f"--inclination: expected -90 to 90, found {arguments.inclination:g}")
-        camera.inclination = arguments.inclination
+    camera = facing_camera(_front_of(options, scene), scene.up, options.orthographic)
+    if options.azimuth is not None:
+        camera.azimuth = options.azimuth
+    if options.inclination is not None:
+        if not -90 <= options.inclination <= 90:
+            raise ViewerError(f"--inclination: expected -90 to 90, found {options.inclination:g}")
+        camera.inclination = options.inclination
     fit(camera, points, size[0] / size[1])
-    if arguments.look_at is not None:
+    if options.look_at is not None:
         from viewer.rendering.framing import find_follow
 
-        camera.target = find_follow(scene, arguments.look_at).origin
-    if arguments.distance is not None:
-        if arguments.distance <= 0:
-            raise ViewerError(f"--distance: expected more than 0, found {arguments.distance:g}")
+        camera.target = find_follow(scene, options.look_at).origin
+    if options.distance is not None:
+        if options.distance <= 0:
+            raise ViewerError(f"--distance: expected more than 0, found {options.distance:g}")
         limit = 1e4 * (box_size(bounding_box(points)) or 1.0)
-        if arguments.distance > limit:
+        if options.distance > limit:
             raise ViewerError(
                 f"--distance: expected at most {limit:g}, 10000 times the figure's size, "
-                f"found {arguments.distance:g}"
+                f"found {options.distance:g}"
             )
-        camera.distance = arguments.distance
+        camera.distance = options.distance
     return camera
 
 
-def _front_of(arguments: argparse.Namespace, scene: Scene) -> Front:
+def _front_of(options: ViewOptions, scene: Scene) -> Front:
     """Return the requested front, or the one estimated from the figures."""
-    front: Front = arguments.front
+    front = options.front
     if front == "auto":
         return guess_front(scene)
     if front not in front_axes(scene.up):
@@ -263,93 +181,67 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
-    for name in ("metallic", "roughness", "image-brightness", "opacity"):
-        value = getattr(arguments, name.replace("-", "_"))
-        if value is not None and not 0.0 <= value <= 1.0:
-            raise ViewerError(f"--{name}: expected 0 to 1, found {value:g}")
-    options = DisplayOptions(
-        show=arguments.show,
-        shading=arguments.shading,
-        matcap=arguments.matcap,
-        metallic=arguments.metallic,
-        roughness=arguments.roughness,
-        flat=arguments.flat,
-        wireframe=arguments.wireframe,
-        normals=arguments.normals,
-        texture=not arguments.no_texture,
-        vertex_colors=not arguments.no_vertex_colors,
-        grid=not arguments.no_grid,
-        bones=arguments.bones,
-        background=arguments.background,
-        samples=arguments.samples,
+    is_overlay = getattr(arguments, "overlay", None) is not None
+    brightness = {"image_brightness": 1.0} if is_overlay else {}
+    options = settings_of(
+        DisplayOptions,
+        arguments,
         quality=arguments.quality or "final",
-        shadows=not arguments.no_shadows,
-        skinning=skinning_of(arguments),
-        keypoints=arguments.keypoints,
-        captured_keypoints=not arguments.no_captured_keypoints,
-        reduced=arguments.reduced,
-        xray=arguments.xray,
-        joint_names=arguments.joint_names,
-        joint_axes=arguments.joint_axes,
-        opacity=arguments.opacity,
-        cameras=arguments.cameras,
-        image_brightness=_brightness(arguments),
+        scalar_range=None,
+        skinning=settings_of(Skinning, arguments),
+        **({} if arguments.image_brightness is not None else brightness),
     )
-    set_scalar(arguments, options)
+    set_scalar(options, stated(DisplayOptions, arguments), arguments.scalar_range)
     return options
 
 
-def _brightness(arguments: argparse.Namespace) -> float:
-    if arguments.image_brightness is not None:
-        return float(arguments.image_brightness)
-    return 1.0 if getattr(arguments, "overlay", None) is not None else _DIMMED
-
-
-def look_through_video(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+def look_through_video(view: ViewOptions, motion: MotionSettings, scene: Scene) -> list[str]:
     """Look through the camera of a given video, unless another view is requested; return notes."""
-    option = "--video" if arguments.video is not None else "--images"
-    is_given = arguments.video is not None or arguments.images is not None
-    if not is_given or arguments.view is not None or scene.images is None:
+    option = "--video" if motion.video is not None else "--images"
+    is_given = motion.video is not None or motion.images is not None
+    if not is_given or view.view is not None or scene.images is None:
         return []
-    asked = [name for name in VIEWS if getattr(arguments, name, None) not in (None, False)]
+    asked = [name for name in VIEWS if getattr(view, name) not in (None, False)]
     if asked:
         other = asked[0].replace("_", "-")
         return [f"{option}: not drawn, because --{other} asks for another view"]
     names = scene.images.cameras
     if len(names) > 1:
         return [f"{option}: not drawn; choose a camera with --view: {listed(names)}"]
-    arguments.view = names[0]
+    view.view = names[0]
     return []
 
 
-def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> list[str]:
+def camera_notes(
+    view: ViewOptions, motion: MotionSettings, scene: Scene, options: DisplayOptions
+) -> list[str]:
     """Return messages about calibrated cameras: their images, and lens distortion.
 
     Raises ViewerError if there is no such camera, or its files lack the size of its images.
     """
-    seen = None if arguments.view is None else _find_view(scene, arguments.view)
-    drawn = scene.views if options.cameras else [view for view in [seen] if view is not None]
+    seen = None if view.view is None else _find_view(scene, view.view)
+    drawn = scene.views if options.cameras else [] if seen is None else [seen]
     notes: list[str] = []
     if drawn:
         from viewer.rendering.camera_views import image_notes, lens_notes
 
-        notes = [note for view in drawn for note in image_notes(scene, view)]
+        notes = [note for one in drawn for note in image_notes(scene, one)]
         notes += [] if seen is None else lens_notes(scene, seen)
     if options.cameras and not scene.views:
         notes.append("--cameras: no file has calibrated cameras")
-    for option, given in (("--images", arguments.images), ("--video", arguments.video)):
+    for option, given in (("--images", motion.images), ("--video", motion.video)):
         if given is not None and scene.images is None:
             notes.append(f"{option}: no file is a capture with calibrated cameras")
     return notes
 
 
-def follow_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+def follow_notes(view: ViewOptions, scene: Scene) -> list[str]:
     """Return a message if several joints or actors have the name that the camera aims at."""
     from viewer.rendering.framing import follow_candidates
 
-    option, name = "--follow", getattr(arguments, "follow", None)
+    option, name = "--follow", view.follow
     if name is None:
-        option, name = "--look-at", arguments.look_at
+        option, name = "--look-at", view.look_at
     actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
     # A person's body and keypoints count as one match.
     others = [
@@ -367,14 +259,14 @@ def follow_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     ]
 
 
-def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
+def hide_parts(view: ViewOptions, scene: Scene, options: DisplayOptions) -> None:
     """Hide parts of meshes, and body parts of the first figure that has any, by name.
 
     Raises ViewerError if no part has one of the names; the message lists the known ones.
     """
     from viewer.near_names import name_hint
 
-    if not arguments.hide_part:
+    if not view.hide_part:
         return
     parts = next((a.figure.body_parts for a in scene.actors if a.figure.body_parts), None)
     of_body = () if parts is None else parts.names
@@ -384,7 +276,7 @@ def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOpti
     if not known:
         raise ViewerError("--hide-part: no figure has parts")
     hidden: set[int] = set()
-    for wanted in arguments.hide_part:
+    for wanted in view.hide_part:
         if not _named(wanted, known):
             hint = name_hint(wanted, known)
             raise ViewerError(f'--hide-part: no part is called "{printable(wanted, 60)}"; {hint}')

@@ -15,27 +15,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.commands._cleanup import add_cleanup_arguments, clean_up_of
+from viewer.commands._cleanup import add_cleanup_arguments
+from viewer.commands._frames import add_frame_arguments
 from viewer.commands._one_pose import check_frame_options
-from viewer.commands._output import inputs_of
 from viewer.commands._pose import (
     add_pose_arguments,
     add_skinning_arguments,
     apply_pose,
-    skinning_of,
     use_file_method,
 )
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import (
+    SceneOptions,
     add_capture_arguments,
     add_file_arguments,
-    motion_settings,
+    inputs_of,
     open_scene,
     print_warnings,
-    scene_files,
-    size_limit,
+    scene_options,
 )
-from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._settings import settings_of, stated
 from viewer.commands._writing.baked_springs import bake_springs
 from viewer.commands._writing.motion_export import (
     add_motion_arguments,
@@ -146,30 +145,34 @@ def _known_suffixes() -> str:
 def run(arguments: argparse.Namespace) -> int:
     """Write poses or motions; print messages about written files and losses."""
     output = Path(arguments.output)
-    _check_suffix(arguments, output)
-    skinning = skinning_of(arguments)
-    notes = convert_streamed(arguments, output, skinning)
+    asked = scene_options(arguments)
+    _check_suffix(arguments, asked, output)
+    skinning = settings_of(Skinning, arguments)
+    notes = convert_streamed(arguments, asked, output, skinning)
     if notes is None:
-        notes = _converted(arguments, output, skinning)
+        notes = _converted(arguments, asked, output, skinning)
     for note in notes:
         note_found(note)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 
 
-def _converted(arguments: argparse.Namespace, output: Path, skinning: Skinning) -> list[Diagnostic]:
+def _converted(
+    arguments: argparse.Namespace, asked: SceneOptions, output: Path, skinning: Skinning
+) -> list[Diagnostic]:
     """Open all files, and write what is requested; return the notes."""
-    scene = open_scene(arguments)
-    use_file_method(arguments, scene, skinning)
+    scene = open_scene(asked)
+    arguments.fps = asked.frames.fps
+    use_file_method(scene, skinning, stated(Skinning, arguments))
     baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    with _saving_joint_map(arguments, scene), shown_progress("converting"):
-        return [*write(arguments, scene, output, skinning), *baked]
+    with _saving_joint_map(arguments, asked, scene), shown_progress("converting"):
+        return [*write(arguments, asked, scene, output, skinning), *baked]
 
 
-def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
+def _check_suffix(arguments: argparse.Namespace, asked: SceneOptions, output: Path) -> None:
     """Check the output before anything is read."""
     check_frame_options(arguments)
     require_stdout(output)
@@ -192,18 +195,26 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         return  # the files are unknown until the motion has been read
     is_pose = all(kind.writes_pose for kind in kinds)
     files = files_written(output) if is_pose else [output]
-    check_targets(files, inputs_of(arguments), arguments.force)
+    check_targets(files, inputs_of(asked), arguments.force)
 
 
 def _write_poses(
-    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+    arguments: argparse.Namespace,
+    asked: SceneOptions,
+    scene: Scene,
+    output: Path,
+    skinning: Skinning,
 ) -> list[Diagnostic]:
     """Write the current poses."""
-    return _write_actors(arguments, scene, output, skinning, lambda _: None)
+    return _write_actors(arguments, asked, scene, output, skinning, lambda _: None)
 
 
 def _write_clips(
-    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+    arguments: argparse.Namespace,
+    asked: SceneOptions,
+    scene: Scene,
+    output: Path,
+    skinning: Skinning,
 ) -> list[Diagnostic]:
     """Write figures at rest with their animations, or only with the requested one."""
     is_chosen, refused = bool(arguments.animation), list[FormatError]()
@@ -212,7 +223,7 @@ def _write_clips(
         own = own_animations(actor, is_chosen, refused) if has_own_animations(actor) else ()
         return own or None
 
-    notes = _write_actors(arguments, scene, output, skinning, clips_of)
+    notes = _write_actors(arguments, asked, scene, output, skinning, clips_of)
     # Figures of one file share its animations.
     problems = dict.fromkeys(map(str, refused))
     return notes + [
@@ -222,6 +233,7 @@ def _write_clips(
 
 def _write_actors(
     arguments: argparse.Namespace,
+    asked: SceneOptions,
     scene: Scene,
     output: Path,
     skinning: Skinning,
@@ -234,11 +246,11 @@ def _write_actors(
     if not actors:
         raise RigError("no person is present at that time: there is nothing to write")
     if EXPORTERS[exporter_for(output)].writes_several and PERSON not in output.name:
-        notes = _write_together(arguments, scene, output, skinning, actors, clips_of)
+        notes = _write_together(arguments, asked, scene, output, skinning, actors, clips_of)
     else:
         places = dict(zip(shown, motion_paths(output, shown), strict=True))
         found = {each: places[each] for each in actors}
-        notes = _write_apart(arguments, scene, skinning, found, clips_of)
+        notes = _write_apart(arguments, asked, scene, skinning, found, clips_of)
     away = [actor.name for actor in shown if not actor.is_present]
     notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
     return notes + lacking + left_out_notes(scene, all_shown)
@@ -246,6 +258,7 @@ def _write_actors(
 
 def _write_together(
     arguments: argparse.Namespace,
+    asked: SceneOptions,
     scene: Scene,
     output: Path,
     skinning: Skinning,
@@ -253,7 +266,7 @@ def _write_together(
     clips_of: Callable[[Actor], Sequence[TransformClip] | None],
 ) -> list[Diagnostic]:
     """Write all actors and cameras to one file."""
-    check_targets(files_written(output), inputs_of(arguments, scene), arguments.force)
+    check_targets(files_written(output), inputs_of(asked, scene), arguments.force)
     upright = []
     for actor in actors:
         placement = upright_placement(scene, actor)
@@ -266,6 +279,7 @@ def _write_together(
 
 def _write_apart(
     arguments: argparse.Namespace,
+    asked: SceneOptions,
     scene: Scene,
     skinning: Skinning,
     places: Mapping[Actor, Path],
@@ -274,7 +288,7 @@ def _write_apart(
     """Write each actor to a separate file."""
     optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
     files = [file for path in places.values() for file in files_written(path)]
-    check_targets(files, inputs_of(arguments, scene), arguments.force)
+    check_targets(files, inputs_of(asked, scene), arguments.force)
     notes: list[Diagnostic] = []
     with all_or_none(files):
         for actor, path in places.items():
@@ -289,9 +303,13 @@ def _write_apart(
 
 
 def _write_motions(
-    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+    arguments: argparse.Namespace,
+    asked: SceneOptions,
+    scene: Scene,
+    output: Path,
+    skinning: Skinning,
 ) -> list[Diagnostic]:
-    inputs, force = inputs_of(arguments, scene), arguments.force
+    inputs, force = inputs_of(asked, scene), arguments.force
     if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
         check_frame_field(output)
     elif not output.suffix:
@@ -302,7 +320,9 @@ def _write_motions(
 
 
 @contextmanager
-def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[None]:
+def _saving_joint_map(
+    arguments: argparse.Namespace, asked: SceneOptions, scene: Scene
+) -> Iterator[None]:
     """Write the requested joint map before the block; remove it if the block fails.
 
     ``arguments``: arguments of ``convert``.
@@ -327,7 +347,7 @@ def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[N
             "none"
         )
     files = motion_paths(Path(arguments.save_joint_map), [*texts.values()])
-    check_targets(files, inputs_of(arguments, scene), arguments.force)
+    check_targets(files, inputs_of(asked, scene), arguments.force)
     output = Path(arguments.output)
     if output.suffix and "{frame" not in output.name:
         check_targets([*files, output], (), force=True)  # the files must be different
@@ -338,7 +358,7 @@ def _saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[N
 
 
 def convert_streamed(
-    arguments: argparse.Namespace, output: Path, skinning: Skinning
+    arguments: argparse.Namespace, asked: SceneOptions, output: Path, skinning: Skinning
 ) -> list[Diagnostic] | None:
     """Convert a long, regular file part by part; print warnings and return the notes.
 
@@ -348,14 +368,14 @@ def convert_streamed(
     Returns None, and leaves the file unchanged, if the files or options need the whole motion in
     memory.
     """
-    if not _is_streamable(arguments, output):
+    if not _is_streamable(arguments, asked, output):
         return None
     from viewer.export.bvh.streaming import Parts, export_parts
     from viewer.formats.bvh.streaming import Irregular
 
     try:
         options = motion_options(arguments, skinning)
-        request = _opened(arguments, options)
+        request = _opened(arguments, asked, options)
     except ViewerError:
         return None  # reading the whole file finds and reports what is wrong
     if request is None:
@@ -376,14 +396,14 @@ def convert_streamed(
     return notes
 
 
-def _is_streamable(arguments: argparse.Namespace, output: Path) -> bool:
+def _is_streamable(arguments: argparse.Namespace, asked: SceneOptions, output: Path) -> bool:
     """Return whether the options can be applied to parts, and the output is a ``.bvh`` file."""
     given = [name for name in _OTHERS if getattr(arguments, name)]
     # Frame 0 and time 0 are values, too.
     given += [
         name for name in ("frame", "time", "model_path") if getattr(arguments, name) is not None
     ]
-    if given or arguments.springs == "on" or not clean_up_of(arguments).is_empty:
+    if given or arguments.springs == "on" or not asked.changes.is_empty:
         return False
     if arguments.kind not in (None, "bvh") or len(arguments.files) != 1:
         return False
@@ -417,15 +437,17 @@ class _Request:
             yield replace(part, first_frame=first)
 
 
-def _opened(arguments: argparse.Namespace, options: MotionOptions) -> _Request | None:
+def _opened(
+    arguments: argparse.Namespace, asked: SceneOptions, options: MotionOptions
+) -> _Request | None:
     """Return the request, or None if the file must be read as a whole."""
     from viewer.formats.bvh.streaming import open_stream
 
-    source = Source.open(scene_files(arguments)[0], size_limit(arguments))
+    source = Source.open(asked.paths[0], asked.size_limit)
     path = source.path
     if source.is_folder or path.suffix.lower() != ".bvh" or path.stat().st_size < _LARGE:
         return None
-    settings = motion_settings(arguments)
+    settings = asked.motion
     head = Source(path, source.peek(_PEEK))
     if detect(head) != "bvh" or len(head.diagnostics):
         return None
@@ -439,7 +461,7 @@ def _opened(arguments: argparse.Namespace, options: MotionOptions) -> _Request |
         used_options=set(),
     )
     scene, _ = begin(contents, settings)
-    warnings = [*scene.diagnostics, *apply_pose(scene, arguments)]
+    warnings = [*scene.diagnostics, *apply_pose(scene, asked.pose, asked.frames)]
     actor = scene.actors[0]
     assert isinstance(actor.clip, SampledClip)  # that of the stream
     span = frame_range(actor.clip, actor.clip.timing.frame_rate, requested_frames(arguments, actor))

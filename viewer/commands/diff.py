@@ -18,13 +18,13 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import TextIO
 
-from viewer.commands._diff.inputs import input_files
-from viewer.commands._output import PICTURES
-from viewer.commands._pose import add_skinning_arguments, skinning_of
+from viewer.commands._frames import parse_range
+from viewer.commands._input_files import input_files
+from viewer.commands._pose import add_skinning_arguments
 from viewer.commands._printing import table_lines
 from viewer.commands._progress import Progress
-from viewer.commands._scene import add_animation_argument, print_warnings
-from viewer.commands._sequence.frame_numbers import parse_range
+from viewer.commands._scene import PICTURES, print_warnings
+from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, described
 from viewer.diagnostics.record import is_recorded, note_values
@@ -79,11 +79,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="also open this file with every input, such as the .skel of .anim files",
     )
-    files.add_argument(
-        "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
-    )
-    files.add_argument("--unit", choices=METRES, help="length unit of BVH files")
-    add_animation_argument(files)
+    add_settings(files, MotionSettings, "up")
+    add_settings(files, MotionSettings, "unit", help="length unit of BVH files")
+    add_settings(files, MotionSettings, "animation")
     _add_poses(parser)
     _add_results(parser)
     add_skinning_arguments(parser)
@@ -133,14 +131,18 @@ def run(arguments: argparse.Namespace) -> int:
     if not 0 <= arguments.poses <= 10_000:
         raise ViewerError(f"--poses: expected 0 to 10000, found {arguments.poses}")
     frames = _frames(arguments.frames)
-    output = _checked_output(arguments)
-    open_one = _opener(arguments)
+    inputs = _inputs(arguments.common, [arguments.reference, *arguments.files])
+    output = None if arguments.output is None else Path(arguments.output)
+    if output is not None:
+        _check_picture(output)
+        check_targets([output], inputs, arguments.force)
+    open_one = _opener(arguments.common, settings_of(MotionSettings, arguments))
     reference = open_one(arguments.reference)
     print_warnings(reference.diagnostics)
-    skinning = skinning_of(arguments)
+    skinning = settings_of(Skinning, arguments)
     rows: list[_Compared] = []
     heats: list[_Heat] = []
-    inputs = [*_inputs(arguments), *reference.files]
+    inputs += reference.files
     for name in arguments.files:
         try:
             other = open_one(name)
@@ -153,7 +155,7 @@ def run(arguments: argparse.Namespace) -> int:
     stream = sys.stdout if output is None else summary_stream(output)
     if output is not None:
         check_targets([output], inputs, arguments.force)
-    _print(arguments, rows, stream)
+    _print(arguments.reference, rows, tolerance, arguments.json, stream)
     if output is not None:
         summary = _save_heat(heats, output, skinning)
         print(summary, file=sys.stderr if arguments.json else stream)
@@ -163,25 +165,20 @@ def run(arguments: argparse.Namespace) -> int:
     return _DIFFERS if exceeds else 0
 
 
-def _checked_output(arguments: argparse.Namespace) -> Path | None:
-    """Check the output image before anything is compared."""
-    if arguments.output is None:
-        return None
-    output = Path(arguments.output)
+def _check_picture(output: Path) -> None:
+    """Check the name of the output image before anything is compared."""
     require_stdout(output)
     if output.suffix.lower() not in PICTURES:
         raise UnsupportedFormatError(
             f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}), "
             f'found "{output.suffix}"'
         )
-    check_targets([output], _inputs(arguments), arguments.force)
-    return output
 
 
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
+def _inputs(common: Sequence[str], inputs: Sequence[str]) -> list[Path]:
     """Return the named files; missing ones are reported when they are opened."""
-    found = [Path(file) for file in arguments.common]
-    for text in (arguments.reference, *arguments.files):
+    found = [Path(file) for file in common]
+    for text in inputs:
         with contextlib.suppress(ViewerError):
             found += input_files(text)
     return found
@@ -196,13 +193,9 @@ def _frames(text: str | None) -> FrameRange | None:
     return found.first, found.stop
 
 
-def _opener(arguments: argparse.Namespace) -> Callable[[str], Scene]:
-    settings = MotionSettings(
-        up=arguments.up or "", unit=arguments.unit or "", animation=arguments.animation or ""
-    )
-
+def _opener(common: Sequence[str], settings: MotionSettings) -> Callable[[str], Scene]:
     def open_one(text: str) -> Scene:
-        return load(*arguments.common, *input_files(text), motion=settings)
+        return load(*common, *input_files(text), motion=settings)
 
     return open_one
 
@@ -247,12 +240,17 @@ def _lone(name: str, pairing: _Pairing) -> tuple[Diagnostic, ...]:
     )
 
 
-def _print(arguments: argparse.Namespace, rows: Sequence[_Compared], stream: TextIO) -> None:
-    tolerance = arguments.tolerance
-    if arguments.json or is_recorded():
-        found = _json_data(arguments.reference, rows, tolerance)
+def _print(
+    reference: str,
+    rows: Sequence[_Compared],
+    tolerance: float | None,
+    is_json: bool,
+    stream: TextIO,
+) -> None:
+    if is_json or is_recorded():
+        found = _json_data(reference, rows, tolerance)
         note_values(found)
-    if arguments.json:
+    if is_json:
         print(json.dumps(found, indent=2, ensure_ascii=False), file=stream)
     elif len(rows) > 1:
         print("\n".join(_table_of(rows, tolerance)), file=stream)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.commands._pose import add_skinning_arguments, skinning_of, use_file_method
-from viewer.commands._scene import add_scene_arguments, open_scene
+from viewer.commands._pose import add_skinning_arguments, use_file_method
+from viewer.commands._scene import add_scene_arguments, open_scene, scene_options
+from viewer.commands._settings import settings_of, stated
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
 from viewer.diagnostics.record import note_values
@@ -55,10 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the contents of the files."""
-    require_files(arguments, "info")
-    skinning = skinning_of(arguments)
-    scene = open_scene(arguments)
-    use_file_method(arguments, scene, skinning)
+    require_files(arguments.files, arguments.body, "info")
+    skinning = settings_of(Skinning, arguments)
+    scene = open_scene(scene_options(arguments))
+    use_file_method(scene, skinning, stated(Skinning, arguments))
     found = describe(scene, skinning)
     note_values(found)
     if arguments.json:

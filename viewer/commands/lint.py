@@ -6,26 +6,17 @@ import argparse
 import json
 from typing import Literal
 
-import numpy as np
-
-from viewer.commands._numbers import number
+from viewer.commands._frames import rate
+from viewer.commands._pose import PoseOptions
 from viewer.commands._printing import print_line, table_lines
 from viewer.commands._progress import Progress
-from viewer.commands._scene import (
-    add_capture_arguments,
-    add_file_arguments,
-    motion_settings,
-    scene_files,
-    size_limit,
-    use_models,
-)
-from viewer.commands._sequence.frame_numbers import rate
+from viewer.commands._scene import add_capture_arguments, add_file_arguments, scene_options
+from viewer.commands._settings import add_settings, number, settings_of
 from viewer.commands._usage import require_files
 from viewer.diagnostics.record import note_values
 from viewer.errors import ViewerError
 from viewer.lint import (
     CODES,
-    MAX_ROTATION,
     SEVERITIES,
     LintOptions,
     describe,
@@ -60,50 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--ignore", default="", metavar="CODE,…", help="codes to ignore, such as W006,M005"
     )
-    _add_limits(group)
-
-
-def _add_limits(group: argparse._ArgumentGroup) -> None:
-    """Add the limits of motions, which depend on the user's purpose."""
-    group.add_argument(
-        "--max-speed",
-        type=number,
-        metavar="S",
-        help="speed limit of joints and keypoints, in figure units per second (default: 15 sizes)",
-    )
-    group.add_argument(
-        "--max-rotation",
-        type=number,
-        default=MAX_ROTATION,
-        metavar="DEGREES",
-        help=f"speed limit of joint rotations, per second (default: {MAX_ROTATION:g})",
-    )
-    group.add_argument(
-        "--confidence",
-        type=number,
-        default=0.3,
-        metavar="C",
-        help="minimum confidence of captured keypoints; keypoints that are below it in more than 5 "
-        "%% of their frames are reported (default: 0.3)",
-    )
-    group.add_argument(
-        "--ground",
-        type=_ground,
-        default="auto",
-        metavar="HEIGHT|auto|none",
-        help="height of the ground; feet that are below it by more than 1 %% of the figure's "
-        "height (17 mm for a person) are reported; auto: the height at which feet rest longest; "
-        "none: feet are not checked (default: auto)",
-    )
-    group.add_argument(
-        "--fps",
-        type=rate,
-        metavar="N",
-        help="frames per second of captures, and for sampling keyframed clips (default: 30)",
-    )
-    group.add_argument(
-        "--hands", choices=("mean", "flat"), help="hand pose to which hand parameters are added"
-    )
+    # The limits of motions depend on the user's purpose.
+    add_settings(group, LintOptions, "max_speed", "max_rotation", "confidence")
+    add_settings(group, LintOptions, "ground", type=_ground)
+    add_settings(group, LintOptions, "frame_rate", type=rate)
+    add_settings(group, PoseOptions, "hands", choices=("mean", "flat"))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -111,26 +63,18 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.codes:
         print("\n".join(_code_lines()))
         return 0
-    require_files(arguments, "lint")
+    require_files(arguments.files, arguments.body, "lint")
     ignored = _ignored(arguments.ignore)
-    options = LintOptions(
-        max_speed=arguments.max_speed,
-        max_rotation=float(np.radians(arguments.max_rotation)),
-        confidence=arguments.confidence,
-        frame_rate=arguments.fps,
-        ground=arguments.ground,
-    )
-    use_models(arguments)
-    files = scene_files(arguments)
+    options = settings_of(LintOptions, arguments)
+    asked = scene_options(arguments)
+    files = asked.paths
     with Progress("checking", 1) as progress:
 
         def show(done: int, total: int, what: str) -> None:
             progress.title, progress.total = what, total
             progress.show(done)
 
-        scene, findings = lint_files(
-            files, options, motion_settings(arguments), size_limit(arguments), show
-        )
+        scene, findings = lint_files(files, options, asked.motion, asked.size_limit, show)
     findings = [finding for finding in findings if finding.code not in ignored]
     findings = worst_first(findings)
     described = describe(findings, scene)

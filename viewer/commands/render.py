@@ -11,23 +11,29 @@ import argparse
 import contextlib
 import re
 import string
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import add_cleanup_arguments
-from viewer.commands._numbers import number
-from viewer.commands._output import PICTURES, inputs_of
+from viewer.commands._frames import Frames, add_frame_arguments, parse_range
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, use_file_method
 from viewer.commands._scalar import choose_subject, scalar_text
 from viewer.commands._scene import (
+    PICTURES,
+    SceneOptions,
     add_capture_arguments,
     add_file_arguments,
+    inputs_of,
     open_scene,
     print_warnings,
+    scene_options,
 )
-from viewer.commands._sequence.frame_numbers import add_frame_arguments, parse_range
+from viewer.commands._sequence import Request
+from viewer.commands._settings import add_settings, settings_of, stated
 from viewer.commands._view import (
     VIEWS,
+    ViewOptions,
     add_camera_arguments,
     add_display_arguments,
     camera_notes,
@@ -39,6 +45,7 @@ from viewer.commands._view import (
     parse_size,
     warn_of_missing,
 )
+from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.interrupts import deferred, hold, poll
@@ -49,10 +56,11 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
+from viewer.rig.skinning import Skinning
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
-    from viewer.commands._sequence.shots import Request, Shots
+    from viewer.commands._sequence import Shots
     from viewer.media.picture_sinks import PictureSink, SheetSink
     from viewer.media.video import VideoSink
     from viewer.rendering.recorder import Recording
@@ -107,37 +115,65 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
 
 
+@dataclass(slots=True, eq=False)
+class _Drawing:
+    """What is drawn, how, and where it is written."""
+
+    asked: SceneOptions
+    view: ViewOptions
+    options: DisplayOptions
+    request: Request
+    size: tuple[int, int]
+    force: bool
+    """Whether existing files are replaced."""
+    panels: bool
+    device: int | None
+    """Index of the EGL device."""
+    is_chosen: bool
+    """Whether the quality was chosen."""
+
+    def check(self, files: Sequence[Path], scene: Scene | None = None) -> None:
+        """Raise if a file must not be replaced."""
+        check_targets(files, inputs_of(self.asked, scene), self.force)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Render the images, write them, and print their names."""
     _check_overlay(arguments)
     size = parse_size(_SIZE if arguments.size is None else arguments.size)
     output = Path(arguments.output)
-    _check_suffix(arguments, output)
-    request = _request_of(arguments, output)
-    if request is None or request.kind != "pictures":
-        check_targets([output], inputs_of(arguments), arguments.force)
-    options = display_of(arguments)
-    is_still = request is None or request.kind == "onion"
-    if arguments.quality is None and (not is_still or arguments.panels):
+    asked, view = scene_options(arguments), settings_of(ViewOptions, arguments)
+    _check_suffix(asked, output)
+    request = settings_of(Request, arguments, output=output)
+    quality = arguments.video_quality is not None
+    _complete(request, asked.frames, view, arguments.panels, has_quality=quality)
+    if request.kind != "pictures":
+        check_targets([output], inputs_of(asked), arguments.force)
+    options, is_chosen = display_of(arguments), arguments.quality is not None
+    if not is_chosen and (not request.is_still or arguments.panels):
         options.quality = "normal"
     _check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format has no transparency"])
-    scene = open_scene(arguments)
-    use_file_method(arguments, scene, options.skinning)
-    print_warnings(look_through_video(arguments, scene))
+    scene = open_scene(asked)
+    use_file_method(scene, options.skinning, stated(Skinning, arguments))
+    print_warnings(look_through_video(view, asked.motion, scene))
     if arguments.overlay is not None:
-        size = _overlay_size(arguments, scene) or size
-    hide_parts(arguments, scene, options)
+        size = _overlay_size(arguments.size is not None, scene) or size
+    hide_parts(view, scene, options)
     print_warnings(choose_subject(scene, options))
-    print_warnings(warn_of_missing(scene, options) + camera_notes(arguments, scene, options))
-    if request is not None and request.kind == "onion":
-        _draw_onion(request, arguments, scene, options, size)
-    elif request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
-        line = _draw_sequence(request, arguments, scene, options, size)
-        print(line, file=summary_stream(output))
+    notes = camera_notes(view, asked.motion, scene, options)
+    print_warnings(warn_of_missing(scene, options) + notes)
+    drawing = _Drawing(
+        *(asked, view, options, request, size),
+        *(arguments.force, arguments.panels, arguments.gpu, is_chosen),
+    )
+    if request.kind == "onion":
+        _draw_onion(drawing, scene)
+    elif request.kind and (request.is_certain or any(a.clip for a in scene.actors)):
+        print(_draw_sequence(drawing, scene), file=summary_stream(output))
     else:
-        _draw_still(arguments, scene, options, size)
+        _draw_still(drawing, scene)
     return 0
 
 
@@ -155,14 +191,14 @@ def _check_overlay(arguments: argparse.Namespace) -> None:
     arguments.video, arguments.no_grid = arguments.overlay, True
 
 
-def _overlay_size(arguments: argparse.Namespace, scene: Scene) -> tuple[int, int] | None:
+def _overlay_size(is_chosen: bool, scene: Scene) -> tuple[int, int] | None:
     """Return the size of the video, unless another one is requested.
 
     Raises ViewerError if no file is a capture.
     """
     if scene.images is None:
         raise ViewerError("--overlay: expected a capture with a camera, found none")
-    return None if arguments.size else scene.images.size_of(scene.images.cameras[0])
+    return None if is_chosen else scene.images.size_of(scene.images.cameras[0])
 
 
 def _check_device(device: int | None) -> None:
@@ -173,26 +209,24 @@ def _check_device(device: int | None) -> None:
         check_device(device)
 
 
-def _draw_still(
-    arguments: argparse.Namespace, scene: Scene, options: DisplayOptions, size: tuple[int, int]
-) -> None:
+def _draw_still(drawing: _Drawing, scene: Scene) -> None:
     from viewer.formats import save_image
     from viewer.rendering.camera_views import with_cameras
 
-    output = Path(arguments.output)
-    check_targets([output], inputs_of(arguments, scene), arguments.force)
+    options, view, size = drawing.options, drawing.view, drawing.size
+    output = drawing.request.output
+    drawing.check([output], scene)
     points = scene_points(scene, options.show)
     box = bounding_box(points)
-    if arguments.follow is not None:
-        arguments.look_at = arguments.follow  # like one frame of a video that follows it
-    print_warnings(follow_notes(arguments, scene))
-    camera = camera_of(arguments, scene, with_cameras(scene, options, points), size)
-    if arguments.panels:
-        fits = (arguments.distance, arguments.view, arguments.look_at) == (None, None, None)
-        pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
+    if view.follow is not None:
+        view.look_at = view.follow  # like one frame of a video that follows it
+    print_warnings(follow_notes(view, scene))
+    camera = camera_of(view, scene, with_cameras(scene, options, points), size)
+    if drawing.panels:
+        pixels = _draw_panels(scene, size, camera, options, box, drawing.device, view.fits)
     else:
-        is_chosen = arguments.quality is not None
-        pixels = draw_scene(scene, size, camera, options, box, arguments.gpu, is_chosen)
+        is_chosen = drawing.is_chosen
+        pixels = draw_scene(scene, size, camera, options, box, drawing.device, is_chosen)
     save_image(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
     colors = scalar_text(scene, options)
@@ -200,35 +234,30 @@ def _draw_still(
     print(line, file=summary_stream(output))
 
 
-def _draw_onion(
-    request: Request,
-    arguments: argparse.Namespace,
-    scene: Scene,
-    options: DisplayOptions,
-    size: tuple[int, int],
-) -> None:
+def _draw_onion(drawing: _Drawing, scene: Scene) -> None:
     """Draw several poses of a motion in one image."""
-    from viewer.commands._sequence.shots import shots_of
+    from viewer.commands._sequence import shots_of
     from viewer.formats import save_image
     from viewer.rendering.camera_views import with_cameras
     from viewer.rig.motion.onion import onion
 
-    shots = shots_of(request, arguments, scene)
-    check_targets([request.output], inputs_of(arguments, scene), arguments.force)
+    asked, options, size = drawing.asked, drawing.options, drawing.size
+    output = drawing.request.output
+    shots = shots_of(drawing.request, asked.frames, asked.pose, scene)
+    drawing.check([output], scene)
     print_warnings(shots.notes)
-    poses = onion(scene, shots.times.tolist(), interpolate=arguments.interpolate_gaps)
+    poses = onion(scene, shots.times.tolist(), interpolate=asked.frames.interpolates)
     points = scene_points(poses, options.show)
-    camera = camera_of(arguments, poses, with_cameras(poses, options, points), size)
-    is_chosen = arguments.quality is not None
+    camera = camera_of(drawing.view, poses, with_cameras(poses, options, points), size)
     box = bounding_box(points)
-    pixels = draw_scene(poses, size, camera, options, box, arguments.gpu, is_chosen)
-    save_image(request.output, pixels)
+    pixels = draw_scene(poses, size, camera, options, box, drawing.device, drawing.is_chosen)
+    save_image(output, pixels)
     frames = ", ".join(map(str, shots.numbers))
-    line = f"{printable(request.output)}: {size[0]} x {size[1]}, poses of frames {frames}"
-    print(line, file=summary_stream(request.output))
+    line = f"{printable(output)}: {size[0]} x {size[1]}, poses of frames {frames}"
+    print(line, file=summary_stream(output))
 
 
-def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
+def _check_suffix(asked: SceneOptions, output: Path) -> None:
     """Check that the suffix is that of an image or video."""
     suffix = output.suffix.lower()
     try:
@@ -237,7 +266,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         return  # reported by check_targets
     if suffix not in ("", *PICTURES, *VIDEOS) and is_ours:
         # Overwriting an input is worse, so it is reported first.
-        check_targets([output], inputs_of(arguments), force=True)
+        check_targets([output], inputs_of(asked), force=True)
         raise UnsupportedFormatError(
             f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) or a video "
             f"({', '.join(VIDEOS)}), found {suffix}"
@@ -308,128 +337,87 @@ def _grid_step(points: Floats) -> float:
 def _add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of videos, numbered images and contact sheets."""
     group = parser.add_argument_group("videos, numbered images, contact sheets")
-    group.add_argument(
-        "--turntable",
-        nargs="?",
-        const="",
-        metavar="SECONDS|DEGREESdeg",
-        help="rotate the camera once within the given number of seconds, or by the given degrees",
-    )
-    group.add_argument(
-        "--contact-sheet",
-        type=int,
-        metavar="N",
-        help="one image of N numbered frames, evenly spaced over the motion, with a common scale "
-        "and ground line",
-    )
-    group.add_argument(
-        "--onion",
-        type=int,
-        metavar="N",
-        help="one image of N poses, each at its position, evenly spaced over the motion, with "
-        "earlier poses fainter",
-    )
-    group.add_argument(
-        "--speed",
-        type=number,
-        metavar="S",
-        help="playback speed of videos: 0.5 is half as fast, -1 backwards",
-    )
-    group.add_argument(
-        "--follow",
-        metavar="NAME",
-        help="follow an actor or joint with the camera: fox, head, or fox/head; captured people "
-        "by number: 1 or 1:pelvis (a single picture: aim at it)",
-    )
-    group.add_argument(
-        "--video-quality",
-        type=number,
-        metavar="Q",
-        help="quality of .mp4 and .webm: 0 to 100 (default: 75)",
-    )
+    add_settings(group, Request, "turntable", "contact_sheet", "onion", "speed")
+    add_settings(group, ViewOptions, "follow")
+    add_settings(group, Request, "video_quality")
 
 
-def _request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
-    """Return the requested output if it is more than one still image.
+def _complete(
+    request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
+) -> None:
+    """Set the kind of the requested output and its range of frames.
 
     Raises ViewerError if options conflict, or the name of numbered images has no frame field.
     """
-    frames = None if arguments.frames is None else parse_range(arguments.frames)
-    turntable = None
-    if arguments.turntable is not None:
-        from viewer.commands._sequence.shots import parse_turntable
-
-        turntable = parse_turntable(arguments.turntable)
-    kind, is_certain = _kind(arguments, output)
-    _check_options(arguments, kind)
-    if not kind:
-        return None
-    if kind == "pictures":
+    output = request.output
+    request.range = None if frames.frames is None else parse_range(frames.frames)
+    asks = request.range is not None or request.turntable is not None
+    if request.contact_sheet is not None:
+        request.kind = "sheet"
+    elif request.onion is not None:
+        request.kind = "onion"
+    elif _FIELD.search(str(output)):
+        request.kind = "pictures"
+    elif output.suffix.lower() == ".gif":
+        wants = asks or view.follow is not None or request.speed is not None
+        if wants or not (frames.is_one or panels):
+            request.kind, request.is_certain = "video", wants
+    elif output.suffix.lower() in VIDEOS:
+        request.kind = "video"
+    elif asks:
+        request.kind = "pictures"
+    _check_options(request, frames, view, panels, has_quality)
+    if request.kind == "pictures":
         _check_name(str(output))
         _check_picture(output)
-    from viewer.commands._sequence.shots import Request
-
-    return Request(kind, output, frames, turntable, is_certain)
 
 
-def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
-    """Return the kind of output, "" for a still image, and whether the kind is certain."""
-    asks = arguments.frames is not None or arguments.turntable is not None
-    if arguments.contact_sheet is not None:
-        return "sheet", True
-    if arguments.onion is not None:
-        return "onion", True
-    if _FIELD.search(str(output)):
-        return "pictures", True
-    if output.suffix.lower() == ".gif":
-        wants = asks or arguments.follow is not None or arguments.speed is not None
-        is_still = arguments.frame is not None or arguments.time is not None or arguments.panels
-        return ("video", wants) if wants or not is_still else ("", True)
-    if output.suffix.lower() in VIDEOS:
-        return "video", True
-    return ("pictures", True) if asks else ("", True)
-
-
-def _check_options(arguments: argparse.Namespace, kind: str) -> None:
-    if kind and arguments.panels:
+def _check_options(
+    request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
+) -> None:
+    if request.kind and panels:
         raise ViewerError("--panels: applies to single images only, not to videos or sequences")
-    if arguments.frames is not None:
+    if request.range is not None:
         for option in ("frame", "time"):
-            if getattr(arguments, option) is not None:
+            if getattr(frames, option) is not None:
                 raise ViewerError(f"--frames and --{option}: expected one of them, found both")
-    if arguments.follow is not None and arguments.look_at is not None:
+    if view.follow is not None and view.look_at is not None:
         raise ViewerError("--follow and --look-at: expected one of them, found both")
-    _check_onion(arguments, kind)
-    for option in ("speed", "video-quality"):
-        given = getattr(arguments, option.replace("-", "_"))
-        if given is not None and kind != "video":
+    _check_onion(request, frames, view)
+    given = {"speed": request.speed is not None, "video-quality": has_quality}
+    for option, is_given in given.items():
+        if is_given and request.kind != "video":
             raise ViewerError(f"--{option}: applies to videos only: {', '.join(VIDEOS)}")
-    is_gif = Path(arguments.output).suffix.lower() == ".gif"
-    if arguments.video_quality is not None and is_gif:
+    suffix, speed, cells = request.output.suffix.lower(), request.speed, request.contact_sheet
+    if has_quality and suffix == ".gif":
         raise ViewerError("--video-quality: applies to .mp4 and .webm, not to a GIF")
-    speed = arguments.speed
     if speed is not None and not 1e-3 <= abs(speed) <= 1e3:
         raise ViewerError(f"--speed: expected 0.001 to 1000 or their negatives, found {speed:g}")
-    cells = arguments.contact_sheet
     if cells is not None and not 1 <= cells <= _MOST_CELLS:
         raise ViewerError(f"--contact-sheet: expected 1 to {_MOST_CELLS} frames, found {cells}")
-    if kind == "sheet" and Path(arguments.output).suffix.lower() in (".mp4", ".webm"):
+    if request.kind == "sheet" and suffix in (".mp4", ".webm"):
         raise ViewerError(
             "--contact-sheet: expected an image file name, such as .png, found a video"
         )
 
 
-def _check_onion(arguments: argparse.Namespace, kind: str) -> None:
-    poses, suffix = arguments.onion, Path(arguments.output).suffix.lower()
+def _check_onion(request: Request, frames: Frames, view: ViewOptions) -> None:
+    poses = request.onion
     if poses is None:
         return
-    for option in ("contact_sheet", "turntable", "follow", "frame", "time"):
-        if getattr(arguments, option) is not None:
-            name = option.replace("_", "-")
+    others = {
+        "contact-sheet": request.contact_sheet,
+        "turntable": request.turntable,
+        "follow": view.follow,
+        "frame": frames.frame,
+        "time": frames.time,
+    }
+    for name, value in others.items():
+        if value is not None:
             raise ViewerError(f"--onion and --{name}: expected one of them, found both")
     if not 2 <= poses <= _MOST_POSES:
         raise ViewerError(f"--onion: expected 2 to {_MOST_POSES} poses, found {poses}")
-    if suffix in (".mp4", ".webm"):
+    if request.output.suffix.lower() in (".mp4", ".webm"):
         raise ViewerError("--onion: expected the name of a picture, such as .png, found a video")
 
 
@@ -460,20 +448,14 @@ def _check_picture(output: Path) -> None:
         )
 
 
-def _draw_sequence(
-    request: Request,
-    arguments: argparse.Namespace,
-    scene: Scene,
-    options: DisplayOptions,
-    size: tuple[int, int],
-) -> str:
+def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
     """Draw and write all frames; return a line about the written files.
 
     Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
     Raises OutputError if a file already exists, or cannot be written.
     """
     from viewer.commands._progress import Progress
-    from viewer.commands._sequence.shots import shots_of
+    from viewer.commands._sequence import shots_of
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import fit_turntable, frame_motion, framed_poses, seen_aspect
     from viewer.rendering.gpu.context import thread_graphics
@@ -481,22 +463,24 @@ def _draw_sequence(
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record
 
-    shots = shots_of(request, arguments, scene)
+    asked, request, view = drawing.asked, drawing.request, drawing.view
+    options, size = drawing.options, drawing.size
+    shots = shots_of(request, asked.frames, asked.pose, scene)
     outputs = _outputs(request, shots)
-    check_targets(outputs, inputs_of(arguments, scene), arguments.force)
-    recording = _recording(request, arguments, scene, shots, options)
+    drawing.check(outputs, scene)
+    recording = _recording(drawing, scene, shots)
     points, recording.box = frame_motion(recording)
     points = with_cameras(scene, options, points, framed_poses(recording))
-    aspect = seen_aspect(camera_of(arguments, scene, points, size), points)
-    sink = _sink(request, arguments, options, shots, outputs, size, aspect)
-    print_warnings([*shots.notes, *follow_notes(arguments, scene), *getattr(sink, "notes", [])])
+    aspect = seen_aspect(camera_of(view, scene, points, size), points)
+    sink = _sink(request, options, shots, outputs, size, aspect)
+    print_warnings([*shots.notes, *follow_notes(view, scene), *getattr(sink, "notes", [])])
     recording.size = frame_size = getattr(sink, "cell", size)
-    recording.camera = camera_of(arguments, scene, points, frame_size)
-    if arguments.distance is None and arguments.look_at is None:
+    recording.camera = camera_of(view, scene, points, frame_size)
+    if view.distance is None and view.look_at is None:
         fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
     title = f"drawing {printable(outputs[0].name)}"
     hold()
-    with Offscreen(graphics=thread_graphics(arguments.gpu)) as offscreen, offscreen.context:
+    with Offscreen(graphics=thread_graphics(drawing.device)) as offscreen, offscreen.context:
         if request.kind == "sheet":
             cells = f"cells of a contact sheet of {size[0]} x {size[1]} pixels"
             check_size(offscreen.context, frame_size, cells)
@@ -526,7 +510,6 @@ def _outputs(request: Request, shots: Shots) -> list[Path]:
 
 def _sink(
     request: Request,
-    arguments: argparse.Namespace,
     options: DisplayOptions,
     shots: Shots,
     outputs: list[Path],
@@ -536,9 +519,8 @@ def _sink(
     if request.kind == "video":
         from viewer.media.video import VideoSink
 
-        quality = 75.0 if arguments.video_quality is None else arguments.video_quality
         is_transparent = options.background == "transparent"
-        return VideoSink(outputs[0], size, shots.rate, quality, is_transparent)
+        return VideoSink(outputs[0], size, shots.rate, request.video_quality, is_transparent)
     from viewer.media.picture_sinks import PictureSink, SheetSink
 
     if request.kind == "sheet":
@@ -546,31 +528,26 @@ def _sink(
     return PictureSink(outputs)
 
 
-def _recording(
-    request: Request,
-    arguments: argparse.Namespace,
-    scene: Scene,
-    shots: Shots,
-    options: DisplayOptions,
-) -> Recording:
+def _recording(drawing: _Drawing, scene: Scene, shots: Shots) -> Recording:
     """Return the recording, without its camera, box and size."""
     from viewer.rendering.camera import Camera
     from viewer.rendering.framing import find_follow, level_shifts
     from viewer.rendering.recorder import Recording
 
+    view = drawing.view
     recording = Recording(
         scene,
         shots.times,
         Camera(up=scene.up),
         (1, 1),
-        options,
+        drawing.options,
         moves=shots.moves,
-        interpolate=arguments.interpolate_gaps,
+        interpolate=drawing.asked.frames.interpolates,
         turntable=shots.turntable,
-        follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
+        follow=None if view.follow is None else find_follow(scene, view.follow),
     )
-    is_free = arguments.follow is None and arguments.view is None
-    if request.kind == "sheet" and is_free and shots.moves:
+    is_free = view.follow is None and view.view is None
+    if drawing.request.kind == "sheet" and is_free and shots.moves:
         recording.shifts = level_shifts(recording)
     return recording
 

@@ -14,25 +14,26 @@ files are checked before the transfer, which takes long, and written together or
 from __future__ import annotations
 
 import argparse
-import math
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
 from viewer.autorig.alignment.orientation_search import AXES
-from viewer.autorig.alignment.surface_alignment import SCALES, AlignmentSettings
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.correspondence import MatchSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged, clip_for
-from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
+from viewer.autorig.settings import TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.commands._numbers import number
-from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
+from viewer.commands._frames import Frames, add_frame_arguments, frames_of
+from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._settings import add_settings, settings_of
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
@@ -57,7 +58,6 @@ from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.skinning import joint_matrices, posed_mesh
 from viewer.streams import require_stdout, summary_stream
 
-_SMOOTHING = 10  # number of iterations if --smooth has no value
 # Landmarks.
 _FARTHEST = 1e9  # largest coordinate, in any unit
 _LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
@@ -128,70 +128,23 @@ def _add_template_pose_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("method")
-    texts = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
-    group.add_argument("--method", choices=METHODS, default="robust", help=texts)
-    group.add_argument(
-        "--max-distance",
-        type=number,
-        default=0.05,
-        metavar="X",
-        help="maximum distance of matching points, relative to the target's size (default: 0.05)",
-    )
-    group.add_argument(
-        "--max-angle",
-        type=number,
-        default=30.0,
-        metavar="DEG",
-        help="maximum angle between the normals of matching points (default: 30)",
-    )
-    group.add_argument(
-        "--smooth",
-        type=int,
-        nargs="?",
-        const=_SMOOTHING,
-        default=0,
-        metavar="N",
-        help=f"smooth inpainted weights, N iterations ({_SMOOTHING} without a number)",
-    )
-    group.add_argument(
-        "--max-influences", type=int, metavar="N", help="keep each vertex's N strongest influences"
-    )
-    group.add_argument(
-        "--joints",
-        choices=JOINTS,
-        default="surface",
-        help="place joints by the surface around them, or only by the alignment (default: surface)",
-    )
-    group.add_argument(
-        "--no-fit",
-        action="store_true",
-        help="keep the template's pose and proportions, even if rotating its joints and scaling "
-        "its limbs would align it with the mesh much better",
-    )
-    group.add_argument(
-        "--no-correctives", action="store_true", help="omit the template's pose correctives"
-    )
+    add_settings(group, TransferSettings, "method")
+    add_settings(group, MatchSettings)
+    add_settings(group, WeightSettings)
+    add_settings(group, TransferSettings, "joints", "fits", "correctives")
 
 
 def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("alignment")
-    group.add_argument("--up", choices=AXES, help="up axis of the target (default: estimated)")
-    group.add_argument("--facing", choices=AXES, help="front of the target (default: estimated)")
-    group.add_argument(
-        "--scale",
-        choices=SCALES,
-        default="uniform",
-        help="scale of the template: one factor, one factor per axis, or none (default: uniform)",
-    )
+    add_settings(group, AlignmentSettings, "up", "facing", choices=AXES)
+    add_settings(group, AlignmentSettings, "scale")
     group.add_argument(
         "--landmarks",
         metavar="FILE",
         help="file with three or more pairs of points, one per line: a joint or position of the "
         "posed template, and a position on the target",
     )
-    group.add_argument(
-        "--no-refine", action="store_true", help="skip the refinement of the alignment"
-    )
+    add_settings(group, AlignmentSettings, "refines")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -200,21 +153,34 @@ def run(arguments: argparse.Namespace) -> int:
 
     output = None if arguments.output is None else Path(arguments.output)
     meta = vrm_meta(arguments, output)
-    inputs = _inputs(arguments)
+    pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
+    inputs = _inputs(
+        [
+            *(*arguments.files, *arguments.template, *pose.files, *arguments.clips),
+            *([arguments.landmarks] if arguments.landmarks else []),
+        ]
+    )
     if output is not None:
         require_stdout(output)
         check_targets(files_of(output), inputs, arguments.force)
-    target = _target(arguments, inputs)
+    target = _target(arguments.files, inputs)
     if output is not None and output.suffix.lower() == ".vrm":
         from viewer.export.vrm.meta import checked_meta
 
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
-    template = _template(arguments, inputs)
+    if arguments.template_frame is not None:
+        if frames.frame is not None:
+            raise ViewerError("--frame and --template-frame: expected one of them, found both")
+        frames.frame, frames.option = arguments.template_frame, "--template-frame"
+    template_files = [
+        file for name in arguments.template or ["body"] for file in _template_files(name)
+    ]
+    template = _template(template_files, arguments.rig or "", pose, frames, inputs)
     if output is not None and output.suffix.lower() != ".npz":
         # The rigged mesh gets the template's joints, and the rig transfer takes long.
         check_figure(exporter_for(output), template.figure)
     settings = _settings(arguments, template, output)
-    clips = _read_clips(arguments, _files(arguments), template.figure)
+    clips = _read_clips(arguments.clips, output, template_files, template.figure, frames.fps)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
     title = f"rigging {printable(target.name, 40)}"
@@ -240,16 +206,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
-    named = [*arguments.files, *arguments.template, *pose_files(arguments)]
-    named += arguments.clips
-    named += [arguments.landmarks] if arguments.landmarks else []
+def _inputs(named: Sequence[str]) -> list[Path]:
     return [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
 
 
-def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
+def _target(files: Sequence[str], inputs: list[Path]) -> Figure:
     """Return the mesh to rig; a mesh that has a rig is used in its current pose."""
-    scene = load(*map(resolve, arguments.files))
+    scene = load(*map(resolve, files))
     inputs += scene.files
     print_warnings(scene.diagnostics)
     meshes = [actor for actor in scene.actors if actor.figure.mesh is not None]
@@ -264,13 +227,19 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
     return Figure(figure.name, posed_mesh(figure, actor.pose))
 
 
-def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
+def _template(
+    files: Sequence[Path], rig: str, pose: PoseOptions, frames: Frames, inputs: list[Path]
+) -> Actor:
     """Return the figure whose rig is transferred, posed and shaped as requested."""
-    settings = MotionSettings(frame_rate=arguments.fps, rig=arguments.rig or "")
-    scene = load(*_files(arguments), motion=settings)
+    scene = load(*files, motion=MotionSettings(frame_rate=frames.fps, rig=rig))
     inputs += scene.files
-    _check_frame(scene, arguments)
-    print_warnings([*scene.diagnostics, *apply_pose(scene, arguments)])
+    if frames.is_one and all(actor.clip is None for actor in scene.actors):
+        option = "--time" if frames.frame is None else frames.option
+        raise ViewerError(
+            f"{option}: expected a template with a motion, found none; add the motion's file with "
+            "another --from, as in --from body --from walk.npz"
+        )
+    print_warnings([*scene.diagnostics, *apply_pose(scene, pose, frames)])
     attached = [actor for actor in scene.actors if actor.figure.is_attached]
     if not attached:
         raise RigError("--from: expected a figure with mesh, skeleton and skin, found none")
@@ -282,46 +251,12 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     return attached[0]
 
 
-def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
-    """Apply --template-frame, and check that the template of a frame or time has a motion.
-
-    Raises ViewerError if the template has no motion, or two frames are given.
-    """
-    if arguments.template_frame is not None:
-        if arguments.frame is not None:
-            raise ViewerError("--frame and --template-frame: expected one of them, found both")
-        arguments.frame, arguments.frame_option = arguments.template_frame, "--template-frame"
-    if arguments.frame is None and arguments.time is None:
-        return
-    if all(actor.clip is None for actor in scene.actors):
-        option = "--time" if arguments.frame is None else arguments.frame_option
-        raise ViewerError(
-            f"{option}: expected a template with a motion, found none; add the motion's file with "
-            "another --from, as in --from body --from walk.npz"
-        )
-
-
-def _files(arguments: argparse.Namespace) -> list[Path]:
-    return [file for name in arguments.template or ["body"] for file in _template_files(name)]
-
-
 def _template_files(name: str) -> list[Path]:
     path, *others = named_files(name)
     near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, [*BUNDLED])
     if near:
         raise FormatError(Diagnostic("F001.no-template", path, values={"near": near}))
     return [path, *others]
-
-
-def _check_numbers(arguments: argparse.Namespace) -> None:
-    if not 0.0 <= arguments.max_angle <= 180.0:
-        raise ViewerError(f"--max-angle: expected 0 to 180, found {arguments.max_angle:g}")
-    if not arguments.max_distance >= 0.0:
-        raise ViewerError(f"--max-distance: expected 0 or more, found {arguments.max_distance:g}")
-    if arguments.smooth < 0:
-        raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
-    if arguments.max_influences is not None and arguments.max_influences < 1:
-        raise ViewerError(f"--max-influences: expected 1 or more, found {arguments.max_influences}")
 
 
 def _settings(
@@ -332,32 +267,18 @@ def _settings(
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)
         landmarks = read_landmarks(source, template.figure, template.require_pose())
-    _check_numbers(arguments)
-    as_rig = output is not None and output.suffix.lower() != ".npz"
-    angle = math.radians(arguments.max_angle)
-    usual = MatchSettings()
-    return TransferSettings(
-        method=arguments.method,
-        alignment=AlignmentSettings(
-            up=arguments.up,
-            facing=arguments.facing,
-            scale=arguments.scale,
-            landmarks=landmarks,
-            refines=not arguments.no_refine,
-        ),
-        weights=WeightSettings(
-            match=MatchSettings(
-                max_distance=arguments.max_distance,
-                max_angle=angle,
-                near_angle=max(angle, usual.near_angle),
-            ),
-            smoothing_rounds=arguments.smooth,
-            max_influences=arguments.max_influences,
-        ),
-        joints=arguments.joints,
-        fits=not arguments.no_fit,
-        correctives=not (arguments.no_correctives or as_rig),
+    if arguments.smooth < 0:
+        raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
+    match = settings_of(MatchSettings, arguments)
+    match = replace(match, near_angle=max(match.max_angle, match.near_angle))
+    settings = settings_of(
+        TransferSettings,
+        arguments,
+        alignment=settings_of(AlignmentSettings, arguments, landmarks=landmarks),
+        weights=settings_of(WeightSettings, arguments, match=match),
     )
+    as_rig = output is not None and output.suffix.lower() != ".npz"
+    return replace(settings, correctives=False) if as_rig else settings
 
 
 def _print_report(rigged: Rigged, stream: TextIO) -> None:
@@ -439,28 +360,31 @@ class _TransferredClip:
 
 
 def _read_clips(
-    arguments: argparse.Namespace, template: list[Path], figure: Figure
+    clips: Sequence[str],
+    output: Path | None,
+    template: list[Path],
+    figure: Figure,
+    fps: float | None,
 ) -> list[_TransferredClip]:
     """Return the motions named by ``--clip``, before any work is done.
 
-    ``arguments``: arguments of ``viewer rig``.
+    ``clips``: their files.
     ``template``: the template's files.
     ``figure``: the template.
     Raises ViewerError if there is no output to write next to, a file contains no motion of the
     template, or two output files would have the same name.
     """
-    if not arguments.clips:
+    if not clips:
         return []
-    if arguments.output is None:
+    if output is None:
         raise ViewerError("--clip: expected -o FILE to write the motion next to, found none")
-    output = Path(arguments.output)
     found: list[_TransferredClip] = []
     suffix = ".anim" if is_course_rig(figure.require_skeleton()) else ".bvh"
-    for name in arguments.clips:
+    for name in clips:
         path = output.with_name(f"{output.stem}-{Path(name).stem}{suffix}")
         if any(each.path == path for each in found):
             raise ViewerError(f"--clip: expected different file names, found {path.stem} twice")
-        found.append(_TransferredClip(_clip_of(name, template, arguments.fps), path))
+        found.append(_TransferredClip(_clip_of(name, template, fps), path))
     return found
 
 

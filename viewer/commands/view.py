@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from viewer.commands._cleanup import add_cleanup_arguments, clean_up_of
-from viewer.commands._numbers import number
+from viewer.commands._cleanup import add_cleanup_arguments
+from viewer.commands._frames import add_frame_arguments
 from viewer.commands._pose import (
     add_pose_arguments,
     add_skinning_arguments,
@@ -16,17 +17,18 @@ from viewer.commands._pose import (
     use_file_method,
 )
 from viewer.commands._scene import (
+    SceneOptions,
     add_capture_arguments,
     add_file_arguments,
     begin_scene,
     clean,
     finish,
-    motion_settings,
     print_warnings,
-    scene_files,
+    scene_options,
 )
-from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._settings import number, settings_of, stated
 from viewer.commands._view import (
+    ViewOptions,
     add_camera_arguments,
     add_display_arguments,
     camera_of,
@@ -46,6 +48,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
+from viewer.rig.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
@@ -87,20 +90,22 @@ def run(arguments: argparse.Namespace) -> int:
     from viewer.app.display import NoDisplay, find_display
 
     problems = _fill_in(arguments)
-    options = display_of(arguments)
+    options, asked = display_of(arguments), scene_options(arguments)
+    view = settings_of(ViewOptions, arguments)
+    begin = partial(_start, asked, view, options, stated(Skinning, arguments))
     try:
         find_display()
     except NoDisplay as problem:
         for text in problems:
             to_stderr(text)
-        start = _start(arguments, options)
+        start = begin()
         for builder in start.builders:
             finish(builder, start.scene)
         box = bounding_box(start.points)
         return _draw_instead(str(problem), start.scene, start.camera, options, box)
     from viewer.app.opening import Opening, watch
 
-    opening = Opening(_title(arguments), partial(_start, arguments, options))
+    opening = Opening(_title(asked.files), begin)
     try:
         shell = watch(opening, arguments.scale)
     except Cancelled:
@@ -117,12 +122,12 @@ def run(arguments: argparse.Namespace) -> int:
         start.scene,
         camera=start.camera,
         options=options,
-        paths=scene_files(arguments),
+        paths=asked.paths,
         scale=arguments.scale,
-        fit_distance=(arguments.distance, arguments.view, arguments.look_at) == (None, None, None),
+        fit_distance=view.fits,
         builders=start.builders,
         plays=arguments.play,
-        motion=motion_settings(arguments),
+        motion=asked.motion,
         shell=shell,
         messages=problems,
     )
@@ -138,26 +143,27 @@ class _Start(NamedTuple):
     camera: Camera
 
 
-def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
-    """Open and pose the files, and print warnings."""
-    scene, builders = begin_scene(arguments)
-    changes = clean_up_of(arguments)
-    if arguments.time is not None or arguments.frame is not None or not changes.is_empty:
+def _start(
+    asked: SceneOptions, view: ViewOptions, options: DisplayOptions, given: Collection[str]
+) -> _Start:
+    """Open and pose the files, and print warnings; ``given`` are the stated fields of skinning."""
+    scene, builders = begin_scene(asked)
+    if asked.frames.is_one or not asked.changes.is_empty:
         for builder in builders:
             finish(builder, scene)  # determines who is present at that time
-    clean(scene, changes)
-    print_warnings(apply_pose(scene, arguments))
-    use_file_method(arguments, scene, options.skinning)
-    print_warnings(look_through_video(arguments, scene))
-    hide_parts(arguments, scene, options)
-    print_warnings(warn_of_missing(scene, options) + follow_notes(arguments, scene))
+    clean(scene, asked.changes)
+    print_warnings(apply_pose(scene, asked.pose, asked.frames))
+    use_file_method(scene, options.skinning, given)
+    print_warnings(look_through_video(view, asked.motion, scene))
+    hide_parts(view, scene, options)
+    print_warnings(warn_of_missing(scene, options) + follow_notes(view, scene))
     prepare_scene(scene)
     points = scene_points(scene, options.show)
-    return _Start(scene, builders, points, camera_of(arguments, scene, points, SIZE))
+    return _Start(scene, builders, points, camera_of(view, scene, points, SIZE))
 
 
-def _title(arguments: argparse.Namespace) -> str:
-    names = [opened_text(Path(file)) for file in arguments.files]
+def _title(files: Sequence[str]) -> str:
+    names = [opened_text(Path(file)) for file in files]
     return " + ".join(names) or "the bundled figure"
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
@@ -24,22 +25,41 @@ NO_TIMES: Floats = np.zeros(0)
 class LintOptions:
     """Check thresholds that depend on the user's purpose."""
 
-    max_speed: float | None = None
-    """Maximum speed of a joint or keypoint, figure units per second; None for 15 times the figure's
-    size."""
-    max_rotation: float = float(np.radians(MAX_ROTATION))
-    """Maximum rotation rate of a joint relative to its parent, radians per second; by default
-    ``MAX_ROTATION``."""
-    confidence: float = 0.3
-    """Captured keypoints below this have low confidence."""
+    max_speed: float | None = setting(
+        None,
+        "speed limit of joints and keypoints, in figure units per second (default: 15 sizes)",
+        metavar="S",
+    )
+    max_rotation: float = setting(
+        float(np.radians(MAX_ROTATION)),
+        f"speed limit of joint rotations, per second (default: {MAX_ROTATION:g})",
+        given=MAX_ROTATION,
+        read=math.radians,
+        metavar="DEGREES",
+    )
+    """Radians per second, relative to the joint's parent."""
+    confidence: float = setting(
+        0.3,
+        "minimum confidence of captured keypoints; keypoints that are below it in more than 5 %% "
+        "of their frames are reported (default: {default})",
+        metavar="C",
+    )
     rate: float = 60.0
     """Minimum sampling rate of keyed clips, per second."""
-    frame_rate: float | None = None
-    """Frames per second for numbering the frames of keyed clips; None for the rate of their
-    keys."""
-    ground: float | Literal["auto", "none"] = "auto"
-    """Height of the ground along the scene's up axis; detected from the feet if ``"auto"``; with
-    ``"none"``, feet are not checked."""
+    frame_rate: float | None = setting(
+        None,
+        "frames per second of captures, and for sampling keyframed clips (default: 30)",
+        flag="--fps",
+        metavar="N",
+    )
+    ground: float | Literal["auto", "none"] = setting(
+        "auto",
+        "height of the ground; feet that are below it by more than 1 %% of the figure's height (17 "
+        "mm for a person) are reported; auto: the height at which feet rest longest; none: feet "
+        "are not checked (default: {default})",
+        metavar="HEIGHT|auto|none",
+    )
+    """Along the scene's up axis."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

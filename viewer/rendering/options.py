@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import field
 from typing import TYPE_CHECKING
 
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
 from viewer.rig.skinning import Skinning
 
@@ -99,67 +99,118 @@ class Lights:
 class DisplayOptions:
     """All render settings except scene and camera."""
 
-    show: str = "skin"
-    """A key of ``SHOWN``. A figure without a mesh always shows its skeleton, one without a skeleton
-    its mesh."""
-    shading: str = "auto"
-    """A key of ``viewer.rendering.gpu.program.SHADING_CHOICES``; ``"auto"`` is metallic-roughness
-    for figures whose files describe such materials, otherwise Blinn-Phong."""
-    matcap: str = "clay"
-    """A key of ``MATCAPS``, for the shading ``"matcap"``."""
-    metallic: float = 0.0
-    roughness: float = 0.6
-    """0 to 1, for the shading ``"pbr"`` of materials that do not define them."""
-    flat: bool = False
-    wireframe: bool = False
-    normals: bool = False
-    texture: bool = True
-    vertex_colors: bool = True
-    grid: bool = True
-    cull: bool = False
-    """Use one normal per triangle; draw edges; draw vertex normals as lines; use textures; use
-    vertex colours; draw the ground grid; cull back faces."""
-    background: str = "gradient"
-    """An entry of ``BACKGROUNDS`` or ``"#rrggbb"``."""
-    bones: str = "auto"
-    """Style of skeletons, a key of ``BONES``: boxes as in the file, or small cubes; octahedra,
-    sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
-    them, otherwise octahedra."""
+    show: str = setting(
+        "skin",
+        "parts of the figures; binding is the skin in the bind pose (default: {default})",
+        choices=SHOWN,
+    )
+    """A figure without a mesh always shows its skeleton, one without a skeleton its mesh."""
+    shading: str = setting(
+        "auto",
+        "shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
+        "phong (default: {default})",
+    )
+    """A key of ``viewer.rendering.gpu.program.SHADING_CHOICES``."""
+    metallic: float = setting(
+        0.0,
+        "value for materials that do not specify one, with --shading pbr (default: {default})",
+        limits=(0.0, 1.0),
+        metavar="0..1",
+    )
+    roughness: float = setting(
+        0.6,
+        "value for materials that do not specify one, with --shading pbr (default: {default})",
+        limits=(0.0, 1.0),
+        metavar="0..1",
+    )
+    matcap: str = setting(
+        "clay", "picture for --shading matcap (default: {default})", choices=MATCAPS
+    )
+    scalar: str = setting(
+        "weight", "show a scalar quantity as colours", given=None, metavar="NAME[:JOINT]"
+    )
+    """Quantity for the shading ``"scalar"``: a key of ``viewer.rig.scalars.SCALARS``. For a
+    quantity of one joint, a colon and the joint may follow (``"weight:left_knee"``,
+    ``"weight:#4"``); by default the selected joint is used."""
+    scalar_range: tuple[float, float] | None = setting(
+        None,
+        "range of the colour map, in the legend's unit (default: all values); write "
+        "--scalar-range=-20:20 if A is below 0",
+        metavar="A:B",
+    )
+    """None for the range of the values, or a range that excludes outliers for quantities with a
+    robust range."""
+    colormap: str = setting(
+        "auto",
+        f"colours of a continuous quantity, as in matplotlib: {', '.join([*COLORMAPS][1:])} "
+        "(default: {default}, dark violet to yellow, or blue through white to red if values have a "
+        "sign)",
+        given=None,
+        choices=COLORMAPS,
+        metavar="NAME",
+    )
+    isolines: bool | None = setting(
+        None, "isolines at every tenth of the range (default: for weights only)"
+    )
+    legend: bool = setting(False, "draw a colour legend")
+    bones: str = setting(
+        "auto",
+        "style of skeletons (default: {default}, the boxes of files that have them, otherwise "
+        "octahedra)",
+        choices=BONES,
+    )
+    """Boxes as in the file, or small cubes; octahedra, sticks, or axes with x red, y green, z
+    blue."""
     skeleton_opacity: float | None = None
     """Opacity of the skeleton over the skin; None for the style's default in ``OPACITIES``."""
-    samples: int = 4
-    """Samples per pixel, limited by the driver's maximum."""
-    quality: str = "draft"
-    """A key of ``QUALITIES``: draft is fastest; normal draws shadows; final averages ``passes``
-    images, for soft shadows, ambient occlusion and smooth edges."""
-    shadows: bool = True
+    background: str = setting(
+        "gradient",
+        "gradient, white, environment (the studio, out of focus), transparent, or a colour "
+        "(default: {default})",
+        metavar="NAME|#rrggbb",
+    )
+    """An entry of ``BACKGROUNDS`` or ``"#rrggbb"``."""
+    samples: int = setting(4, "samples per pixel (default: {default})", metavar="N")
+    """Limited by the driver's maximum."""
+    quality: str = setting(
+        "draft",
+        "draft: no shadows; normal: shadows; final: soft shadows, ambient occlusion and smoother "
+        "edges (default: final for pictures, normal for videos)",
+        given=None,
+        choices=QUALITIES,
+        metavar="NAME",
+    )
+    """Final quality averages ``passes`` images."""
+    shadows: bool = setting(True, "omit shadows")
     """Draw shadows, unless the quality is draft."""
+    flat: bool = setting(False, "use one normal per triangle")
+    wireframe: bool = setting(False, "draw triangle edges")
+    normals: bool = setting(False, "draw vertex normals")
+    texture: bool = setting(True, "use plain colours instead of textures")
+    """Use textures."""
+    vertex_colors: bool = setting(True, "omit vertex colours")
+    """Use vertex colours."""
+    grid: bool = setting(True, "omit the ground grid")
+    """Draw the ground grid."""
+    keypoints: bool = setting(False, "draw a model's keypoints")
+    captured_keypoints: bool = setting(True, "hide the keypoints of captures")
+    """Draw the keypoints of captures."""
+    reduced: bool = setting(False, "draw the coarser mesh, if there is one")
+    xray: bool = setting(False, "draw bones that are visible through the skin")
+    """The skin is translucent unless it shows a scalar quantity."""
+    joint_names: bool = setting(False, "label joints; labels that would overlap are omitted")
+    joint_axes: bool = setting(False, "draw the axes of joints: x red, y green, z blue")
+    cameras: bool = setting(
+        False, "draw the frusta of a capture's calibrated cameras, with their images"
+    )
+    cull: bool = False
+    """Cull back faces."""
     passes: int = 8
     """Images that are averaged in final quality."""
     lights: Lights = field(default_factory=Lights)
     """The two lights."""
     skinning: Skinning = field(default_factory=Skinning)
     """Skinning method and options."""
-    scalar: str = "weight"
-    """Quantity for the shading ``"scalar"``: a key of ``viewer.rig.scalars.SCALARS``. For a
-    quantity of one joint, a colon and the joint may follow (``"weight:left_knee"``,
-    ``"weight:#4"``); by default the selected joint is used."""
-    scalar_range: tuple[float, float] | None = None
-    """Range of the colour map, in the unit of the legend; None for the range of the values, or a
-    range that excludes outliers for quantities with a robust range."""
-    colormap: str = "auto"
-    """A key of ``COLORMAPS``; ``"auto"`` is dark violet to yellow, or blue through white to red for
-    quantities with a sign."""
-    isolines: bool | None = None
-    """Draw lines at every tenth of the range; None for the quantity's default."""
-    legend: bool = False
-    """Draw the colour legend into the image."""
-    reduced: bool = False
-    """Draw the coarser mesh of figures that have one."""
-    keypoints: bool = False
-    """Draw the figure's keypoints as markers."""
-    captured_keypoints: bool = True
-    """Draw the keypoints of captures."""
     hidden_parts: tuple[int, ...] = ()
     """Indices of hidden body parts."""
     path_joints: tuple[tuple[int, int], ...] = ()
@@ -168,19 +219,18 @@ class DisplayOptions:
     """Seconds of motion paths before and after the current time; 0 for the whole motion."""
     min_confidence: float = 0.1
     """Captured keypoints below this confidence are hidden."""
-    xray: bool = False
-    """Show bones through the skin, which is translucent unless it shows a scalar quantity."""
-    joint_names: bool = False
-    joint_axes: bool = False
-    """Label the joints, omitting labels that would overlap; draw the axes of the joint spaces (x
-    red, y green, z blue)."""
-    opacity: float = 1.0
-    """Opacity of all figures, 0 to 1; it multiplies that of each actor."""
-    cameras: bool = False
-    """Draw the frusta of calibrated cameras, with their images if there are any."""
-    image_brightness: float = 0.6
-    """Brightness of the image behind the scene when looking through a calibrated camera, 0 to 1; 0
-    hides it."""
+    opacity: float = setting(
+        1.0, "opacity of the figures (default: {default})", limits=(0.0, 1.0), metavar="0..1"
+    )
+    """It multiplies the opacity of each actor."""
+    image_brightness: float = setting(
+        0.6,
+        "brightness of the camera's image behind the scene, with --view; 0 hides it (default: "
+        "{default}; 1 with --overlay)",
+        given=None,
+        limits=(0.0, 1.0),
+        metavar="0..1",
+    )
     outline: bool = False
     """Outline the selected joint, or otherwise the selected actor, in images."""
 

@@ -12,7 +12,7 @@ import pytest
 
 import viewer
 from viewer.cli import run
-from viewer.commands._diff.inputs import input_files
+from viewer.commands._input_files import input_files
 
 SKEL = "balljoint base {{\n  offset 0 0 0\n  balljoint tip {{\n    offset {tip} 0 0\n  }}\n}}\n"
 SKIN = """positions 3 {{ 0 0 0  3 0 0  0 4 {depth} }}

@@ -13,7 +13,7 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
 from viewer.cli import run
-from viewer.commands._sequence.frame_numbers import Numbering, Range, numbering_of, parse_range
+from viewer.commands._frames import Numbering, Range, numbering_of, parse_range
 from viewer.errors import ViewerError
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure

@@ -13,7 +13,7 @@ from formats.synthetic_smpl import model
 
 import viewer
 from viewer.cli import run
-from viewer.commands._sequence.shots import Turntable, parse_turntable
+from viewer.commands._sequence import Turntable, parse_turntable
 from viewer.errors import OutputError
 from viewer.rig.motion.evaluation import pose_actor
 

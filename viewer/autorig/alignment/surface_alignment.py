@@ -21,7 +21,7 @@ from viewer.autorig.alignment.icp import (
 from viewer.autorig.alignment.orientation_search import axis_rotations, in_place, search
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
@@ -62,15 +62,17 @@ class Posed:
 class AlignmentSettings:
     """Known facts about an alignment, and options."""
 
-    up: str | None = None
-    facing: str | None = None
-    """The target's axes, from ``orientation_search.AXES``; None to detect them."""
-    scale: str = "uniform"
-    """One of ``SCALES``."""
+    up: str | None = setting(None, "up axis of the target (default: estimated)")
+    facing: str | None = setting(None, "front of the target (default: estimated)")
+    scale: str = setting(
+        "uniform",
+        "scale of the template: one factor, one factor per axis, or none (default: {default})",
+        choices=SCALES,
+    )
     landmarks: Floats | None = None
     """(N, 2, 3) or None. Three or more pairs of points of the posed template and the target. They
     replace the search."""
-    refines: bool = True
+    refines: bool = setting(True, "skip the refinement of the alignment", flag="--no-refine")
     """Whether closest points refine landmarks or the result of the search."""
     matrix: Floats | None = None
     """(4, 4) or None. A given alignment, such as one set by hand in the window; it replaces the

@@ -12,6 +12,7 @@ but overshoots; negative weights are clipped and rows rescaled to a sum of 1.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Any
@@ -29,7 +30,7 @@ from viewer.autorig.weights.result import (
     rigid_lines,
     template_lines,
 )
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
@@ -60,10 +61,19 @@ class WeightSettings:
 
     match: MatchSettings = field(default_factory=MatchSettings)
     """Criteria by which a vertex lies on the template."""
-    smoothing_rounds: int = 0
-    """Smoothing iterations of the inpainted weights and their neighbourhoods; 0 for none."""
-    max_influences: int | None = None
-    """Number of strongest influences kept per vertex; None for all."""
+    smoothing_rounds: int = setting(
+        0,
+        f"smooth inpainted weights, N iterations ({_ROUNDS} without a number)",
+        flag="--smooth",
+        nargs="?",
+        const=_ROUNDS,
+        metavar="N",
+    )
+    """Of the inpainted weights and their neighbourhoods; 0 for none."""
+    max_influences: int | None = setting(
+        None, "keep each vertex's N strongest influences", limits=(1, math.inf), metavar="N"
+    )
+    """None for all."""
 
     def __post_init__(self) -> None:
         if self.smoothing_rounds < 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from viewer.commands._numbers import number
+from viewer.commands._settings import number
 
 RETRIES = 2
 TIMEOUT = 600.0  # default time limit of an attempt, seconds

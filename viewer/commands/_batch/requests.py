@@ -30,7 +30,7 @@ from viewer.batching.tables import comparisons
 from viewer.commands._batch.jobs import JOBS, CommandJob, add_job_arguments
 from viewer.commands._batch.planning import Request
 from viewer.commands._batch.results import check_results, name_in_shard
-from viewer.commands._diff.inputs import input_files
+from viewer.commands._input_files import input_files
 from viewer.commands._scene import parse_bytes
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass

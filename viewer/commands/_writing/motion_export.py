@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from viewer.commands._numbers import number
+from viewer.commands._frames import numbering_of, parse_range
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note
-from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
+from viewer.commands._settings import number
 from viewer.commands._writing.baked_springs import add_spring_argument
 from viewer.commands._writing.written_actors import able_actors, left_out_notes, written_actors
 from viewer.data_classes import dataclass

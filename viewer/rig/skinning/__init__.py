@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -65,17 +66,35 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 class Skinning:
     """Skinning options; by default, weights are used as stored."""
 
-    method: str = "lbs"
+    method: str = setting(
+        "lbs",
+        "; ".join(f"{key}: {method.title}" for key, method in METHODS.items())
+        + " (default: as an FBX file states, else {default})",
+        choices=METHODS,
+        given=None,
+    )
     """A key of ``METHODS``."""
-    blend_factor: float | None = 0.5
+    blend_factor: float | None = setting(
+        0.5,
+        "blend factor of dual quaternions with --method mix, 0 to 1 (default: that of each vertex "
+        "if an FBX file states them, else {default})",
+        limits=(0.0, 1.0),
+        metavar="F",
+        given=None,
+    )
     """Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS. None
     for the fractions that the file states for each vertex; see ``Skin.dqs_fractions``."""
-    max_influences: int = 0
+    max_influences: int = setting(
+        0,
+        "use only each vertex's N strongest influences (default: all)",
+        flag="--influences",
+        limits=(0, math.inf),
+        metavar="N",
+    )
     """Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as
     stored."""
-    normalize: bool = False
-    """Scale each vertex's weights to a sum of 1."""
-    correctives: bool = True
+    normalize: bool = setting(False, "normalise each vertex's weights to a sum of 1")
+    correctives: bool = setting(True, "omit pose correctives")
     """Add pose correctives, if the figure has any."""
 
     def unreduced(self) -> Skinning:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import re
 from dataclasses import field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from viewer.commands._sequence.frame_numbers import Numbering, Range, numbering_of
-from viewer.data_classes import dataclass
+from viewer.commands._frames import Frames, Numbering, Range, numbering_of
+from viewer.commands._pose import PoseOptions
+from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
@@ -29,23 +30,6 @@ class Turntable:
 
     degrees: float
     seconds: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """Requested output, checked as thoroughly as possible before anything is opened."""
-
-    kind: str
-    """One of "pictures", "video", "sheet" or "onion". One file per frame, one video file, or one
-    image of all frames: in cells or superimposed."""
-    output: Path
-    """The given path; includes ``{frame}`` for images."""
-    range: Range | None
-    """Range of frames; None for the whole motion."""
-    turntable: Turntable | None
-    """Rotation of the camera; None if it does not rotate."""
-    is_certain: bool = True
-    """False for a GIF, which is a still image if nothing moves."""
 
 
 @dataclass(slots=True, eq=False)
@@ -91,34 +75,80 @@ Turntable(degrees=-90.0, seconds=None))
     )
 
 
-def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> Shots:
+@dataclass(slots=True)
+class Request:
+    """The requested output, checked as thoroughly as possible before anything is opened."""
+
+    output: Path
+    """The given path; includes ``{frame}`` for numbered images."""
+    turntable: Turntable | None = setting(
+        None,
+        "rotate the camera once within the given number of seconds, or by the given degrees",
+        nargs="?",
+        const="",
+        read=parse_turntable,
+        metavar="SECONDS|DEGREESdeg",
+    )
+    contact_sheet: int | None = setting(
+        None,
+        "one image of N numbered frames, evenly spaced over the motion, with a common scale and "
+        "ground line",
+        metavar="N",
+    )
+    onion: int | None = setting(
+        None,
+        "one image of N poses, each at its position, evenly spaced over the motion, with earlier "
+        "poses fainter",
+        metavar="N",
+    )
+    speed: float | None = setting(
+        None, "playback speed of videos: 0.5 is half as fast, -1 backwards", metavar="S"
+    )
+    video_quality: float = setting(
+        75.0, "quality of .mp4 and .webm: 0 to 100 (default: {default})", given=None, metavar="Q"
+    )
+    kind: Literal["", "pictures", "video", "sheet", "onion"] = ""
+    """A still image, one file per frame, one video file, or one image of all frames: in cells or
+    superimposed."""
+    range: Range | None = None
+    """Range of frames; None for the whole motion."""
+    is_certain: bool = True
+    """False for a GIF, which is a still image if nothing moves."""
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it is one image."""
+        return self.kind in ("", "onion")
+
+
+def shots_of(request: Request, frames: Frames, pose: PoseOptions, scene: Scene) -> Shots:
     """Return the frames of a scene to draw.
 
     Raises ViewerError if nothing moves, or there are no frames or too many.
     """
-    is_still = arguments.frame is not None or arguments.time is not None
+    is_still = frames.is_one
     moves = not is_still and any(actor.clip is not None for actor in scene.actors)
     if not moves and request.turntable is None:
         found = "a single frame is requested" if is_still else "no file has a motion"
         raise ViewerError(f"nothing moves: {found} (--turntable rotates the camera)")
     if not moves and request.range is not None:
         raise ViewerError("--frames: no file has a motion")
-    numbering = numbering_of(scene.actors, arguments.fps)
-    rates = _rates(request, arguments, numbering.rate)
+    numbering = numbering_of(scene.actors, frames.fps)
+    rates = _rates(request, frames.fps, numbering.rate)
     notes = [*rates.notes]
     if moves:
-        places, more = _places(request, arguments, numbering, rates)
-        notes += [*more, *_overridden(arguments, scene)]
+        places, more = _places(request, numbering, rates)
+        notes += [*more, *_overridden(pose, scene)]
     else:
         assert request.turntable is not None  # something moves: figures or the camera
         places = np.zeros(_count((request.turntable.seconds or _ROTATION_SECONDS) * rates.drawn))
     seconds = len(places) / rates.drawn
-    if request.kind == "sheet":
-        places = _spread(places, arguments.contact_sheet, moves)
-        notes += _too_few("contact-sheet", len(places), arguments.contact_sheet)
-    if request.kind == "onion":
-        places = _spread(places, arguments.onion, moves)
-        notes += _too_few("onion", len(places), arguments.onion)
+    if request.contact_sheet is not None:
+        places = _spread(places, request.contact_sheet, moves)
+        notes += _too_few("contact-sheet", len(places), request.contact_sheet)
+    if request.onion is not None:
+        places = _spread(places, request.onion, moves)
+        notes += _too_few("onion", len(places), request.onion)
     # A rotation longer than the motion repeats its frames.
     is_counted = moves and (request.turntable is None or request.turntable.seconds is None)
     first = numbering.first if is_counted else 0
@@ -139,10 +169,10 @@ class _Rates:
     notes: tuple[str, ...]
 
 
-def _rates(request: Request, arguments: argparse.Namespace, counted: float) -> _Rates:
+def _rates(request: Request, fps: float | None, counted: float) -> _Rates:
     """Return the frame rates; videos that skip frames keep the motion's speed."""
     step = 1 if request.range is None else request.range.step
-    skips = step > 1 and request.kind == "video" and arguments.fps is None
+    skips = step > 1 and request.kind == "video" and fps is None
     # A frame is also shown for the time of the skipped frames.
     played = counted / step if skips else counted
     is_gif = request.kind == "video" and request.output.suffix.lower() == ".gif"
@@ -156,9 +186,7 @@ def _rates(request: Request, arguments: argparse.Namespace, counted: float) -> _
     return _Rates(played, drawn, remark, notes)
 
 
-def _places(
-    request: Request, arguments: argparse.Namespace, numbering: Numbering, rates: _Rates
-) -> tuple[Floats, list[str]]:
+def _places(request: Request, numbering: Numbering, rates: _Rates) -> tuple[Floats, list[str]]:
     """Return the frames to draw, counted from 0 at the start, possibly fractional, and messages."""
     start, stop = numbering.span(request.range)
     total, first = numbering.count, numbering.first
@@ -166,15 +194,16 @@ def _places(
     notes = [f"--frames: {behind} are beyond the end of the motion"] if stop > total else []
     # Step between drawn frames, in frames of the motion.
     step = 1 if request.range is None else request.range.step
-    pace = step * (arguments.speed or 1.0) * rates.played / rates.drawn
+    pace = step * (request.speed or 1.0) * rates.played / rates.drawn
     length = stop - start
     begin = start if pace > 0.0 else stop - 1
     seconds = None if request.turntable is None else request.turntable.seconds
     if seconds is None:
         count = _count(math.floor((length - 1) / abs(pace) + 1e-9) + 1)
-        return begin + np.arange(count) * pace, notes
+        return begin + np.arange(count, dtype=np.float64) * pace, notes
     # The motion loops until the camera has completed its rotation.
-    run = begin - start + np.arange(_count(seconds * rates.drawn)) * pace
+    n_frames = _count(seconds * rates.drawn)
+    run = begin - start + np.arange(n_frames, dtype=np.float64) * pace
     return start + np.minimum(np.mod(run, length), length - 1), notes
 
 
@@ -209,7 +238,7 @@ def _moves_shapes(scene: Scene) -> bool:
     return any(channel.path == "weights" for clip in clips for channel in clip.channels)
 
 
-def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+def _overridden(pose: PoseOptions, scene: Scene) -> list[str]:
     """Return messages about shape and pose options that the motion overrides."""
     from viewer.rig.motion.sampled_clip import SampledClip
 
@@ -217,5 +246,5 @@ def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     clips = [actor.clip for actor in scene.actors if isinstance(actor.clip, SampledClip)]
     if any(clip.shape_weights is not None for clip in clips) or _moves_shapes(scene):
         names += ["shape", "expression"]
-    given = [name for name in names if getattr(arguments, name)]
+    given = [name for name in names if getattr(pose, name)]
     return [f"--{name}: applies only to figures without a motion" for name in given]

@@ -6,8 +6,8 @@ import argparse
 import re
 from collections.abc import Sequence
 
-from viewer.commands._numbers import number
-from viewer.data_classes import dataclass
+from viewer.commands._settings import add_settings, number, settings_of
+from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.phrases import printable
@@ -15,6 +15,7 @@ from viewer.rig.scene import Actor, Scene
 
 _SLOWEST, _FASTEST = 0.001, 100_000.0  # limits of frame rates, frames per second
 _LAST_NUMBER = 1_000_000_000
+_RANGE = "frames A to B - 1{step}; A or B may be omitted (default: the whole motion)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,27 +134,55 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     return Numbering(first, count, start, end, counted, runs_on, holds=not captures and not runs_on)
 
 
+def rate(text: str) -> float:
+    """Return the frame rate given to an option; raises as ``number`` does."""
+    value = number(text)
+    if not _SLOWEST <= value <= _FASTEST:
+        raise argparse.ArgumentTypeError(
+            f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames per second, found {text}"
+        )
+    return value
+
+
+@dataclass(slots=True)
+class Frames:
+    """The requested frames, numbered as in a capture's files, otherwise from 0."""
+
+    frames: str | None = setting(None, _RANGE, metavar="A:B")
+    frame: int | None = setting(None, "pose at frame N of the motion", metavar="N")
+    time: float | None = setting(
+        None, "pose at S seconds of the motion (default: start)", metavar="S"
+    )
+    fps: float | None = setting(
+        None,
+        "frames per second of captures, and for numbering the frames of clips (default: the file's "
+        "own, or 30)",
+        type=rate,
+        metavar="R",
+    )
+    interpolates: bool = False
+    """Whether gaps of captures are interpolated."""
+    option: str = "--frame"
+    """The option that gave ``frame``, for messages."""
+
+    @property
+    def is_one(self) -> bool:
+        """Whether a single frame or time is requested."""
+        return self.frame is not None or self.time is not None
+
+
+def frames_of(arguments: argparse.Namespace) -> Frames:
+    """Return the requested frames."""
+    return settings_of(Frames, arguments, interpolates=arguments.interpolate_gaps)
+
+
 def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None:
     """Add the options that choose frames; ``many`` is the syntax of a range, if one is allowed."""
     group = parser.add_argument_group("frames: numbered as in a capture's files, otherwise from 0")
     if many:
         step = ", every STEP-th of them" if "STEP" in many else ""
-        group.add_argument(
-            "--frames",
-            metavar=many,
-            help=f"frames A to B - 1{step}; A or B may be omitted (default: the whole motion)",
-        )
-    group.add_argument("--frame", type=int, metavar="N", help="pose at frame N of the motion")
-    group.add_argument(
-        "--time", type=number, metavar="S", help="pose at S seconds of the motion (default: start)"
-    )
-    group.add_argument(
-        "--fps",
-        type=rate,
-        metavar="R",
-        help="frames per second of captures, and for numbering the frames of clips "
-        "(default: the file's own, or 30)",
-    )
+        add_settings(group, Frames, "frames", metavar=many, help=_RANGE.format(step=step))
+    add_settings(group, Frames, "frame", "time", "fps")
     # Commands with another name for the option use that name in messages.
     parser.set_defaults(frame_option="--frame")
 
@@ -179,17 +208,7 @@ def parse_range(text: str, option: str = "--frames", *, steps: bool = True) -> R
     )
 
 
-def rate(text: str) -> float:
-    """Return the frame rate given to an option; raises as ``number`` does."""
-    value = number(text)
-    if not _SLOWEST <= value <= _FASTEST:
-        raise argparse.ArgumentTypeError(
-            f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames per second, found {text}"
-        )
-    return value
-
-
-def apply_time(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:
+def apply_time(scene: Scene, frames: Frames) -> list[str | Diagnostic]:
     """Pose every actor that has a motion at the requested frame or time, in place.
 
     A scene without a motion has one pose, which is its frame 0 and the pose at all times.
@@ -197,29 +216,29 @@ def apply_time(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagno
     Returns: messages about times outside the motions.
     Raises ViewerError if there is no such frame, or the time is outside the captures.
     """
-    if arguments.frame is None and arguments.time is None:
+    if not frames.is_one:
         return []
     from viewer.rig.motion.evaluation import pose_actor
 
-    option = "--time" if arguments.frame is None else arguments.frame_option
-    if arguments.frame is not None and arguments.time is not None:
+    option = "--time" if frames.frame is None else frames.option
+    if frames.frame is not None and frames.time is not None:
         raise ViewerError(f"{option} and --time: expected one of them, found both")
     if all(actor.clip is None for actor in scene.actors):
-        if arguments.frame:
+        if frames.frame:
             raise ViewerError(f"{option}: no file has a motion")
         return [f"{option} has no effect: no file has a motion"]
-    frames = numbering_of(scene.actors, arguments.fps)
-    if arguments.frame is not None:
-        scene.time = frames.time_of(arguments.frame, option)
+    numbering = numbering_of(scene.actors, frames.fps)
+    if frames.frame is not None:
+        scene.time = time = numbering.time_of(frames.frame, option)
     else:
-        scene.time = frames.checked_time(arguments.time)
+        scene.time = time = numbering.checked_time(frames.time or 0.0)
     notes: list[str | Diagnostic] = []
-    if arguments.time is not None and frames.holds and frames.is_outside(arguments.time):
-        held = "first" if arguments.time < frames.start else "last"
+    if frames.time is not None and numbering.holds and numbering.is_outside(frames.time):
+        held = "first" if frames.time < numbering.start else "last"
         notes.append(
-            f"--time {arguments.time:g}: the motion has keys from {frames.start:.6g} to "
-            f"{frames.end:.6g} seconds, so its {held} pose is held"
+            f"--time {frames.time:g}: the motion has keys from {numbering.start:.6g} to "
+            f"{numbering.end:.6g} seconds, so its {held} pose is held"
         )
     for actor in scene.actors:
-        pose_actor(actor, scene.time, arguments.interpolate_gaps)
+        pose_actor(actor, time, frames.interpolates)
     return notes

@@ -1,1 +1,0 @@
-"""Frames of motions: numbering, selection and output."""
