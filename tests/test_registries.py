@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 import viewer
-from viewer.app.features import ACTIONS, KEYS, PANELS, function_of, panel_module
+from viewer.app.features import ACTIONS, KEYS
+from viewer.app.layout import PANELS, panel_module
 from viewer.batching.engines import ENGINES
 from viewer.commands import COMMANDS
 from viewer.examples import EXAMPLES
@@ -75,16 +76,16 @@ def test_panels_can_draw() -> None:
         assert callable(panel_module(name).draw)
 
 
-def test_keys_and_actions_run_functions_of_the_state() -> None:
-    for names in ([key.label for key in KEYS], [action.text for action in ACTIONS]):
+def test_keys_and_actions_are_functions_of_the_state() -> None:
+    for names in (
+        [key.label for key in KEYS],
+        [key.name for key in KEYS],
+        [action.text for action in ACTIONS],
+    ):
         assert len(names) == len(set(names))
     for one in (*KEYS, *ACTIONS):
-        function = function_of(one.action)
-        assert next(iter(signature(function).parameters)) == "state", one
-        signature(function).bind(None, *one.arguments)
-    for action in ACTIONS:
-        if action.why:
-            signature(function_of(action.why)).bind(None)
+        assert next(iter(signature(one.run).parameters)) == "state", one
+        signature(one.run).bind(None)
 
 
 def test_commands_can_run() -> None:

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 import viewer
 from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
-from viewer.app.files.files import Files
+from viewer.app.files.files import Files, open_files
 from viewer.app.headless import HeadlessApp
 from viewer.diagnostics.template import in_window
 from viewer.rendering.camera import facing_camera, fit
@@ -217,7 +217,7 @@ class Driver:
 
     def open(self, *paths):
         """Drop files on the window and wait for them."""
-        self.app.frame.open(list(paths))
+        open_files(self.state, list(paths))
         self.wait_for_loader()
 
     def says(self, text):

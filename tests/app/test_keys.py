@@ -27,31 +27,6 @@ def test_shortcuts_are_unique_and_described():
     assert all(key.text for key in KEYS)
 
 
-def test_names_in_preferences_stay_when_functions_move():
-    """A user's keys are stored by these names: a name that changed would lose them."""
-    names = {key.label: key.name for key in KEYS}
-    assert names["W"] == "view.display_actions.toggle_option wireframe Wireframe"
-    assert names["Ctrl+3"] == "view.camera_actions.look right"
-    assert names["Space"] == "playback.actions.play"
-    assert names["Ctrl+P"] == "palette.palette_window.toggle_palette"
-    assert names["Ctrl+O"] == "window_actions.want open dialog"
-    assert {key.action.rpartition(".")[0] for key in KEYS} == {
-        "cancel",
-        "core.undo_actions",
-        "palette.palette_window",
-        "playback.actions",
-        "playback.animations",
-        "posing.pose_actions",
-        "posing.tool_actions",
-        "preferences.preferences_window",
-        "rigging.results",
-        "view.camera_actions",
-        "view.display_actions",
-        "weights.actions",
-        "window_actions",
-    }
-
-
 def test_r_key_resets_every_dof_to_the_clamped_pose_of_the_file(hand):
     for label in ("root.x", "root.y", "arm.x", "arm.z", "root.tx"):
         hand.drag(label, 0.9)

@@ -8,8 +8,7 @@ from app.captured import people
 from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 
-from viewer.app.features import PANELS
-from viewer.app.layout import Layout, ShownPanels, set_open
+from viewer.app.layout import PANELS, Layout, ShownPanels, set_open
 
 
 def resize(hand, *size):

@@ -11,8 +11,9 @@ from formats.synthetic_smpl import model
 from imgui_bundle import imgui
 
 import viewer.models
-from viewer.app.features import KEYS, MOUSE, PANELS
+from viewer.app.features import KEYS, MOUSE
 from viewer.app.files.files import Files
+from viewer.app.layout import PANELS
 from viewer.models import load_model_folder, save_model_folder
 
 

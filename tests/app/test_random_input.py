@@ -17,6 +17,7 @@ from imgui_bundle import imgui
 from PIL import Image
 
 from viewer.app import menus
+from viewer.app.files.files import open_files
 from viewer.app.posing import posing
 
 KEYS = [
@@ -72,7 +73,7 @@ class Monkey:
         self.hand.io.add_input_character(ord(self.random.choice("0123456789.-eEnaif#%{")))
 
     def drop(self):
-        self.hand.app.frame.open(self.random.choice(self.files))
+        open_files(self.hand.state, self.random.choice(self.files))
         self.hand.wait_for_loader()
 
     def resize(self):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.app.features import PANELS
-from viewer.app.layout import ShownPanels, is_open, set_open
+from viewer.app.layout import PANELS, ShownPanels, is_open, set_open
 
 
 def test_panels_on_demand_are_closed_at_first(hand):

@@ -107,7 +107,10 @@ def advance_closing(state: AppState) -> None:
 
 def may_replace_scene(state: AppState) -> bool:
     """Return whether files that were read may replace the scene: nothing would be lost."""
-    return not _edits(state)
+    if _edits(state):
+        return False
+    state.of(Closing).discards = False  # the agreement to lose edits concerned these files
+    return True
 
 
 def keep_open(state: AppState) -> None:

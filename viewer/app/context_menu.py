@@ -11,7 +11,6 @@ from viewer.app.actors.parts_panel import isolate_part, part_label, set_part_sho
 from viewer.app.core.reasons import no_pose, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, menu_item
-from viewer.app.features import key_of
 from viewer.app.palette import toggle_palette
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.posing import copy_pose, mirror, paste_pose, reset_actor, reset_joint
@@ -99,7 +98,7 @@ def _draw_joint(state: AppState, spot: Spot) -> None:
     if menu_item(state, "Show weights", "V", why=no_view(state, "weight")):
         choose()
         show_scalar(state, "weight")
-    if menu_item(state, "Fit joint", key_of("view.camera_actions.fit_selection")):
+    if menu_item(state, "Fit joint", "."):
         choose()
         fit_selection(state)
     _draw_following(state, "Camera follows joint", spot.actor, joint)

@@ -1,269 +1,175 @@
-"""Tables of the panels and keys that features add to the window.
-
-A panel is a module ``<name>_panel.py`` of its feature's folder with ``draw(state)``; a key runs a
-function of the state. Both are imported on first use.
-"""
+"""Tables of what the user can do: keys, actions, mouse, and the entries of the palette."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
-from types import ModuleType
+from collections.abc import Iterator
+from functools import partial
 
 from imgui_bundle import imgui
 
+from viewer.app.actors.actors_panel import no_springs, toggle_springs
+from viewer.app.actors.parts_panel import show_all_parts
+from viewer.app.closing import request_quit
+from viewer.app.core.actions import Action, Shortcut, given
+from viewer.app.core.reasons import (
+    no_drive,
+    no_job_room,
+    no_mesh,
+    no_new_clip,
+    no_panel,
+    no_parts,
+    no_pose,
+    no_skeleton,
+    nothing_to_export,
+)
 from viewer.app.core.state import AppState
-from viewer.data_classes import dataclass
+from viewer.app.core.undo_actions import redo, undo
+from viewer.app.core.widgets import key_name
+from viewer.app.curves.editing import new_clip
+from viewer.app.files.files import ask_for_files, open_bundled_body, open_bundled_figure
+from viewer.app.files.motion_export import ask_for_motion
+from viewer.app.keys import cancel, toggle_keys, toggle_messages, toggle_panels, want_screenshot
+from viewer.app.layout import PANELS, reset_layout, show_panel
+from viewer.app.linting.lint_panel import check_rig
+from viewer.app.menus import ask_for_export
+from viewer.app.palette import Entry, toggle_palette
+from viewer.app.playback.animations import choose_animation, step_animation
+from viewer.app.playback.timeline_panel import go_to_end, play, range_in, range_out, step
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.posing.posing import (
+    ask_for_pose,
+    copy_numbers,
+    copy_pose,
+    mirror,
+    paste_pose,
+    random_shape,
+    reset_actor,
+    reset_pose,
+    reset_shape,
+)
+from viewer.app.posing.toolbar import choose_tool, key_pose_now, next_orientation, no_keys
+from viewer.app.preferences.preferences_window import open_preferences
+from viewer.app.recording.record_dialog import open_record_dialog
+from viewer.app.retargeting.drive_changes import no_edit, toggle_feet
+from viewer.app.retargeting.joint_match_panel import (
+    ask_for_map,
+    ask_where_to_save,
+    match_automatically,
+)
+from viewer.app.rigging.results import switch_version
+from viewer.app.view.camera_panel import fit_selection, fit_view, look, toggle_projection
+from viewer.app.view.display_panel import (
+    reset_lights,
+    set_shading,
+    show,
+    show_bones,
+    toggle_binding,
+    toggle_gizmo,
+    toggle_option,
+    toggle_skeleton,
+)
+from viewer.app.view.outlines import toggle_outlines
+from viewer.app.weights.weights_panel import toggle_picking, toggle_vertex_info, toggle_weights
+from viewer.phrases import printable
+from viewer.rendering.gpu.program import SHADING
+from viewer.rendering.options import BONES, SHOWN
+from viewer.rig.motion.animation_choice import animation_labels
+from viewer.rig.skeleton import joint_labels, shown_joints
+from viewer.rig.skinning import METHODS
 
 _CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
 _K = imgui.Key
-_OPTION = "view.display_actions.toggle_option"
-_LOOK = "view.camera_actions.look"
-_TOOL = "posing.tool_actions.choose_tool"
-_UNDO = "core.undo_actions"
-_STEP = "playback.actions.step"
-_ANIMATION = "playback.animations.step_animation"
-
-_MOVED = {
-    "cancel": "keys",
-    "palette.palette_window": "palette",
-    "playback.actions": "playback.timeline_panel",
-    "posing.pose_actions": "posing.posing",
-    "posing.tool_actions": "posing.toolbar",
-    "view.camera_actions": "view.camera_panel",
-    "view.display_actions": "view.display_panel",
-    "weights.actions": "weights.weights_panel",
-    "window_actions": "keys",
-}
-"""Present modules of actions that ``KEYS`` calls by older names.
-
-Preferences store an action of ``KEYS`` by its name, so the name stays when the function moves.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """Entry of a panel, with the properties that the layout needs."""
-
-    feature: str
-    """Folder of the panel's module, ``<name>_panel.py``."""
-    title: str
-    """Title of its tab."""
-    place: str
-    """Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards."""
-    needs: str = ""
-    """Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
-    ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
-    motion of another skeleton; empty if the panel is always available."""
-    leads: bool = False
-    """Whether it is brought to the front of its tabs when a scene makes it available."""
-    on_demand: bool = False
-    """Whether it is closed until the user opens it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Shortcut:
-    """A key and its action."""
-
-    chords: tuple[int, ...]
-    """ImGui's key codes with modifiers."""
-    label: str
-    """Name of the key."""
-    text: str
-    """Effect of the key, as shown in lists of keys."""
-    action: str
-    """Module and function within ``viewer.app``, called with the state."""
-    arguments: tuple[object, ...] = ()
-    """Additional arguments of the action."""
-
-    @property
-    def name(self) -> str:
-        """Name of the action in the preferences: it stays the same when keys and labels change."""
-        return " ".join([self.action, *map(str, self.arguments)])
-
-    def run(self, state: AppState) -> None:
-        """Run the action."""
-        function_of(self.action)(state, *self.arguments)
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """An action without a key, for the command palette."""
-
-    text: str
-    """Name of the action."""
-    action: str
-    """Module and function within ``viewer.app``; called with the state."""
-    arguments: tuple[object, ...] = ()
-    """Additional arguments of the action."""
-    why: str = ""
-    """Function of the state that returns the reason why the action is disabled; empty if it is
-    always enabled."""
-
-    def run(self, state: AppState) -> None:
-        """Run the action."""
-        function_of(self.action)(state, *self.arguments)
-
-    def reason(self, state: AppState) -> str:
-        """Return the reason why it is disabled; empty if it can be run."""
-        return str(function_of(self.why)(state)) if self.why else ""
-
-
-def function_of(path: str) -> Callable[..., object]:
-    """Return a function of ``viewer.app``, imported on first use."""
-    module, _, name = path.rpartition(".")
-    place = _MOVED.get(module, module)
-    found: Callable[..., object] = getattr(import_module(f"viewer.app.{place}"), name)
-    return found
-
-
-PANELS = {
-    "joints": Panel("posing", "Joints", "left"),
-    "shape": Panel("posing", "Shape", "left", needs="blend_shapes"),
-    "hands": Panel("posing", "Hands", "left", needs="hands"),
-    "vertex": Panel("weights", "Vertex", "left", on_demand=True),
-    "lint": Panel("linting", "Lint", "left", on_demand=True),
-    "rig": Panel("rigging", "Rig", "left", on_demand=True),
-    "display": Panel("view", "Display", "right 1"),
-    "skinning": Panel("view", "Skinning", "right 1"),
-    "weights": Panel("weights", "Weights", "right 1"),
-    "camera": Panel("view", "Camera", "right 2"),
-    "lights": Panel("view", "Lights", "right 2"),
-    "stats": Panel("view", "Stats", "right 3"),
-    "actors": Panel("actors", "Actors", "right 3", needs="actors"),
-    "parts": Panel("actors", "Parts", "right 3", needs="parts"),
-    "timeline": Panel("playback", "Timeline", "bottom", needs="motion", leads=True),
-    "curves": Panel("curves", "Curves", "bottom", needs="motion"),
-    "joint_match": Panel("retargeting", "Joint match", "bottom", needs="drive"),
-}
-"""Panels in the order in which they are docked and listed in the menu."""
+_LEFT_OUT = ("Ctrl+P", "Esc")  # shortcuts that open and close the palette
+_LONGEST = 60  # maximum length of a name in characters
 
 KEYS = (
-    Shortcut((_K.r,), "R", "reset the pose to the file's pose", "posing.pose_actions.reset_pose"),
-    Shortcut((_K.s,), "S", "show or hide the skeleton", "view.display_actions.toggle_skeleton"),
+    Shortcut((_K.r,), "R", "reset the pose to the file's pose", reset_pose),
+    Shortcut((_K.s,), "S", "show or hide the skeleton", toggle_skeleton),
+    Shortcut((_K.k,), "K", "posed skin, or skin in bind pose", toggle_binding),
+    Shortcut((_K.w,), "W", "wireframe", given(toggle_option, "wireframe", "Wireframe")),
+    Shortcut((_K.n,), "N", "vertex normals", given(toggle_option, "normals", "Vertex normals")),
+    Shortcut((_K.t,), "T", "texture", given(toggle_option, "texture", "Texture")),
+    Shortcut((_K.g,), "G", "ground grid", given(toggle_option, "grid", "Grid")),
+    Shortcut((_K.a,), "A", "rigged or original mesh (A/B)", switch_version),
     Shortcut(
-        (_K.k,),
-        "K",
-        "posed skin, or skin in bind pose",
-        "view.display_actions.toggle_binding",
+        (_K.b,), "B", "x-ray: skeleton through the skin", given(toggle_option, "xray", "X-ray")
     ),
-    Shortcut((_K.w,), "W", "wireframe", _OPTION, ("wireframe", "Wireframe")),
-    Shortcut((_K.n,), "N", "vertex normals", _OPTION, ("normals", "Vertex normals")),
-    Shortcut((_K.t,), "T", "texture", _OPTION, ("texture", "Texture")),
-    Shortcut((_K.g,), "G", "ground grid", _OPTION, ("grid", "Grid")),
-    Shortcut((_K.a,), "A", "rigged or original mesh (A/B)", "rigging.results.switch_version"),
-    Shortcut((_K.b,), "B", "x-ray: skeleton through the skin", _OPTION, ("xray", "X-ray")),
-    Shortcut((_K.j,), "J", "joint names", _OPTION, ("joint_names", "Joint names")),
-    Shortcut((_SHIFT | _K.j,), "Shift+J", "joint axes", _OPTION, ("joint_axes", "Joint axes")),
-    Shortcut((_K.v,), "V", "weights of the selected joint", "weights.actions.toggle_weights"),
-    Shortcut((_K.f,), "F", "fit the view", "view.camera_actions.fit_view"),
+    Shortcut((_K.j,), "J", "joint names", given(toggle_option, "joint_names", "Joint names")),
     Shortcut(
-        (_K.period, _K.keypad_decimal),
-        ".",
-        "fit the selected joint or actor",
-        "view.camera_actions.fit_selection",
+        (_SHIFT | _K.j,), "Shift+J", "joint axes", given(toggle_option, "joint_axes", "Joint axes")
     ),
-    Shortcut((_K._1, _K.keypad1), "1", "front view", _LOOK, ("front",)),
-    Shortcut((_K._3, _K.keypad3), "3", "side view", _LOOK, ("left",)),
-    Shortcut((_K._7, _K.keypad7), "7", "top view", _LOOK, ("top",)),
-    Shortcut((_CTRL | _K._1, _CTRL | _K.keypad1), "Ctrl+1", "back view", _LOOK, ("back",)),
-    Shortcut((_CTRL | _K._3, _CTRL | _K.keypad3), "Ctrl+3", "other side", _LOOK, ("right",)),
-    Shortcut((_CTRL | _K._7, _CTRL | _K.keypad7), "Ctrl+7", "view from below", _LOOK, ("bottom",)),
+    Shortcut((_K.v,), "V", "weights of the selected joint", toggle_weights),
+    Shortcut((_K.f,), "F", "fit the view", fit_view),
+    Shortcut((_K.period, _K.keypad_decimal), ".", "fit the selected joint or actor", fit_selection),
+    Shortcut((_K._1, _K.keypad1), "1", "front view", given(look, "front")),
+    Shortcut((_K._3, _K.keypad3), "3", "side view", given(look, "left")),
+    Shortcut((_K._7, _K.keypad7), "7", "top view", given(look, "top")),
+    Shortcut((_CTRL | _K._1, _CTRL | _K.keypad1), "Ctrl+1", "back view", given(look, "back")),
+    Shortcut((_CTRL | _K._3, _CTRL | _K.keypad3), "Ctrl+3", "other side", given(look, "right")),
     Shortcut(
-        (_K._5, _K.keypad5),
-        "5",
-        "orthographic or perspective",
-        "view.camera_actions.toggle_projection",
+        (_CTRL | _K._7, _CTRL | _K.keypad7), "Ctrl+7", "view from below", given(look, "bottom")
     ),
-    Shortcut((_K.tab,), "Tab", "hide or show the panels", "window_actions.toggle_panels"),
-    Shortcut((_K.h, _SHIFT | _K.slash, _K.f1), "H or ?", "this list", "window_actions.toggle_keys"),
-    Shortcut((_CTRL | _K.p,), "Ctrl+P", "find an action", "palette.palette_window.toggle_palette"),
-    Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", "window_actions.toggle_messages"),
-    Shortcut((_K.f12,), "F12", "save a screenshot", "window_actions.want", ("screenshot",)),
-    Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", "window_actions.want", ("open dialog",)),
+    Shortcut((_K._5, _K.keypad5), "5", "orthographic or perspective", toggle_projection),
+    Shortcut((_K.tab,), "Tab", "hide or show the panels", toggle_panels),
+    Shortcut((_K.h, _SHIFT | _K.slash, _K.f1), "H or ?", "this list", toggle_keys),
+    Shortcut((_CTRL | _K.p,), "Ctrl+P", "find an action", toggle_palette),
+    Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", toggle_messages),
+    Shortcut((_K.f12,), "F12", "save a screenshot", want_screenshot),
+    Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", ask_for_files),
+    Shortcut((_CTRL | _K.comma,), "Ctrl+,", "preferences", open_preferences),
+    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", undo),
+    Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", redo),
+    Shortcut((_K.q,), "Q", "Select tool: click selects", given(choose_tool, "select")),
+    Shortcut((_K.e,), "E", "Rotate tool: rotate the selected joint", given(choose_tool, "rotate")),
+    Shortcut((_K.d,), "D", "Move tool: drag a joint (IK)", given(choose_tool, "move")),
+    Shortcut((_K.x,), "X", "local, parent or world axes", next_orientation),
+    Shortcut((_K.m,), "M", "mirror the pose left to right", mirror),
+    Shortcut((_CTRL | _K.c,), "Ctrl+C", "copy the pose", copy_pose),
     Shortcut(
-        (_CTRL | _K.comma,),
-        "Ctrl+,",
-        "preferences",
-        "preferences.preferences_window.open_preferences",
+        (_CTRL | _SHIFT | _K.c,), "Ctrl+Shift+C", "copy the pose as raw pose values", copy_numbers
     ),
-    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", f"{_UNDO}.undo"),
-    Shortcut(
-        (_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo_actions.redo"
-    ),
-    Shortcut((_K.q,), "Q", "Select tool: click selects", _TOOL, ("select",)),
-    Shortcut((_K.e,), "E", "Rotate tool: rotate the selected joint", _TOOL, ("rotate",)),
-    Shortcut((_K.d,), "D", "Move tool: drag a joint (IK)", _TOOL, ("move",)),
-    Shortcut((_K.x,), "X", "local, parent or world axes", "posing.tool_actions.next_orientation"),
-    Shortcut((_K.m,), "M", "mirror the pose left to right", "posing.pose_actions.mirror"),
-    Shortcut((_CTRL | _K.c,), "Ctrl+C", "copy the pose", "posing.pose_actions.copy_pose"),
-    Shortcut(
-        (_CTRL | _SHIFT | _K.c,),
-        "Ctrl+Shift+C",
-        "copy the pose as raw pose values",
-        "posing.pose_actions.copy_numbers",
-    ),
-    Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", "posing.pose_actions.paste_pose"),
-    Shortcut((_K.space,), "Space", "play or pause", "playback.actions.play"),
-    Shortcut((_K.left_arrow,), "Left", "one frame back", _STEP, (-1,)),
-    Shortcut((_K.right_arrow,), "Right", "one frame forward", _STEP, (1,)),
-    Shortcut((_SHIFT | _K.left_arrow,), "Shift+Left", "ten frames back", _STEP, (-10,)),
-    Shortcut((_SHIFT | _K.right_arrow,), "Shift+Right", "ten frames forward", _STEP, (10,)),
-    Shortcut(
-        (_K.home,), "Home", "first frame of the range", "playback.actions.go_to_end", (False,)
-    ),
-    Shortcut((_K.end,), "End", "last frame of the range", "playback.actions.go_to_end", (True,)),
-    Shortcut((_K.left_bracket,), "[", "previous animation", _ANIMATION, (-1,)),
-    Shortcut((_K.right_bracket,), "]", "next animation", _ANIMATION, (1,)),
-    Shortcut((_K.i,), "I", "start the range here", "playback.actions.range_in"),
-    Shortcut((_K.o,), "O", "end the range here", "playback.actions.range_out"),
-    Shortcut((_K.escape,), "Esc", "close the topmost dialog", "cancel.cancel"),
-    Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", "window_actions.want", ("quit",)),
+    Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", paste_pose),
+    Shortcut((_K.space,), "Space", "play or pause", play),
+    Shortcut((_K.left_arrow,), "Left", "one frame back", given(step, -1)),
+    Shortcut((_K.right_arrow,), "Right", "one frame forward", given(step, 1)),
+    Shortcut((_SHIFT | _K.left_arrow,), "Shift+Left", "ten frames back", given(step, -10)),
+    Shortcut((_SHIFT | _K.right_arrow,), "Shift+Right", "ten frames forward", given(step, 10)),
+    Shortcut((_K.home,), "Home", "first frame of the range", given(go_to_end, False)),
+    Shortcut((_K.end,), "End", "last frame of the range", given(go_to_end, True)),
+    Shortcut((_K.left_bracket,), "[", "previous animation", given(step_animation, -1)),
+    Shortcut((_K.right_bracket,), "]", "next animation", given(step_animation, 1)),
+    Shortcut((_K.i,), "I", "start the range here", range_in),
+    Shortcut((_K.o,), "O", "end the range here", range_out),
+    Shortcut((_K.escape,), "Esc", "close the topmost dialog", cancel),
+    Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", request_quit),
 )
 """Keys in the order in which they are listed."""
 
-_WANT = "keys.want"
-_ROOM = "core.reasons.no_job_room"
-_MATCH = "retargeting.joint_match_panel"
-_NO_EDIT = "retargeting.drive_changes.no_edit"
-
 ACTIONS = (
-    Action("Open the bundled figure", _WANT, ("open bundled",)),
-    Action("Open the bundled body", _WANT, ("open body",)),
-    Action("Save pose…", "posing.posing.ask_for_pose", why="core.reasons.no_pose"),
-    Action("Export…", "menus.ask_for_export", why=_ROOM),
-    Action(
-        "Export motion…",
-        "files.motion_export.ask_for_motion",
-        why="core.reasons.nothing_to_export",
-    ),
-    Action("Record pictures or video…", "recording.record_dialog.open_record_dialog", why=_ROOM),
-    Action("Check the rig", "linting.lint_panel.check_rig", why=_ROOM),
-    Action("New clip", "curves.editing.new_clip", why="core.reasons.no_new_clip"),
-    Action(
-        "Key the pose at the current time",
-        "posing.toolbar.key_pose_now",
-        why="posing.toolbar.no_keys",
-    ),
-    Action("Reset the pose of this actor", "posing.posing.reset_actor"),
-    Action("Reset shape", "posing.posing.reset_shape"),
-    Action("Random shape", "posing.posing.random_shape"),
-    Action("Match joints automatically", f"{_MATCH}.match_automatically", why=_NO_EDIT),
-    Action("Load joint map…", f"{_MATCH}.ask_for_map", why=_NO_EDIT),
-    Action("Save joint map…", f"{_MATCH}.ask_where_to_save", why="core.reasons.no_drive"),
-    Action("Show all parts", "actors.parts_panel.show_all_parts", why="core.reasons.no_parts"),
-    Action("Feet on the ground", "retargeting.drive_changes.toggle_feet", why=_NO_EDIT),
-    Action("Springs", "actors.actors_panel.toggle_springs", why="actors.actors_panel.no_springs"),
-    Action("Reset lights", "view.display_panel.reset_lights"),
-    Action("Axis gizmo", "view.display_panel.toggle_gizmo"),
-    Action("Selection outlines", "view.outlines.toggle_outlines"),
-    Action("Pick vertices", "weights.weights_panel.toggle_picking", why="core.reasons.no_mesh"),
-    Action(
-        "Inspect vertex under cursor",
-        "weights.weights_panel.toggle_vertex_info",
-        why="core.reasons.no_mesh",
-    ),
-    Action("Reset layout", "layout.reset_layout"),
+    Action("Open the bundled figure", open_bundled_figure),
+    Action("Open the bundled body", open_bundled_body),
+    Action("Save pose…", ask_for_pose, no_pose),
+    Action("Export…", ask_for_export, no_job_room),
+    Action("Export motion…", ask_for_motion, nothing_to_export),
+    Action("Record pictures or video…", open_record_dialog, no_job_room),
+    Action("Check the rig", check_rig, no_job_room),
+    Action("New clip", new_clip, no_new_clip),
+    Action("Key the pose at the current time", key_pose_now, no_keys),
+    Action("Reset the pose of this actor", reset_actor),
+    Action("Reset shape", reset_shape),
+    Action("Random shape", random_shape),
+    Action("Match joints automatically", match_automatically, no_edit),
+    Action("Load joint map…", ask_for_map, no_edit),
+    Action("Save joint map…", ask_where_to_save, no_drive),
+    Action("Show all parts", show_all_parts, no_parts),
+    Action("Feet on the ground", toggle_feet, no_edit),
+    Action("Springs", toggle_springs, no_springs),
+    Action("Reset lights", reset_lights),
+    Action("Axis gizmo", toggle_gizmo),
+    Action("Selection outlines", toggle_outlines),
+    Action("Pick vertices", toggle_picking, no_mesh),
+    Action("Inspect vertex under cursor", toggle_vertex_info, no_mesh),
+    Action("Reset layout", reset_layout),
 )
 """Actions of menus and panels that have no key."""
 
@@ -282,12 +188,86 @@ MOUSE = (
 """Actions of the mouse, listed with the keys."""
 
 
-def key_of(action: str, *arguments: object) -> str:
-    """Return the name of the key that runs an action; empty if none does."""
-    found = (key.label for key in KEYS if (key.action, key.arguments) == (action, arguments))
-    return next(found, "")
+def entries(state: AppState) -> list[Entry]:
+    """Return all entries for the current scene."""
+    kinds = (_actions, _panels, _choices, _animations, _joints, _figures)
+    return [entry for kind in kinds for entry in kind(state)]
 
 
-def panel_module(name: str) -> ModuleType:
-    """Return a panel's module, imported on first use."""
-    return import_module(f"viewer.app.{PANELS[name].feature}.{name}_panel")
+def _actions(state: AppState) -> Iterator[Entry]:
+    for key in KEYS:
+        if key.label not in _LEFT_OUT:
+            yield Entry(
+                key.text[0].upper() + key.text[1:],
+                "action",
+                key.run,
+                key_name(state, key.label),
+            )
+    for action in ACTIONS:
+        yield Entry(action.text, "action", action.run, why=action.reason(state))
+
+
+def _panels(state: AppState) -> Iterator[Entry]:
+    for name, panel in PANELS.items():
+        why = no_panel(state, panel.needs)
+        yield Entry(panel.title, "panel", partial(_open_panel, name=name), why=why)
+
+
+def _open_panel(state: AppState, name: str) -> None:
+    """Open a panel, or bring it to the front of its tabs."""
+    state.panels_visible = True
+    show_panel(state, name)
+
+
+def _choices(state: AppState) -> Iterator[Entry]:
+    """Yield the choices of shading, skeletons and skinning."""
+    for name, text in SHADING.items():
+        yield Entry(f"Shading: {text}", "choice", partial(_shade, name=name))
+    for name, text in SHOWN.items():
+        yield Entry(f"Show: {text}", "choice", partial(show, what=name))
+    for name, text in BONES.items():
+        yield Entry(
+            f"Bones: {text}", "choice", partial(show_bones, style=name), why=no_skeleton(state)
+        )
+    for name, method in METHODS.items():
+        yield Entry(f"Skinning: {method.title}", "choice", partial(_skin, name=name))
+
+
+def _shade(state: AppState, name: str) -> None:
+    set_shading(state, name)
+    state.say_status(SHADING[name])
+
+
+def _skin(state: AppState, name: str) -> None:
+    state.options.skinning.method = name
+    state.say_status(METHODS[name].title)
+
+
+def _animations(state: AppState) -> Iterator[Entry]:
+    """Yield the animations of the chosen actor."""
+    labels = animation_labels(state.actor.figure)
+    for index, label in enumerate(labels):
+        text = f"Play animation: {printable(label, _LONGEST)}"
+        yield Entry(text, "animation", partial(choose_animation, index=index))
+    if labels:
+        yield Entry("Play no animation", "animation", partial(choose_animation, index=-1))
+
+
+def _joints(state: AppState) -> Iterator[Entry]:
+    """Yield the joints of the chosen actor."""
+    skeleton = state.actor.figure.skeleton
+    if skeleton is None:
+        return
+    labels = joint_labels(skeleton)
+    for joint in shown_joints(skeleton).tolist():
+        yield Entry(printable(labels[joint], _LONGEST), "joint", partial(select_joint, joint=joint))
+
+
+def _figures(state: AppState) -> Iterator[Entry]:
+    for index, actor in enumerate(state.scene.actors):
+        yield Entry(printable(actor.name, _LONGEST), "figure", partial(_choose, index=index))
+
+
+def _choose(state: AppState, index: int) -> None:
+    state.select_actor(index)
+    state.say_status(printable(state.actor.name, _LONGEST))

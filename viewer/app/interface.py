@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from imgui_bundle import imgui
 
 from viewer.app.core.messages import Message, message_line
@@ -11,14 +9,17 @@ from viewer.app.core.reasons import no_panel
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import ERROR, ink
 from viewer.app.core.widgets import begin_window, button, checkbox, explain, same_line_if_room
-from viewer.app.features import PANELS, Panel, panel_module
+from viewer.app.features import KEYS
 from viewer.app.layout import (
+    PANELS,
     Layout,
+    Panel,
     ShownPanels,
     bring_to_front,
     draw_dock,
     is_open,
     keep_fronts,
+    panel_module,
     set_open,
 )
 from viewer.app.manual import draw_manual
@@ -33,11 +34,11 @@ _SIZE = (42.0, 22.0)  # initial size of the window, in font sizes
 _LONGEST = 1000  # maximum length of a message in characters
 
 
-def draw_interface(state: AppState) -> list[Path]:
-    """Draw everything except the scene; return files to open from a menu."""
+def draw_interface(state: AppState) -> None:
+    """Draw everything except the scene."""
     state.item_rects.clear()
     if state.panels_visible:
-        chosen = draw_menus(state)
+        draw_menus(state)
         dock = draw_dock(state)
         leading = ""
         for name, panel in PANELS.items():
@@ -54,16 +55,14 @@ def draw_interface(state: AppState) -> list[Path]:
         node = imgui.internal.dock_builder_get_central_node(dock)
         state.view_rect = (node.pos.x, node.pos.y, node.size.x, node.size.y)
     else:
-        chosen = []
         keep_fronts(state.of(Layout))
         viewport = imgui.get_main_viewport()
         state.view_rect = (viewport.pos.x, viewport.pos.y, viewport.size.x, viewport.size.y)
     draw_overlays(state)
     _draw_message_window(state)
     draw_manual(state)
-    draw_preferences(state)
+    draw_preferences(state, KEYS)
     _draw_error(state)
-    return chosen
 
 
 def _dock_of_neighbour(panel: Panel) -> int:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 from imgui_bundle import imgui
 
 from viewer.app.closing import Closing, keep_open, question_of
+from viewer.app.core.actions import Shortcut
 from viewer.app.core.state import AppState
-from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.files import Files
 from viewer.app.linting.lint_panel import Linting
 from viewer.app.manual import Manual
@@ -53,14 +53,16 @@ class Keyboard:
     bound: dict[int, list[_Bound]] = field(default_factory=dict)
     """Keys in the order of the table of keys, by the modifiers that are held with them."""
 
-    def of(self, chosen: Mapping[str, str], held: int) -> list[_Bound]:
+    def of(
+        self, shortcuts: Sequence[Shortcut], chosen: Mapping[str, str], held: int
+    ) -> list[_Bound]:
         """Return the keys that run an action while these modifiers are held."""
         if not self.bound or self.chosen != chosen:
-            self.chosen, self.bound = dict(chosen), _bound(chosen)
+            self.chosen, self.bound = dict(chosen), _bound(shortcuts, chosen)
         return self.bound.get(held, [])
 
 
-def handle_keys(state: AppState) -> None:
+def handle_keys(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
     """Run the actions of keys pressed in this frame; letters typed into a text box are ignored."""
     keyboard = state.of(Keyboard)
     had_menu, keyboard.has_menu = keyboard.has_menu, _has_menu()
@@ -86,7 +88,7 @@ def handle_keys(state: AppState) -> None:
     is_covered = bool(state.error) or state.of(Files).dialog is not None
     is_covered |= question_of(state) is not None
     chosen = state.of(Preferences).keys
-    for key, repeats, shortcut in keyboard.of(chosen, int(held)):
+    for key, repeats, shortcut in keyboard.of(shortcuts, chosen, int(held)):
         if is_covered and shortcut.label not in _ALWAYS:
             continue
         if (had_menu or keyboard.has_menu) and key in _NAVIGATION:
@@ -96,11 +98,11 @@ def handle_keys(state: AppState) -> None:
             break
 
 
-def _bound(chosen: Mapping[str, str]) -> dict[int, list[_Bound]]:
+def _bound(shortcuts: Sequence[Shortcut], chosen: Mapping[str, str]) -> dict[int, list[_Bound]]:
     """Return the keys by their modifiers; splitting chords in every frame would be slow."""
     mask = int(imgui.Key.mod_mask_)
     bound: dict[int, list[_Bound]] = {}
-    for shortcut in KEYS:
+    for shortcut in shortcuts:
         for chord in map(int, chords_of(shortcut, chosen)):
             key = imgui.Key(chord & ~mask)
             bound.setdefault(chord & mask, []).append((key, key in _REPEATED, shortcut))
@@ -195,6 +197,6 @@ def toggle_messages(state: AppState) -> None:
     state.messages.is_open = not state.messages.is_open
 
 
-def want(state: AppState, what: str) -> None:
-    """Request an action that the window runs after the frame."""
-    state.wants.add(what)
+def want_screenshot(state: AppState) -> None:
+    """Save a picture of the scene after the frame."""
+    state.wants_screenshot = True

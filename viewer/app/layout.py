@@ -1,14 +1,19 @@
-"""Arrangement of the panels: which are open, and the dock's proportions in a window of any size."""
+"""Panels: their table, which are open, and the dock's proportions in a window of any size.
+
+A panel is a module ``<name>_panel.py`` of its feature's folder with ``draw(state)``, imported on
+first use.
+"""
 
 from __future__ import annotations
 
 from dataclasses import field
+from importlib import import_module
+from types import ModuleType
 from typing import NamedTuple
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.features import PANELS
 from viewer.data_classes import dataclass
 
 _DOCK = "viewer dock"
@@ -21,6 +26,53 @@ _MOST = 0.5
 _THREE_ROWS = 60.0  # font sizes: lower windows have two rows of panels on the right
 _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 """Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Entry of a panel, with the properties that the layout needs."""
+
+    feature: str
+    """Folder of the panel's module, ``<name>_panel.py``."""
+    title: str
+    """Title of its tab."""
+    place: str
+    """Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards."""
+    needs: str = ""
+    """Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
+    ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
+    motion of another skeleton; empty if the panel is always available."""
+    leads: bool = False
+    """Whether it is brought to the front of its tabs when a scene makes it available."""
+    on_demand: bool = False
+    """Whether it is closed until the user opens it."""
+
+
+PANELS = {
+    "joints": Panel("posing", "Joints", "left"),
+    "shape": Panel("posing", "Shape", "left", needs="blend_shapes"),
+    "hands": Panel("posing", "Hands", "left", needs="hands"),
+    "vertex": Panel("weights", "Vertex", "left", on_demand=True),
+    "lint": Panel("linting", "Lint", "left", on_demand=True),
+    "rig": Panel("rigging", "Rig", "left", on_demand=True),
+    "display": Panel("view", "Display", "right 1"),
+    "skinning": Panel("view", "Skinning", "right 1"),
+    "weights": Panel("weights", "Weights", "right 1"),
+    "camera": Panel("view", "Camera", "right 2"),
+    "lights": Panel("view", "Lights", "right 2"),
+    "stats": Panel("view", "Stats", "right 3"),
+    "actors": Panel("actors", "Actors", "right 3", needs="actors"),
+    "parts": Panel("actors", "Parts", "right 3", needs="parts"),
+    "timeline": Panel("playback", "Timeline", "bottom", needs="motion", leads=True),
+    "curves": Panel("curves", "Curves", "bottom", needs="motion"),
+    "joint_match": Panel("retargeting", "Joint match", "bottom", needs="drive"),
+}
+"""Panels in the order in which they are docked and listed in the menu."""
+
+
+def panel_module(name: str) -> ModuleType:
+    """Return a panel's module, imported on first use."""
+    return import_module(f"viewer.app.{PANELS[name].feature}.{name}_panel")
 
 
 @dataclass(slots=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from viewer.app.closing import request_quit
 from viewer.app.core.reasons import (
     no_job_room,
     no_new_clip,
@@ -19,13 +20,18 @@ from viewer.app.core.state import AppState
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.editing import new_clip
-from viewer.app.features import PANELS
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import (
+    Files,
+    ask_for_files,
+    open_bundled_body,
+    open_bundled_figure,
+    open_files,
+)
 from viewer.app.files.model_menu import draw_model_menu
 from viewer.app.files.motion_export import N_ROWS, ask_for_motion, draw_pose_formats, pose_formats
-from viewer.app.keys import Keyboard
-from viewer.app.layout import is_open, reset_layout, toggle_panel
+from viewer.app.keys import Keyboard, want_screenshot
+from viewer.app.layout import PANELS, is_open, reset_layout, toggle_panel
 from viewer.app.linting.lint_panel import check_rig
 from viewer.app.manual import draw_manual_menu
 from viewer.app.palette import toggle_palette
@@ -46,14 +52,13 @@ from viewer.formats import file_stem, opened_text
 from viewer.phrases import printable
 
 
-def draw_menus(state: AppState) -> list[Path]:
-    """Draw the menu bar; return files to open."""
+def draw_menus(state: AppState) -> None:
+    """Draw the menu bar."""
     keyboard = state.of(Keyboard)
-    chosen: list[Path] = []
     if not imgui.begin_main_menu_bar():
-        return chosen
+        return
     if begin_menu(state, "File"):
-        chosen = _draw_file_menu(state)
+        _draw_file_menu(state)
         imgui.end_menu()
     if begin_menu(state, "Edit"):
         _draw_edit_menu(state)
@@ -76,29 +81,27 @@ def draw_menus(state: AppState) -> list[Path]:
         draw_manual_menu(state)
         imgui.end_menu()
     imgui.end_main_menu_bar()
-    return chosen
 
 
-def _draw_file_menu(state: AppState) -> list[Path]:
+def _draw_file_menu(state: AppState) -> None:
     files = state.of(Files)
-    chosen: list[Path] = []
     if menu_item(state, "Open…", "Ctrl+O"):
-        state.wants.add("open dialog")
+        ask_for_files(state)
     if begin_menu(state, "Open recent", bool(files.recent)):
         for number, group in enumerate(files.recent):
             text = printable(" + ".join(opened_text(Path(path)) for path in group), 80)
             if imgui.menu_item(f"{text}##recent{number}", "", False)[0]:
-                chosen = [Path(path) for path in group]
+                open_files(state, [Path(path) for path in group])
             note_item(state, f"recent {number}")
             if imgui.is_item_hovered():
                 imgui.set_tooltip("\n".join(printable(path, 200) for path in group))
         imgui.end_menu()
     if menu_item(state, "Bundled figure"):
-        state.wants.add("open bundled")
+        open_bundled_figure(state)
     if menu_item(state, "Bundled body"):
-        state.wants.add("open body")
+        open_bundled_body(state)
     if begin_menu(state, "Models"):
-        chosen = draw_model_menu(state) or chosen
+        draw_model_menu(state)
         imgui.end_menu()
     imgui.separator()
     if menu_item(state, "Save pose…", why=no_pose(state)):
@@ -110,11 +113,10 @@ def _draw_file_menu(state: AppState) -> list[Path]:
     if menu_item(state, "Record pictures or video…", why=no_job_room(state)):
         open_record_dialog(state)
     if menu_item(state, "Save screenshot", "F12"):
-        state.wants.add("screenshot")
+        want_screenshot(state)
     imgui.separator()
     if menu_item(state, "Quit", "Ctrl+Q"):
-        state.wants.add("quit")
-    return chosen
+        request_quit(state)
 
 
 def ask_for_export(state: AppState) -> None:

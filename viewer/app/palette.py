@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import field
-from functools import partial
 
 from imgui_bundle import imgui
 
-from viewer.app.core.reasons import no_panel, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import ink
-from viewer.app.core.widgets import key_name, note_item, overlay_rect
-from viewer.app.features import ACTIONS, KEYS, PANELS
-from viewer.app.layout import show_panel
-from viewer.app.playback.animations import choose_animation
-from viewer.app.posing.joint_tree import select_joint
-from viewer.app.view.display_panel import set_shading, show, show_bones
+from viewer.app.core.widgets import note_item, overlay_rect
 from viewer.data_classes import dataclass
-from viewer.phrases import printable
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BONES, SHOWN
-from viewer.rig.motion.animation_choice import animation_labels
-from viewer.rig.skeleton import joint_labels, shown_joints
-from viewer.rig.skinning import METHODS
 
 _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
 _TOP = 0.14  # upper edge, as a fraction of the window's height
 _KEY_COLOR = (1.0, 0.78, 0.45, 1.0)
 _K = imgui.Key
-_LEFT_OUT = ("Ctrl+P", "Esc")  # shortcuts that open and close the palette
-_LONGEST = 60  # maximum length of a name in characters
 _START, _INSIDE, _SCATTERED = 100.0, 60.0, 20.0
 _BOUNDARIES = " _-.:/#("
 
@@ -47,7 +32,7 @@ class Palette:
     """Typed text."""
     row: int = 0
     """Highlighted row."""
-    known: list[_Entry] = field(default_factory=list)
+    known: list[Entry] = field(default_factory=list)
     """Entries of the scene for which it was opened."""
     shown: list[int] = field(default_factory=list)
     """Indices of matching entries, best first."""
@@ -56,14 +41,14 @@ class Palette:
 
 
 @dataclass(frozen=True, slots=True)
-class _Entry:
+class Entry:
     """An entry that can be found and run."""
 
     text: str
     """Name of the entry."""
     kind: str
     """Category in one word."""
-    run: Callable[[AppState], None]
+    run: Callable[[AppState], object]
     """Called with the state."""
     key: str = ""
     """Keyboard shortcut; empty for none."""
@@ -74,14 +59,15 @@ class _Entry:
 def toggle_palette(state: AppState) -> None:
     """Open the palette with an empty query, or close it."""
     is_open = state.of(Palette).is_open
-    state.put(Palette(is_open=not is_open, known=[] if is_open else entries(state)))
+    state.put(Palette(is_open=not is_open))
 
 
-def draw_palette(state: AppState) -> None:
-    """Draw the palette if it is open; run the chosen entry after it has closed."""
+def draw_palette(state: AppState, entries: Callable[[AppState], list[Entry]]) -> None:
+    """Draw the palette if it is open; run the chosen one of its entries after it has closed."""
     palette = state.of(Palette)
     if not palette.is_open:
         return
+    palette.known = palette.known or entries(state)
     viewport, font = imgui.get_main_viewport(), imgui.get_font_size()
     width = min(_WIDTH * font, viewport.size.x - 2.0 * font)
     place = (viewport.get_center().x, viewport.pos.y + _TOP * viewport.size.y)
@@ -110,7 +96,7 @@ def _is_closed() -> bool:
     return is_again or imgui.is_key_pressed(_K.escape, False)
 
 
-def _draw_content(state: AppState, palette: Palette) -> _Entry | None:
+def _draw_content(state: AppState, palette: Palette) -> Entry | None:
     """Draw the text box and the rows; return the entry to run."""
     if not palette.has_focus:
         imgui.set_keyboard_focus_here()
@@ -153,7 +139,7 @@ def _move(palette: Palette) -> bool:
     return True
 
 
-def _draw_rows(state: AppState, palette: Palette, moved: bool) -> _Entry | None:
+def _draw_rows(state: AppState, palette: Palette, moved: bool) -> Entry | None:
     """Draw the rows in view; return the entry that was clicked."""
     chosen, count = None, len(palette.shown)
     if not count:
@@ -183,7 +169,7 @@ def _reveal(top: float, height: float) -> None:
         imgui.set_scroll_y(top + height - room)
 
 
-def _draw_row(state: AppState, entry: _Entry, row: int, is_chosen: bool) -> bool:
+def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
     """Draw an entry with its kind, and its key or reason; return whether it was clicked."""
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
     flags = imgui.SelectableFlags_.disabled if entry.why else imgui.SelectableFlags_.none
@@ -202,93 +188,6 @@ def _draw_row(state: AppState, entry: _Entry, row: int, is_chosen: bool) -> bool
         imgui.same_line(left)
         imgui.text_disabled(note)
     return bool(clicked)
-
-
-def entries(state: AppState) -> list[_Entry]:
-    """Return all entries for the current scene."""
-    kinds = (_actions, _panels, _choices, _animations, _joints, _figures)
-    return [entry for kind in kinds for entry in kind(state)]
-
-
-def _actions(state: AppState) -> Iterator[_Entry]:
-    for key in KEYS:
-        if key.label not in _LEFT_OUT:
-            yield _Entry(
-                key.text[0].upper() + key.text[1:],
-                "action",
-                key.run,
-                key_name(state, key.label),
-            )
-    for action in ACTIONS:
-        yield _Entry(action.text, "action", action.run, why=action.reason(state))
-
-
-def _panels(state: AppState) -> Iterator[_Entry]:
-    for name, panel in PANELS.items():
-        why = no_panel(state, panel.needs)
-        yield _Entry(panel.title, "panel", partial(_open_panel, name=name), why=why)
-
-
-def _open_panel(state: AppState, name: str) -> None:
-    """Open a panel, or bring it to the front of its tabs."""
-    state.panels_visible = True
-    show_panel(state, name)
-
-
-def _choices(state: AppState) -> Iterator[_Entry]:
-    """Yield the choices of shading, skeletons and skinning."""
-    for name, text in SHADING.items():
-        yield _Entry(f"Shading: {text}", "choice", partial(_shade, name=name))
-    for name, text in SHOWN.items():
-        yield _Entry(f"Show: {text}", "choice", partial(show, what=name))
-    for name, text in BONES.items():
-        yield _Entry(
-            f"Bones: {text}", "choice", partial(show_bones, style=name), why=no_skeleton(state)
-        )
-    for name, method in METHODS.items():
-        yield _Entry(f"Skinning: {method.title}", "choice", partial(_skin, name=name))
-
-
-def _shade(state: AppState, name: str) -> None:
-    set_shading(state, name)
-    state.say_status(SHADING[name])
-
-
-def _skin(state: AppState, name: str) -> None:
-    state.options.skinning.method = name
-    state.say_status(METHODS[name].title)
-
-
-def _animations(state: AppState) -> Iterator[_Entry]:
-    """Yield the animations of the chosen actor."""
-    labels = animation_labels(state.actor.figure)
-    for index, label in enumerate(labels):
-        text = f"Play animation: {printable(label, _LONGEST)}"
-        yield _Entry(text, "animation", partial(choose_animation, index=index))
-    if labels:
-        yield _Entry("Play no animation", "animation", partial(choose_animation, index=-1))
-
-
-def _joints(state: AppState) -> Iterator[_Entry]:
-    """Yield the joints of the chosen actor."""
-    skeleton = state.actor.figure.skeleton
-    if skeleton is None:
-        return
-    labels = joint_labels(skeleton)
-    for joint in shown_joints(skeleton).tolist():
-        yield _Entry(
-            printable(labels[joint], _LONGEST), "joint", partial(select_joint, joint=joint)
-        )
-
-
-def _figures(state: AppState) -> Iterator[_Entry]:
-    for index, actor in enumerate(state.scene.actors):
-        yield _Entry(printable(actor.name, _LONGEST), "figure", partial(_choose, index=index))
-
-
-def _choose(state: AppState, index: int) -> None:
-    state.select_actor(index)
-    state.say_status(printable(state.actor.name, _LONGEST))
 
 
 def score(query: str, name: str) -> float:

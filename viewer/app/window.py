@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.app.display import find_display, import_glfw
-from viewer.app.files.files import Files
+from viewer.app.files.files import Files, open_files, stream_captures
 from viewer.app.layout import ShownPanels
 from viewer.app.weights.weights_panel import Weights
 
@@ -123,7 +123,8 @@ def show(
     if options.shading == "scalar":
         start_heat_map(state)
     opened = state.of(Files)
-    opened.recent = load_recent(problems.append)
+    opened.recent, opened.keeps_recent = load_recent(problems.append), True
+    opened.wake = glfw.post_empty_event
     state.of(ShownPanels).closed = load_closed_panels(problems.append)
     start_with(state, preferences)
     is_arranged = load_arranged(problems.append)
@@ -134,7 +135,7 @@ def show(
     state.of(Layout).is_arranged = is_arranged and shell.has_layout
     window = _Window(state, shell)
     try:
-        window.frame.stream(builders)
+        stream_captures(state, builders)
         window.run()
     finally:
         window.release()
@@ -162,7 +163,7 @@ class _Window:
         self.state, self.shell, self.handle = state, shell, shell.handle
         self._n_drawn = 0
         state.say(*shell.problems)
-        self.frame = Frame(state, Programs(shell.context), glfw.post_empty_event, keeps_recent=True)
+        self.frame = Frame(state, Programs(shell.context))
 
     def run(self) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
@@ -172,7 +173,7 @@ class _Window:
             happened = self._wait(rest.left > 0) | self._is_asked_to_close()
             rest.count(happened, self._awaits())
             if self.shell.dropped:
-                self.frame.open(self.shell.dropped)
+                open_files(self.state, self.shell.dropped)
                 self.shell.dropped = []
             if rest.left >= 0:
                 self._draw()

@@ -9,7 +9,7 @@ import pytest
 from app.tiny import SKEL, skin_text, write_rig
 
 import viewer.app.files.files
-from viewer.app.files.files import Files
+from viewer.app.files.files import Files, open_files
 from viewer.app.files.recent import load_recent, remember, state_folder
 from viewer.errors import RenderError
 from viewer.loading import load, read_files
@@ -18,7 +18,7 @@ from viewer.rendering.gpu.index_sets import curve_order
 
 
 def _open(hand, *paths):
-    hand.app.frame.open(list(paths))
+    open_files(hand.state, list(paths))
     hand.wait_for_loader()
 
 
@@ -162,7 +162,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
 
     monkeypatch.setattr(viewer.app.files.files, "read_files", slow)
     scene = hand.state.scene
-    hand.app.frame.open(list(rig))
+    open_files(hand.state, list(rig))
     loader = hand.state.of(Files).loader
     loader._started -= 5.0
     hand.step(3)
@@ -184,7 +184,7 @@ def test_escape_cancels_reading(hand, rig, monkeypatch):
         "read_files",
         lambda paths, **_: (gate.wait(10), read_files(paths))[1],
     )
-    hand.app.frame.open(list(rig))
+    open_files(hand.state, list(rig))
     loader = hand.state.of(Files).loader
     hand.key("escape")
     assert hand.state.of(Files).loader is None
@@ -206,7 +206,7 @@ def test_progress_of_opening_is_shown_and_cancelling_ends_the_reading(hand, rig,
             ended.set()
 
     monkeypatch.setattr(viewer.app.files.files, "read_files", slow)
-    hand.app.frame.open(list(rig))
+    open_files(hand.state, list(rig))
     loader = hand.state.of(Files).loader
     assert begun.wait(10)
     loader._started -= 5.0
@@ -250,7 +250,7 @@ def test_bundled_figure_opens_from_the_menu(hand):
 
 
 def test_opened_files_are_remembered_latest_first(hand, rig, tmp_path):
-    hand.app.frame.keeps_recent = True
+    hand.state.of(Files).keeps_recent = True
     _open(hand, rig[0])
     _open(hand, *rig)
     _open(hand, rig[0])
@@ -259,7 +259,7 @@ def test_opened_files_are_remembered_latest_first(hand, rig, tmp_path):
 
 
 def test_invalid_file_is_not_remembered(hand, tmp_path):
-    hand.app.frame.keeps_recent = True
+    hand.state.of(Files).keeps_recent = True
     _open(hand, tmp_path / "missing.skel")
     assert load_recent() == []
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
+from viewer.app.features import entries
 from viewer.app.layout import is_open
-from viewer.app.palette import Palette, entries
+from viewer.app.palette import Palette
 
 
 def opened(hand, text=""):

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rig.animated import animated_leg, animation, bow, channel, clip_of, leg, wave
 
 from viewer.app.core.undo_actions import redo, undo
-from viewer.app.palette import entries
+from viewer.app.features import entries
 from viewer.app.playback.animations import choose_animation, played
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError

@@ -23,6 +23,58 @@ from viewer.app.preferences.preferences import (
 from viewer.phrases import printable
 
 WIREFRAME = next(key.name for key in KEYS if key.label == "W")
+STORED = {  # names of actions in the preferences of version 0.2, by the usual key
+    "R": "posing.pose_actions.reset_pose",
+    "S": "view.display_actions.toggle_skeleton",
+    "K": "view.display_actions.toggle_binding",
+    "W": "view.display_actions.toggle_option wireframe Wireframe",
+    "N": "view.display_actions.toggle_option normals Vertex normals",
+    "T": "view.display_actions.toggle_option texture Texture",
+    "G": "view.display_actions.toggle_option grid Grid",
+    "A": "rigging.results.switch_version",
+    "B": "view.display_actions.toggle_option xray X-ray",
+    "J": "view.display_actions.toggle_option joint_names Joint names",
+    "Shift+J": "view.display_actions.toggle_option joint_axes Joint axes",
+    "V": "weights.actions.toggle_weights",
+    "F": "view.camera_actions.fit_view",
+    ".": "view.camera_actions.fit_selection",
+    "1": "view.camera_actions.look front",
+    "3": "view.camera_actions.look left",
+    "7": "view.camera_actions.look top",
+    "Ctrl+1": "view.camera_actions.look back",
+    "Ctrl+3": "view.camera_actions.look right",
+    "Ctrl+7": "view.camera_actions.look bottom",
+    "5": "view.camera_actions.toggle_projection",
+    "Tab": "window_actions.toggle_panels",
+    "H or ?": "window_actions.toggle_keys",
+    "Ctrl+P": "palette.palette_window.toggle_palette",
+    "Ctrl+M": "window_actions.toggle_messages",
+    "F12": "window_actions.want screenshot",
+    "Ctrl+O": "window_actions.want open dialog",
+    "Ctrl+,": "preferences.preferences_window.open_preferences",
+    "Ctrl+Z": "core.undo_actions.undo",
+    "Ctrl+Shift+Z": "core.undo_actions.redo",
+    "Q": "posing.tool_actions.choose_tool select",
+    "E": "posing.tool_actions.choose_tool rotate",
+    "D": "posing.tool_actions.choose_tool move",
+    "X": "posing.tool_actions.next_orientation",
+    "M": "posing.pose_actions.mirror",
+    "Ctrl+C": "posing.pose_actions.copy_pose",
+    "Ctrl+Shift+C": "posing.pose_actions.copy_numbers",
+    "Ctrl+V": "posing.pose_actions.paste_pose",
+    "Space": "playback.actions.play",
+    "Left": "playback.actions.step -1",
+    "Right": "playback.actions.step 1",
+    "Shift+Left": "playback.actions.step -10",
+    "Shift+Right": "playback.actions.step 10",
+    "Home": "playback.actions.go_to_end False",
+    "End": "playback.actions.go_to_end True",
+    "[": "playback.animations.step_animation -1",
+    "]": "playback.animations.step_animation 1",
+    "I": "playback.actions.range_in",
+    "O": "playback.actions.range_out",
+    "Ctrl+Q": "window_actions.want quit",
+}
 CHANGED = Preferences("light", 1.5, 18.0, False, "draft", 8, "z", {WIREFRAME: "Shift+P"})
 
 
@@ -43,6 +95,23 @@ def height(hand):
 
 def luminance():
     return sum(list(imgui.get_style().color_(imgui.Col_.window_bg))[:3]) / 3.0
+
+
+def test_names_stored_by_earlier_versions_are_known():
+    """A user's keys are stored by these names: a name that changed would lose them."""
+    chosen = {name: f"Ctrl+F{number}" for number, name in enumerate(STORED.values())}
+    preferences_file().parent.mkdir(parents=True, exist_ok=True)
+    said = []
+    for stored in (
+        chosen,
+        {key.name: chosen[STORED[key.label]] for key in KEYS if key.label in STORED},
+    ):
+        preferences_file().write_text(json.dumps({"keys": stored}))
+        keys = load_preferences(said.append).keys
+        assert [keys.get(key.name) for key in KEYS] == [
+            chosen.get(STORED.get(key.label)) for key in KEYS
+        ]
+    assert said == []
 
 
 def test_stored_preferences_are_restored():
@@ -145,7 +214,7 @@ def test_shortcut_in_use_is_reported_and_does_not_act_while_chosen(shown):
     shown.key("n")
     shown.step(2)
     assert not shown.state.options.normals
-    found = conflicts(load_preferences().keys)
+    found = conflicts(KEYS, load_preferences().keys)
     assert set(found) == {WIREFRAME, next(key.name for key in KEYS if key.label == "N")}
     shown.key("n")  # the first action in the list runs
     assert shown.state.options.wireframe and not shown.state.options.normals
@@ -161,7 +230,7 @@ def test_escape_first_cancels_the_choice_of_a_shortcut_and_then_closes_the_windo
 
 
 def test_default_shortcuts_have_no_conflicts_and_their_names_round_trip():
-    assert conflicts({}) == {}
+    assert conflicts(KEYS, {}) == {}
     for key in KEYS:
         for chord in key.chords:
             name = chord_name(chord)

@@ -15,7 +15,7 @@ from rig.retargeting.walking import RATE, walk
 
 from viewer.app.core.reasons import no_undo
 from viewer.app.core.undo_actions import undo
-from viewer.app.files.files import Files, Stream
+from viewer.app.files.files import Files, Stream, stream_captures
 from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit, plants_feet, toggle_feet
 from viewer.formats import Source, read
@@ -149,7 +149,7 @@ def test_captures_are_retargeted_to_the_end_in_the_background(drive, monkeypatch
     builder.place("y")
     builder.carry_to(target)
     hand = drive(scene=Scene(list(builder.actors)), size=(1000, 1000))
-    hand.app.frame.stream([builder])
+    stream_captures(hand.state, [builder])
     (actor,) = builder.actors
     hand.state.clock.pose(actor, again=True)
     actor.clip = with_rate(actor.clip, 12.0)  # as the timeline does

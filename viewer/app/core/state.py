@@ -79,8 +79,8 @@ class AppState:
     height)."""
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     """Last rectangle of each labelled widget: (x0, y0, x1, y1), which tests click."""
-    wants: set[str] = field(default_factory=set)
-    """Requests to the window, served after the frame: "screenshot", "quit", "open dialog"."""
+    wants_screenshot: bool = False
+    """Whether a picture of the scene is saved after the frame."""
     error: str = ""
     """Error message shown above everything else; empty if there is none."""
     messages: Messages = field(default_factory=Messages)
@@ -197,3 +197,22 @@ class AppState:
     def say_status(self, text: str) -> None:
         """Show the result of a key or button in place of the previous one."""
         self.messages.show(text, is_status=True)
+
+    def advance_job(self) -> bool:
+        """Perform the next step of the running job, and report how it ended.
+
+        Returns whether it failed in this frame.
+        """
+        job = self.job
+        if job is None:
+            return False
+        job.step()
+        if not job.is_done:
+            return False
+        self.job = None
+        # A cancelled export may have been finished all the same.
+        if job.is_cancelled and not job.output:
+            return False
+        self.say(*job.lines)
+        self.error = job.error or self.error
+        return bool(job.error)

@@ -175,13 +175,6 @@ def button(state: AppState, label: str, why: str = "") -> bool:
     return pressed and not why
 
 
-def offer_files(state: AppState, text: str) -> None:
-    """Draw the reason why a panel is empty, and a button that opens files to fill it."""
-    imgui.text_wrapped(text)
-    if button(state, "Open files…"):
-        state.wants.add("open dialog")
-
-
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
     """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must then follow."""
     opened = imgui.begin_menu(text, enabled)

@@ -13,7 +13,6 @@ from viewer.app.core.widgets import (
     choice,
     explain,
     note_item,
-    offer_files,
     plain_zero,
     same_line_if_room,
 )
@@ -40,6 +39,7 @@ from viewer.app.curves.editing import (
     place_key,
 )
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
+from viewer.app.files.files import offer_files
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
 from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel

@@ -44,9 +44,7 @@ def draw_file_dialog(state: AppState) -> None:
         imgui.end_popup()
     if result or not stays:
         files.dialog = None
-    if result and dialog.done is None:
-        files.wants_open = result
-    elif result and dialog.done is not None:
+    if result and dialog.done is not None:
         dialog.done(state, result)
 
 

@@ -1,4 +1,4 @@
-"""Opening of files: the open dialog, the thread that reads files, and captures read while shown."""
+"""Opening of files: the thread that reads them, their scene, and captures read while shown."""
 
 from __future__ import annotations
 
@@ -9,23 +9,43 @@ from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 
+from imgui_bundle import imgui
+
+from viewer.app.core.edited_animations import Animations, keep_edited
 from viewer.app.core.jobs import unexpected
-from viewer.app.files.file_choice import FileDialog
+from viewer.app.core.saved_work import SavedPose, SavedWork
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import button
+from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of
+from viewer.app.files.recent import remember
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.errors import ViewerError
-from viewer.loading import Contents, MotionSettings, begin, read_files
+from viewer.errors import RenderError, ViewerError
+from viewer.formats import FORMATS
+from viewer.loading import (
+    Contents,
+    MotionSettings,
+    begin,
+    bundled_body,
+    bundled_files,
+    read_files,
+)
+from viewer.loading.additions import add_to_actor
 from viewer.loading.capturing import Builder
+from viewer.phrases import printable
 from viewer.progress import Cancelled, receiving
 from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
+from viewer.rig.pose import pose_key
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor, Scene
 
 _Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
+_ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
+"""Suffixes of poses and textures, which are applied to the open figure."""
 _WAITING = 4  # maximum number of parts in the queue: limits memory
 
 
@@ -35,8 +55,6 @@ class Files:
 
     dialog: FileDialog | None = None
     """File dialog that is open."""
-    wants_open: list[Path] = field(default_factory=list)
-    """Files to open after the frame."""
     loader: Loader | None = None
     """Loader of files that are being opened."""
     stream: Stream | None = None
@@ -49,6 +67,12 @@ class Files:
     """Body models that were found, by name; searched for when the menu opens."""
     model_folder: Path | None = None
     """Folder of body models; read when the window "Preferences" opens."""
+    up: str = ""
+    """Up axis of captures and BVH files that are opened; empty to detect it."""
+    wake: Callable[[], None] = lambda: None
+    """Called from other threads when a frame must be drawn."""
+    keeps_recent: bool = False
+    """Whether opened files are stored in the list of recent files."""
 
 
 class Loader:
@@ -294,3 +318,137 @@ def keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
         for actor in new:
             if isinstance(actor.clip, SampledClip | PointClip):
                 actor.clip = with_rate(actor.clip, frame_rate(first.clip))
+
+
+def ask_for_files(state: AppState) -> None:
+    """Open the dialog that opens files."""
+    state.of(Files).dialog = FileDialog(folder_of(state.paths), open_files)
+
+
+def offer_files(state: AppState, text: str) -> None:
+    """Draw the reason why a panel is empty, and a button that opens files to fill it."""
+    imgui.text_wrapped(text)
+    if button(state, "Open files…"):
+        ask_for_files(state)
+
+
+def open_bundled_figure(state: AppState) -> None:
+    """Open the bundled figure."""
+    open_files(state, bundled_files())
+
+
+def open_bundled_body(state: AppState) -> None:
+    """Open the bundled body."""
+    open_files(state, [bundled_body()])
+
+
+def open_files(state: AppState, paths: Sequence[Path]) -> None:
+    """Begin to read files; the current scene is shown until they have been read.
+
+    A skin opened while the scene is a lone skeleton, or the reverse, is attached if it matches.
+    """
+    files = state.of(Files)
+    attempts = [[*paths]]
+    figures = [actor.figure for actor in state.scene.actors]
+    is_part = len(figures) == 1 and (figures[0].mesh is None or figures[0].skeleton is None)
+    suffixes = {path.suffix.lower() for path in (*paths, *state.paths)}
+    is_part &= len(paths) == 1 and len(state.paths) == 1 and len(suffixes) == 2
+    if is_part and paths[0].suffix.lower() not in _ADDED:
+        attempts.insert(0, [*state.paths, *paths])
+    opened = state.paths or bundled_files()
+    rig, files.rig = files.rig, ""
+    settings = MotionSettings(up=files.up, rig=rig, springs=True)
+    files.loader = Loader(paths, attempts, files.wake, settings, opened)
+
+
+def take_loaded(
+    state: AppState, may_replace: Callable[[AppState], bool], prepare: Callable[[Scene], None]
+) -> bool:
+    """Show the files that were read, or the error; return whether they have replaced the scene.
+
+    Parameters
+    ----------
+    state : AppState
+        State that shows them.
+    may_replace : callable
+        Returns whether nothing would be lost; until then, they wait.
+    prepare : callable
+        Uploads a scene, and raises RenderError if that is impossible.
+    """
+    files = state.of(Files)
+    loader = files.loader
+    if loader is None or not loader.is_done:
+        return False
+    if loader.scene is not None and not may_replace(state):
+        return False
+    files.loader = None
+    if loader.addition is not None:
+        _add(state, loader.addition)
+    elif loader.scene is None:
+        state.error = loader.error
+    else:
+        try:
+            prepare(loader.scene)
+        except RenderError as problem:
+            state.error = str(problem)
+            return False
+        if files.stream is not None:
+            files.stream.cancel()
+        state.show_scene(loader.scene, loader.paths)
+        stream_captures(state, loader.builders)
+        if files.keeps_recent:
+            state.say(*filter(None, [remember(files.recent, loader.paths)]))
+        return True
+    return False
+
+
+def _add(state: AppState, contents: Contents) -> None:
+    """Apply poses and textures to the chosen actor."""
+    saved = state.of(SavedWork)
+    state.history.observe(state.scene, state.options, busy=False)
+    try:
+        actor, notes = add_to_actor(contents, state.actor)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    if actor is not state.actor:
+        keep_edited(state.of(Animations), state.actor, actor)
+        state.history.exchange_actor(state.actor, actor)
+        saved.exchange_actor(state.actor, actor)
+        state.scene.actors[state.chosen_actor] = actor
+    if contents.poses and actor.pose is not None:
+        saved.add(SavedPose(actor, pose_key(actor.pose)))
+    state.scene.files += contents.files
+    added = [*contents.poses, *contents.pictures]
+    state.say(*contents.diagnostics, *notes)
+    state.say_status(f"Applied {', '.join(printable(path.name, 60) for path, _ in added)}")
+
+
+def stream_captures(state: AppState, builders: Sequence[Builder]) -> None:
+    """Begin to read the remaining parts of captures."""
+    files, left = state.of(Files), [builder for builder in builders if not builder.is_done]
+    files.stream = Stream(left, files.wake) if left else None
+
+
+def take_streamed(state: AppState) -> None:
+    """Add the people and longer clips read from captures since the last frame."""
+    files = state.of(Files)
+    stream = files.stream
+    if stream is None:
+        return
+    try:
+        new, notes, grew = stream.take()
+    except ViewerError as problem:
+        state.error, files.stream = str(problem), None
+        stream.cancel()
+        return
+    if grew:
+        state.scene.actors += new
+        state.of(SavedWork).add_actors(new)
+        state.clock.pose(state.actor, again=True)
+        state.history.add_actors(state.scene, state.options)
+        state.history.follow(state.clock.time)
+    state.say(*notes)
+    if stream.is_done:
+        files.stream = None
+        state.error = stream.error or state.error

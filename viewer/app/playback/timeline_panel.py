@@ -19,12 +19,11 @@ from viewer.app.core.widgets import (
     explain,
     key_name,
     note_item,
-    offer_files,
     same_line_if_room,
     slider,
     with_key,
 )
-from viewer.app.files.files import Files
+from viewer.app.files.files import Files, offer_files
 from viewer.app.playback.animations import animation_texts, choose_animation, played
 from viewer.app.playback.tracks import draw_tracks
 from viewer.rig.captures.points import PointClip

@@ -9,7 +9,8 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, note_item, offer_files, plain_zero, same_line_if_room
+from viewer.app.core.widgets import button, note_item, plain_zero, same_line_if_room
+from viewer.app.files.files import offer_files
 from viewer.app.posing.posing import Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

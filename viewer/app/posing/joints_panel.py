@@ -18,13 +18,13 @@ from viewer.app.core.widgets import (
     explain,
     menu_item,
     note_item,
-    offer_files,
     plain_zero,
     same_line_if_room,
     show_tooltip,
     with_key,
 )
 from viewer.app.curves.editing import Curves
+from viewer.app.files.files import offer_files
 from viewer.app.posing.joint_fields import (
     draw_own_numbers,
     draw_scale,

@@ -13,11 +13,11 @@ from viewer.app.core.widgets import (
     button,
     checkbox,
     note_item,
-    offer_files,
     plain_zero,
     same_line_if_room,
     show_tooltip,
 )
+from viewer.app.files.files import offer_files
 from viewer.app.posing.posing import Posing, pause_for_edit, random_shape, reset_shape
 from viewer.errors import ViewerError
 from viewer.phrases import counted, printable

@@ -8,13 +8,15 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 
 from imgui_bundle import imgui
 
+from viewer.app.core.actions import Shortcut
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import change_scale, set_theme
 from viewer.app.core.widgets import KeyNames
-from viewer.app.features import KEYS
+from viewer.app.files.files import Files
 from viewer.app.preferences.key_map import label_of
 from viewer.app.preferences.preferences import Appearance, Preferences, save_preferences
 
@@ -30,7 +32,7 @@ def start_with(state: AppState, preferences: Preferences) -> None:
     ``state``: state whose preferences and angle unit are set.
     """
     state.put(preferences)
-    state.in_degrees = preferences.in_degrees
+    state.in_degrees, state.of(Files).up = preferences.in_degrees, preferences.up
 
 
 def change(state: AppState, preferences: Preferences) -> None:
@@ -39,6 +41,7 @@ def change(state: AppState, preferences: Preferences) -> None:
     if preferences == before:
         return
     state.put(preferences)
+    state.of(Files).up = preferences.up
     if preferences.in_degrees != before.in_degrees:
         state.in_degrees = preferences.in_degrees
     if preferences.quality != before.quality:
@@ -67,7 +70,7 @@ def chosen_theme(preferences: Preferences, appearance: Appearance) -> str:
     return preferences.theme
 
 
-def follow_preferences(state: AppState) -> None:
+def follow_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
     """Apply the preferences that differ from the applied ones; called in every frame."""
     preferences, applied = state.of(Preferences), state.of(Appearance)
     theme = chosen_theme(preferences, applied)
@@ -84,7 +87,7 @@ def follow_preferences(state: AppState) -> None:
         applied.font_size = preferences.font_size
     if preferences.keys != applied.keys:
         applied.keys = dict(preferences.keys)
-        names = {key.label: label_of(key, preferences.keys) for key in KEYS}
+        names = {key.label: label_of(key, preferences.keys) for key in shortcuts}
         state.of(KeyNames).changed = {usual: name for usual, name in names.items() if name != usual}
 
 

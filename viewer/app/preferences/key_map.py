@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from imgui_bundle import imgui
 
-from viewer.app.features import KEYS, Shortcut
+from viewer.app.core.actions import Shortcut
 
 FIXED = ("Esc",)
 """Labels of keys that cannot be changed."""
@@ -71,14 +71,14 @@ def label_of(shortcut: Shortcut, keys: Mapping[str, str]) -> str:
     return chosen if parse_chord(chosen) else shortcut.label
 
 
-def conflicts(keys: Mapping[str, str]) -> dict[str, str]:
+def conflicts(table: Sequence[Shortcut], keys: Mapping[str, str]) -> dict[str, str]:
     """Return the actions whose key also runs another action.
 
     ``keys``: changed keys, as in ``Preferences.keys``. Returns maps the name of an action to the
     text of another action with the same key.
     """
     users: dict[int, list[Shortcut]] = {}
-    for shortcut in KEYS:
+    for shortcut in table:
         for chord in chords_of(shortcut, keys):
             users.setdefault(chord, []).append(shortcut)
     found = {}

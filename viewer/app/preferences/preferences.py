@@ -75,6 +75,11 @@ class Appearance:
 
 
 Value = TypeVar("Value", str, float, int, bool)
+_RENAMED = {
+    "want screenshot": "want_screenshot",
+    "want open dialog": "ask_for_files",
+    "want quit": "request_quit",
+}
 
 
 def preferences_file() -> Path:
@@ -99,7 +104,21 @@ def _entries(data: bytes) -> dict[str, Any]:
     found = as_json(data)
     if not isinstance(found, dict):
         raise ValueError("expected an object")
+    keys = found.get("keys")
+    if isinstance(keys, dict):
+        found["keys"] = {_present_name(name): key for name, key in keys.items()}
     return found
+
+
+def _present_name(stored: str) -> str:
+    """Return the name of an action; up to version 0.2, its module stood before it.
+
+    >>> _present_name("view.camera_actions.look front"), _present_name("window_actions.want quit")
+    ('look front', 'request_quit')
+    """
+    function, space, arguments = stored.partition(" ")
+    name = function.rpartition(".")[2] + space + arguments
+    return _RENAMED.get(name, name)
 
 
 def _valid(found: dict[str, Any]) -> Preferences:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from imgui_bundle import imgui
 
+from viewer.app.core.actions import Shortcut
 from viewer.app.core.fields import begin_field, slider_float
 from viewer.app.core.state import AppState
 from viewer.app.core.theme import WARNING, ink
@@ -18,7 +20,6 @@ from viewer.app.core.widgets import (
     note_item,
     same_line_if_room,
 )
-from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files
 from viewer.app.files.model_menu import set_model_folder
@@ -50,7 +51,7 @@ def open_preferences(state: AppState) -> None:
     state.of(Files).model_folder = load_model_folder()
 
 
-def draw_preferences(state: AppState) -> None:
+def draw_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
     """Draw the window if it is open."""
     appearance = state.of(Appearance)
     if not appearance.is_open:
@@ -65,7 +66,7 @@ def draw_preferences(state: AppState) -> None:
         imgui.separator_text("Files")
         _draw_files(state, preferences)
         imgui.separator_text("Keys")
-        _draw_keys(state, preferences)
+        _draw_keys(state, preferences, shortcuts)
         why = "" if preferences != Preferences() else "all preferences have their default values"
         if button(state, "Reset all###reset preferences", why):
             preferences = Preferences()
@@ -136,15 +137,15 @@ def _draw_files(state: AppState, preferences: Preferences) -> None:
     imgui.text_disabled("none" if folder is None else printable(folder, 60))
 
 
-def _draw_keys(state: AppState, preferences: Preferences) -> None:
+def _draw_keys(state: AppState, preferences: Preferences, shortcuts: Sequence[Shortcut]) -> None:
     """Draw the list of keys; a click on a key waits for its replacement."""
     height = _LISTED * imgui.get_text_line_height_with_spacing()
-    found = conflicts(preferences.keys)
+    found = conflicts(shortcuts, preferences.keys)
     # Leaves room for the button below and a line about conflicts.
     below = (1 + bool(found)) * imgui.get_frame_height_with_spacing()
     room = imgui.get_content_region_avail().y - below
     if imgui.begin_child("##key map", (0.0, max(min(height, room), 0.2 * height))):
-        for shortcut in KEYS:
+        for shortcut in shortcuts:
             _draw_key(state, preferences, shortcut, found.get(shortcut.name, ""))
     imgui.end_child()
     if found:

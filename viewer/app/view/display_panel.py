@@ -19,7 +19,6 @@ from viewer.app.core.widgets import (
     slider,
     with_key,
 )
-from viewer.app.features import key_of
 from viewer.app.view.axis_gizmo import AxisGizmo
 from viewer.app.view.camera_panel import (
     fit_selection,
@@ -75,7 +74,14 @@ _SURFACE_TOGGLES = {
     "normals": ("Vertex normals", "N"),
     "texture": ("Texture", "T"),
 }
-_ACTIONS = "view.camera_actions"
+_VIEW_KEYS = {
+    "front": "1",
+    "back": "Ctrl+1",
+    "left": "3",
+    "right": "Ctrl+3",
+    "top": "7",
+    "bottom": "Ctrl+7",
+}
 
 
 def draw(state: AppState) -> None:
@@ -308,12 +314,12 @@ def draw_view_menu(state: AppState) -> None:
 def draw_views(state: AppState) -> None:
     """Draw the items of named views, fitting and projection."""
     for name in VIEWS:
-        if menu_item(state, f"{name.capitalize()} view", key_of(f"{_ACTIONS}.look", name)):
+        if menu_item(state, f"{name.capitalize()} view", _VIEW_KEYS[name]):
             fly_to(state, name)
     imgui.separator()
-    if menu_item(state, "Fit all", key_of(f"{_ACTIONS}.fit_view")):
+    if menu_item(state, "Fit all", "F"):
         fit_view(state)
-    if menu_item(state, "Fit selection", key_of(f"{_ACTIONS}.fit_selection")):
+    if menu_item(state, "Fit selection", "."):
         fit_selection(state)
     if menu_item(state, "Orthographic view", "5", state.camera.orthographic):
         toggle_projection(state)

@@ -11,9 +11,9 @@ from viewer.app.core.widgets import (
     disabled,
     explain,
     note_item,
-    offer_files,
     slider,
 )
+from viewer.app.files.files import offer_files
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import strongest
 from viewer.rig.skinning import METHODS, Skinning
