@@ -287,3 +287,20 @@ def test_filter_without_a_match_shows_a_message_and_no_row(hand):
     hand.type("xyz")
     hand.step(2)
     assert not [label for label in hand.state.item_rects if label.startswith("joint ")]
+
+
+def test_drawing_changes_no_pose(hand):
+    """A pose beyond its limits, as files of other programs have them, stays as it is."""
+    pose = hand.state.actor.pose
+    pose.dofs[:] = 7.0 + np.arange(len(pose.dofs))
+    before = [
+        getattr(pose, name).copy() for name in ("dofs", "translations", "rotations", "scales")
+    ]
+    hand.step(3)
+    found = [getattr(pose, name) for name in ("dofs", "translations", "rotations", "scales")]
+    assert all((a == b).all() for a, b in zip(before, found, strict=True))
+    assert hand.undo_steps == 1  # the change above
+    hand.drag("arm.y", 0.5)
+    assert (
+        abs(hand.dof("arm.y")) < 0.2 and hand.dof("root.x") == before[0][hand.dof_index("root.x")]
+    )

@@ -51,6 +51,14 @@ def test_slider_covers_five_standard_deviations(shape):
         assert _weights(shape)[1] == 0.0
 
 
+def test_drawing_changes_no_weights_and_sliders_add_missing_ones(shape):
+    shape.state.actor.pose.shape_weights = np.zeros(0)
+    shape.step(3)
+    assert len(_weights(shape)) == 0
+    _drag(shape, 1, 1.0)
+    assert _weights(shape).tolist() == pytest.approx([0.0, 5.0], abs=0.1)
+
+
 def test_joints_follow_the_shape(shape):
     # The middles of the sides are 0.25 m from the centre, and 20 % more per sigma of the girth.
     assert_allclose(rest_joints(_rest(shape))[:, 0], [0, 0.25, -0.25], atol=1e-12)

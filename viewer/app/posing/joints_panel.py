@@ -247,7 +247,8 @@ def _draw_dof(
         draw_vector_component(state, figure, pose, joint, kind - FIRST_ROTATION, label)
         return
     imgui.begin_disabled(bool(locked))
-    value = _dof_slider(state, skeleton, pose, dof)
+    now = float(pose.dofs[dof])
+    value = _dof_slider(state, skeleton, now, dof)
     if imgui.is_item_activated():
         pause_for_edit(state)
     imgui.end_disabled()
@@ -265,13 +266,14 @@ def _draw_dof(
             value = 0.0
         if menu_item(state, "Copy value"):
             is_angle = state.in_degrees and kind >= FIRST_ROTATION
-            shown = math.degrees(pose.dofs[dof]) if is_angle else float(pose.dofs[dof])
+            shown = math.degrees(now) if is_angle else now
             imgui.set_clipboard_text(repr(shown + 0.0))
         imgui.end_popup()
-    pose.dofs[dof] = min(max(value, low), high)
+    if value != now:  # drawing alone keeps a value beyond its limits
+        pose.dofs[dof] = min(max(value, low), high)
 
 
-def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> float:
+def _dof_slider(state: AppState, skeleton: Skeleton, now: float, dof: int) -> float:
     """Draw the slider in the displayed unit and return the value in radians or lengths."""
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
     is_rotation = skeleton.dof_kinds[dof] >= FIRST_ROTATION
@@ -284,14 +286,14 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
     changed, moved = slider_float(
         state,
         f"##dof{dof}",
-        plain_zero(float(pose.dofs[dof]) * factor, text),
+        plain_zero(now * factor, text),
         (low if math.isfinite(low) else min(-unlimited, high - unlimited)) * factor,
         (high if math.isfinite(high) else max(unlimited, low + unlimited)) * factor,
         text,
         _STAYS_WITHIN if bounded else _MAY_TYPE_BEYOND,
     )
     # The widget's float32 must not change a value that was not moved; "nan" can be typed.
-    return moved / factor if changed and math.isfinite(moved) else float(pose.dofs[dof])
+    return moved / factor if changed and math.isfinite(moved) else now
 
 
 def _reach(state: AppState) -> float:

@@ -21,6 +21,7 @@ from viewer.app.files.files import offer_files
 from viewer.app.posing.posing import Posing, pause_for_edit, random_shape, reset_shape
 from viewer.errors import ViewerError
 from viewer.phrases import counted, printable
+from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
@@ -108,9 +109,8 @@ def _measures(rest: Figure) -> tuple[tuple[str, str], ...]:
 def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     shapes = figure.blend_shapes
     assert shapes is not None  # checked by the caller
-    if len(pose.shape_weights) < shapes.n_shapes:
-        padding = np.zeros(shapes.n_shapes - len(pose.shape_weights))
-        pose.shape_weights = np.concatenate([pose.shape_weights, padding])
+    weights = np.zeros(max(shapes.n_shapes, len(pose.shape_weights)))
+    weights[: len(pose.shape_weights)] = pose.shape_weights
     rows = _rows(shapes, state.of(Posing).shape_filter if shapes.n_shapes > _SEARCHED else "")
     longest = imgui.calc_text_size(printable(max(shapes.names, key=len), 40)).x
     column = min(longest, _LABELS * imgui.get_content_region_avail().x)
@@ -122,7 +122,8 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
                 imgui.align_text_to_frame_padding()
                 imgui.text_disabled(row)
             else:
-                _draw_slider(state, shapes.names[row], row, pose, column)
+                if _draw_slider(state, shapes.names[row], row, weights, column):
+                    pose.shape_weights = weights
     clipper.end()
 
 
@@ -143,7 +144,8 @@ def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
     return rows
 
 
-def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: float) -> None:
+def _draw_slider(state: AppState, name: str, index: int, weights: Floats, column: float) -> bool:
+    """Draw the slider of one of the weights, and return whether it has changed."""
     shapes, shown = state.actor.figure.blend_shapes, printable(name, 40)
     assert shapes is not None  # checked by the caller
     low, high, unit = _slider_range(shapes, index)
@@ -151,7 +153,7 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
     changed, value = slider_float(
         state,
         begin_field(f"{shown}##{index}", column=column),
-        plain_zero(float(pose.shape_weights[index]) + origin, "%.2f"),
+        plain_zero(float(weights[index]) + origin, "%.2f"),
         low,
         high,
         "%.2f",
@@ -159,14 +161,16 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
     note_item(state, f"coefficient {index}")
     if imgui.is_item_activated() and isinstance(state.actor.clip, TransformClip):
         pause_for_edit(state)
-    if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
-        pose.shape_weights[index] = value - origin
+    changed = changed and abs(value) < 1e6  # "nan" and "1e99" can be typed into a slider
+    if changed:
+        weights[index] = value - origin
     if unit == _SIGMA:
         _draw_marks()
     if imgui.is_item_hovered():
         show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-            pose.shape_weights[index] = state.actor.figure.rest_shape_weights[index]
+            weights[index], changed = state.actor.figure.rest_shape_weights[index], True
+    return changed
 
 
 def _slider_range(shapes: BlendShapes, index: int) -> tuple[float, float, str]:
