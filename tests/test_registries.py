@@ -61,8 +61,8 @@ def test_formats_can_read_and_write_as_declared() -> None:
 def test_exporters_write_what_they_declare() -> None:
     for name, kind in EXPORTERS.items():
         module = import_module(f"viewer.export.{name}")
-        assert hasattr(module, "export") == kind.writes_pose
-        assert hasattr(module, "export_animation") == kind.writes_motion
+        assert callable(module.export) and kind.stores
+        assert hasattr(module, "require") == bool(kind.joints)
 
 
 def test_panel_table_lists_the_panels_of_all_features() -> None:

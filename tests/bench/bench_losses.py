@@ -7,10 +7,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+from exporting import export_frames
 from measure import interleaved, report
 
 import viewer
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.loading import bundled_body
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animation
@@ -44,11 +45,11 @@ def main(rounds: int = 7) -> None:
             path = Path(folder) / name
 
             def export(key: str = key, path: Path = path) -> None:
-                export_animation(animation, path, key, MotionOptions())
+                export_frames(animation, path, key, ExportOptions())
 
             def alone(key: str = key, path: Path = path, lost: str = lost) -> None:
                 with patch(f"viewer.export.{key}.{lost}", lambda *_: []):
-                    export_animation(animation, path, key, MotionOptions())
+                    export_frames(animation, path, key, ExportOptions())
 
             times = interleaved({"compared": export, "not compared": alone}, rounds)
             shown = f"{key}: {FRAMES} frames of {animation.figure.name}"

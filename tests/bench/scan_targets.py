@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 import transfer_targets as made
+from exporting import export_frames
 
 import viewer
-from viewer.export import MotionOptions, export, export_animation
+from viewer.export import ExportOptions, export
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.motion.sampled_animation import sample_animation
@@ -285,7 +286,7 @@ def main() -> None:
     for what, figure in (("body", made.body()), ("fox", made.fox())):
         actor = Actor(figure, viewer.rest_pose(figure.skeleton), clip=walk(figure, what))
         path = folder / f"walk_{what}.bvh"
-        lines = export_animation(sample_animation(actor), path, "bvh", MotionOptions())
+        lines = export_frames(sample_animation(actor), path, "bvh", ExportOptions())
         print("\n".join(lines))
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import faults
 import numpy as np
+from exporting import export_frames
 from plain_bvh import PlainBvh
 
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.rig.figure import Figure
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.evaluation import world_frames
@@ -55,7 +56,7 @@ def chain(count: int = 3) -> Skeleton:
 
 def write(animation: SampledAnimation, folder: Path, **options) -> tuple[PlainBvh, list[str]]:
     path = folder / "out.bvh"
-    notes = faults.lines(export_animation(animation, path, "bvh", MotionOptions(**options)))
+    notes = faults.lines(export_frames(animation, path, "bvh", ExportOptions(**options)))
     return PlainBvh(path), [note.replace(str(path), "PATH") for note in notes]
 
 

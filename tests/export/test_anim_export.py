@@ -9,12 +9,13 @@ from pathlib import Path
 import faults
 import numpy as np
 import pytest
+from exporting import export_frames
 from numpy.testing import assert_allclose, assert_array_equal
 from rig import hand_made
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, export_animation, motion_exporters
+from viewer.export import ExportOptions, exporters_of
 from viewer.formats import Source, read
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip, evaluate_all
@@ -65,7 +66,7 @@ def written(actor, path, **settings):
     animation = sample_animation(
         actor, **{key: settings.pop(key) for key in ("rate", "frames") if key in settings}
     )
-    notes = faults.lines(export_animation(animation, path, "anim", MotionOptions(**settings)))
+    notes = faults.lines(export_frames(animation, path, "anim", ExportOptions(**settings)))
     return read(Source.open(path)) if path.exists() else None, notes
 
 
@@ -214,7 +215,7 @@ def test_figures_without_dofs_are_refused(tmp_path):
 
 
 def test_empty_motions_and_unknown_options_are_refused(tmp_path):
-    with pytest.raises(RigError, match="every frame is missing"):
+    with pytest.raises(RigError, match="no person is present in frame"):
         written(Actor(rig(), clip=turning([0.0], rows=[-1, -1])), tmp_path / "a.anim")
     with pytest.raises(RigError, match='expected one of hold, interpolate, split, found "jump"'):
         written(Actor(rig(), clip=keyed()), tmp_path / "a.anim", gaps="jump")
@@ -229,7 +230,7 @@ def test_failed_export_leaves_no_file(tmp_path):
 
 
 def test_exporter_is_found_by_its_suffix():
-    assert motion_exporters("walk.anim") == ["anim"]
+    assert exporters_of("walk.anim", "frames") == ["anim"]
 
 
 def test_written_clip_reproduces_the_poses_of_the_frames(tmp_path):

@@ -7,13 +7,14 @@ import faults
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
+from exporting import export_frames, export_people
 from family_animations import family_animation, family_motion, vertices_about_origin, waves
 from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, easymocap, export_animation, motion_exporters
+from viewer.export import ExportOptions, easymocap, exporters_of
 from viewer.formats import Source, read
 from viewer.rig.motion.body_motion import body_clip
 from viewer.rig.motion.sampled_clip import joined
@@ -42,7 +43,7 @@ def frames_in(folder):
 
 
 def written(animation, path, **options):
-    notes = faults.lines(export_animation(animation, path, "easymocap", MotionOptions(**options)))
+    notes = faults.lines(export_frames(animation, path, "easymocap", ExportOptions(**options)))
     return frames_in(path), notes
 
 
@@ -58,7 +59,7 @@ def clip_of(path, figure, person=0):
 
 
 def test_folder_finds_the_exporter():
-    assert motion_exporters("out/") == ["easymocap"]
+    assert exporters_of("out/", "frames") == ["easymocap"]
 
 
 @pytest.mark.parametrize("kind", COUNTS)
@@ -105,7 +106,7 @@ def test_motion_round_trips_through_amass(family, tmp_path, kind):
     figure, motion = family(kind), family_motion(COUNTS[kind])
     written(family_animation(figure, motion), tmp_path / "a")
     there = animation_of_clip(figure, clip_of(tmp_path / "a", figure))
-    export_animation(there, tmp_path / "a.npz", "amass", MotionOptions(world_up="z"))
+    export_frames(there, tmp_path / "a.npz", "amass", ExportOptions(world_up="z"))
     back = read(Source.open(tmp_path / "a.npz"))
     again = animation_of_clip(figure, body_clip(back, figure)[0])
     frames, _ = written(again, tmp_path / "b")
@@ -130,9 +131,7 @@ def test_recording_round_trips(shared_data, tmp_path):
         animation_of_clip(figure, clip_of(folder / "easymocap", figure, person))
         for person in (0, 1)
     ]
-    notes = faults.lines(
-        easymocap.export_animations(animations, tmp_path / "out", MotionOptions(world_up="z"))
-    )
+    notes = faults.lines(export_people(animations, tmp_path / "out", ExportOptions(world_up="z")))
     assert notes[0].startswith(f"{tmp_path}/out/smpl: 30 frames of 2 people, z up")
     found = frames_in(tmp_path / "out")
     wanted = frames_in(folder / "easymocap")
@@ -151,9 +150,7 @@ def test_people_and_gaps_are_written_to_common_files(family, tmp_path):
     second = family_animation(
         figure, family_motion(24, first_frame=9, shape=waves(1, 10, seed=9.0))
     )
-    notes = faults.lines(
-        easymocap.export_animations([first, second], tmp_path, MotionOptions(), [7, 3])
-    )
+    notes = faults.lines(export_people([first, second], tmp_path, ExportOptions(), [7, 3]))
     frames = frames_in(tmp_path)
     assert {frame: [record["id"] for record in people] for frame, people in frames.items()} == {
         5: [7], 6: [], 7: [7], 8: [], 9: [3], 10: [3], 11: [3], 12: [3],
@@ -252,7 +249,7 @@ def test_people_must_be_compatible(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     other = replace(animation, frame_rate=25.0)
     for animations, persons, message in (
-        ([], [], "expected at least one person to write, found none"),
+        ([], [], "expected at least one actor to write, found none"),
         ([animation, animation], [1, 1], "expected a number for each of 2 people, found [1, 1]"),
         ([animation, other], None, "expected one frame rate for all people, found 25, 50"),
         (
@@ -262,11 +259,11 @@ def test_people_must_be_compatible(family, tmp_path):
         ),
     ):
         with pytest.raises(RigError) as caught:
-            easymocap.export_animations(animations, tmp_path / "out", MotionOptions(), persons)
+            export_people(animations, tmp_path / "out", ExportOptions(), persons)
         assert str(caught.value).replace(f"{animation.name}:", "walk:") == message
     nobody = replace(animation, frames=replace(animation.frames, present=np.zeros(4, dtype=bool)))
-    with pytest.raises(RigError, match=r"every frame is missing, so there is nothing to write$"):
-        easymocap.export_animations([nobody], tmp_path / "out", MotionOptions())
+    with pytest.raises(RigError, match="no person is present in frame"):
+        export_people([nobody], tmp_path / "out", ExportOptions())
     assert not list(tmp_path.iterdir())
 
 

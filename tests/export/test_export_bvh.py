@@ -19,12 +19,13 @@ from export.bvh_animations import (
     rig_animation,
     write,
 )
+from exporting import export_frames
 from family_models import family_figure
 from plain_bvh import PlainBvh
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import MotionOptions, export_animation, motion_exporters
+from viewer.export import ExportOptions, exporters_of
 from viewer.export._options import ROTATION_ORDERS
 from viewer.formats import Source, bvh
 from viewer.loading import bundled_body
@@ -47,7 +48,7 @@ def body(tmp_path_factory) -> Figure:
 
 
 def test_bvh_is_registered() -> None:
-    assert motion_exporters("walk.bvh") == ["bvh"]
+    assert exporters_of("walk.bvh", "frames") == ["bvh"]
 
 
 def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -> None:
@@ -238,7 +239,7 @@ def test_gaps_are_interpolated_on_the_shorter_arc(tmp_path: Path) -> None:
 def test_gaps_split_into_files(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body, 5, GAPS)
     notes = faults.lines(
-        export_animation(animation, tmp_path / "out.bvh", "bvh", MotionOptions(gaps="split"))
+        export_frames(animation, tmp_path / "out.bvh", "bvh", ExportOptions(gaps="split"))
     )
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"out-{i}.bvh" for i in (1, 2, 3)]
     wanted = joints_of(animation) * 100
@@ -256,8 +257,8 @@ def test_failure_of_one_file_removes_all_files(body: Figure, tmp_path: Path) -> 
     (tmp_path / "out-1.bvh").write_text("old")
     (tmp_path / "out-3.bvh").mkdir()
     with pytest.raises(OutputError):
-        export_animation(
-            body_animation(body, 5, GAPS), tmp_path / "out.bvh", "bvh", MotionOptions(gaps="split")
+        export_frames(
+            body_animation(body, 5, GAPS), tmp_path / "out.bvh", "bvh", ExportOptions(gaps="split")
         )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out-1.bvh", "out-3.bvh"]
     assert (tmp_path / "out-1.bvh").read_text() == "old"
@@ -357,7 +358,7 @@ def test_unknown_options_are_refused(options: dict, message: str, tmp_path: Path
 def test_absent_or_non_finite_motion_is_refused(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     none = replace(animation, frames=replace(animation.frames, present=np.zeros(12, dtype=bool)))
-    with pytest.raises(RigError, match="every frame is missing, so there is nothing to write"):
+    with pytest.raises(RigError, match="no person is present in frame"):
         write(none, tmp_path)
     wild = animation.frames.figure_translations.copy()
     wild[3, 0] = np.inf

@@ -5,6 +5,7 @@ import zipfile
 import faults
 import numpy as np
 import pytest
+from exporting import export_frames
 from formats.pig_text import write as write_pig
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
@@ -13,8 +14,7 @@ from seamed import POSITIONS, TRIANGLES, UV_TRIANGLES, UVS, seamed_actor, seamed
 
 import viewer
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export, export_animation
-from viewer.export.npz import export_points
+from viewer.export import ExportOptions, export
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.figure import Figure
@@ -55,8 +55,8 @@ def test_reduced_weights_are_reported(tmp_path):
     path, how = tmp_path / "out.npz", Skinning(max_influences=1)
     still = f"{path}: vertices differ from the pose by up to 1 m (vertex 3): only the strongest "
     assert faults.lines(export(actor, path, how))[1].startswith(still)
-    animation, options = single_frame(actor, number=7), MotionOptions(up="z", skinning=how)
-    _, note = faults.lines(export_animation(animation, path, "npz", options))
+    animation, options = single_frame(actor, number=7), ExportOptions(up="z", skinning=how)
+    _, note = faults.lines(export_frames(animation, path, "npz", options))
     moving = "vertices differ from the motion by up to 1 m (vertex 3, frame 7): only the strongest"
     assert note.startswith(f"{path}: {moving}")
 
@@ -152,7 +152,7 @@ def sampled_points(present=(True, False)):
 
 def test_points_of_all_frames_are_written(tmp_path):
     path = tmp_path / "two.npz"
-    (note,) = export_points(sampled_points(), path, MotionOptions(world_up="z"))
+    (note,) = export_frames(sampled_points(), path, "npz", ExportOptions(world_up="z"))
     assert str(note) == (
         f"{path}: 2 frames at 10 fps; 1 of them missing, NaN, z up: name, up, frame_rate, "
         "times, frames, present, points, confidences, joint_names, limbs, sides, layout"
@@ -170,18 +170,22 @@ def test_points_of_all_frames_are_written(tmp_path):
 @pytest.mark.parametrize(
     ("options", "present", "message"),
     [
-        (MotionOptions(up="x"), True, 'up axis of arrays: expected y or z, found "x"'),
+        (ExportOptions(up="x"), True, 'up axis of arrays: expected y or z, found "x"'),
         (
-            MotionOptions(unit="cm"),
+            ExportOptions(unit="cm"),
             True,
             'unit of arrays: expected none, as in the scene, found "cm"',
         ),
-        (MotionOptions(), False, "two 4: every frame is missing, so there is nothing to write"),
+        (
+            ExportOptions(),
+            False,
+            "no person is present in frames 7 to 8: there is nothing to write",
+        ),
     ],
 )
 def test_unsupported_point_options_are_refused(tmp_path, options, present, message):
     with pytest.raises(RigError) as caught:
-        export_points(sampled_points((present, False)), tmp_path / "two.npz", options)
+        export_frames(sampled_points((present, False)), tmp_path / "two.npz", "npz", options)
     assert str(caught.value) == message and not any(tmp_path.iterdir())
 
 
@@ -198,7 +202,7 @@ def test_points_are_rotated_to_a_different_up_axis(tmp_path):
     animation = SampledPoints(
         "two 4", layout, 30.0, 0, np.zeros(1), np.ones(1, bool), rows, np.array([[1.0, 0.0]])
     )
-    export_points(animation, tmp_path / "p.npz", MotionOptions(up="z", world_up="y"))
+    export_frames(animation, tmp_path / "p.npz", "npz", ExportOptions(up="z", world_up="y"))
     with np.load(tmp_path / "p.npz") as arrays:
         assert str(arrays["up"]) == "z"
         # The up axis y becomes z: (x, y, z) to (x, -z, y).

@@ -8,6 +8,7 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
+from exporting import export_frames
 from formats.bvh_text import PERSON_JOINTS, PERSON_TURNED, person
 from numpy.testing import assert_allclose
 from plain_bvh import PlainBvh
@@ -18,7 +19,7 @@ from seamed import POSITIONS, seamed_actor
 import viewer
 from viewer.cli import run
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export, export_animation
+from viewer.export import ExportOptions, export
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
@@ -90,8 +91,8 @@ def test_error_in_millimetres_uses_the_unit_of_the_file(tmp_path):
     clip = SampledClip("a", Timing(30.0, np.arange(1)), turns, translations=shifts)
     for unit, millimetres in (("cm", 10.0), ("mm", 1.0), ("in", 25.4)):
         animation = sample_animation(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
-        options = MotionOptions(unit=unit, digits=1)
-        notes = faults.lines(export_animation(animation, tmp_path / "a.bvh", "bvh", options))
+        options = ExportOptions(unit=unit, digits=1)
+        notes = faults.lines(export_frames(animation, tmp_path / "a.bvh", "bvh", options))
         assert f"joints differ from the motion by up to {0.04 * millimetres:.3g} mm (" in notes[1]
 
 
@@ -156,7 +157,7 @@ def smpl_animation(unit="cm", n_frames=3):
 def test_amass_of_a_skeleton_is_in_metres_relative_to_its_root(tmp_path, up):
     animation, vectors, places = smpl_animation()
     notes = faults.lines(
-        export_animation(animation, tmp_path / "a.npz", "amass", MotionOptions(up=up))
+        export_frames(animation, tmp_path / "a.npz", "amass", ExportOptions(up=up))
     )
     turn = TO_Z if up else np.eye(3)
     with np.load(tmp_path / "a.npz") as arrays:
@@ -177,9 +178,7 @@ def test_amass_of_a_skeleton_is_in_metres_relative_to_its_root(tmp_path, up):
 
 def test_easymocap_of_a_skeleton_rotates_about_the_origin(tmp_path):
     animation, vectors, places = smpl_animation()
-    notes = faults.lines(
-        export_animation(animation, tmp_path / "out", "easymocap", MotionOptions())
-    )
+    notes = faults.lines(export_frames(animation, tmp_path / "out", "easymocap", ExportOptions()))
     for frame in range(3):
         (record,) = json.loads((tmp_path / "out" / "smpl" / f"{frame:06}.json").read_text())
         # For the pelvis X = J0, the position is V = R X + T.
@@ -195,7 +194,7 @@ def test_easymocap_of_a_skeleton_rotates_about_the_origin(tmp_path):
 def test_skeletons_of_unknown_unit_are_refused(tmp_path, kind, what):
     animation, _, _ = smpl_animation("")
     with pytest.raises(RigError) as caught:
-        export_animation(animation, tmp_path / "out.npz", kind, MotionOptions())
+        export_frames(animation, tmp_path / "out.npz", kind, ExportOptions())
     assert str(caught.value) == (
         f"walk cannot be written as {what}, which is in metres: its unit is unknown (for a BVH, "
         "--unit sets it)"
@@ -207,10 +206,10 @@ def test_skeletons_of_unknown_unit_are_refused(tmp_path, kind, what):
 def test_units_other_than_metres_are_refused_for_the_smpl_family(tmp_path, kind, title):
     animation, _, _ = smpl_animation("m")
     with pytest.raises(RigError) as caught:
-        export_animation(animation, tmp_path / "out.npz", kind, MotionOptions(unit="cm"))
+        export_frames(animation, tmp_path / "out.npz", kind, ExportOptions(unit="cm"))
     assert str(caught.value) == f'unit of {title}: expected m, found "cm"'
     assert not any(tmp_path.iterdir())
-    assert export_animation(animation, tmp_path / "out.npz", kind, MotionOptions(unit="m"))
+    assert export_frames(animation, tmp_path / "out.npz", kind, ExportOptions(unit="m"))
 
 
 def test_obj_states_its_unit(tmp_path):
@@ -227,5 +226,5 @@ def test_end_sites_without_bones_have_equal_length_in_any_unit(tmp_path):
     clip = SampledClip("a", Timing(30.0, np.arange(1)), turns)
     for unit in ("m", "cm", "mm", "in"):
         animation = sample_animation(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
-        export_animation(animation, tmp_path / "a.bvh", "bvh", MotionOptions(unit="m"))
+        export_frames(animation, tmp_path / "a.bvh", "bvh", ExportOptions(unit="m"))
         assert_allclose(PlainBvh(tmp_path / "a.bvh").ends[0], [0, 0.05, 0], rtol=0, atol=1e-6)

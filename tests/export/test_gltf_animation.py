@@ -6,6 +6,7 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
+from exporting import export_frames
 from family_animations import family_animation, family_motion, waves
 from family_models import family_figure
 from gltf_files import AS_IS, EXACT, TO_Y, assert_drawn, corners
@@ -16,7 +17,7 @@ from small_rigs import clip_text, write_twist
 
 import viewer
 from viewer.errors import OutputError, RigError
-from viewer.export import EXPORTERS, MotionOptions, export_animation
+from viewer.export import EXPORTERS, ExportOptions
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MorphTarget, with_morphs
@@ -52,9 +53,7 @@ def roof_animation(rows=None, count=4, rate=10.0, **tracks) -> SampledAnimation:
 
 
 def write(folder, animation, name="out.glb", **options) -> tuple[Gltf, list[str]]:
-    notes = faults.lines(
-        export_animation(animation, folder / name, "gltf", MotionOptions(**options))
-    )
+    notes = faults.lines(export_frames(animation, folder / name, "gltf", ExportOptions(**options)))
     return Gltf(folder / name), notes
 
 
@@ -142,7 +141,7 @@ def test_poses_in_gaps_are_held_or_interpolated(tmp_path, gaps, angles, text):
 def test_gaps_split_into_files(tmp_path):
     animation = roof_animation(rows=[-1, 0, 1, -1, -1, 3, -1])
     notes = faults.lines(
-        export_animation(animation, tmp_path / "walk.gltf", "gltf", MotionOptions(gaps="split"))
+        export_frames(animation, tmp_path / "walk.gltf", "gltf", ExportOptions(gaps="split"))
     )
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         "walk-1.bin",
@@ -318,7 +317,7 @@ def test_invalid_animations_are_refused(tmp_path):
             write(tmp_path, animation, **options)
         assert str(caught.value) == message
 
-    text = "roof: every frame is missing, so there is nothing to write"
+    text = "no person is present in frames 7 to 8: there is nothing to write"
     refused(roof_animation(rows=[-1, -1]), text)
     refused(roof_animation(), 'unit of glTF: expected m, found "cm"', unit="cm")
     refused(roof_animation(), 'up axis of glTF: expected y, found "z"', up="z")
@@ -335,7 +334,7 @@ def test_invalid_animations_are_refused(tmp_path):
 
 def test_registry_lists_motion_and_pose(tmp_path):
     kind = EXPORTERS["gltf"]
-    assert kind.suffixes == (".glb", ".gltf") and kind.writes_pose and kind.writes_motion
+    assert kind.suffixes == (".glb", ".gltf") and kind.stores == {"pose", "clips", "frames"}
     gltf, _ = write(tmp_path, roof_animation(), "x.GLTF")
     assert json.loads((tmp_path / "x.GLTF").read_text())["asset"]["version"] == "2.0"
     assert gltf.root["buffers"][0]["uri"] == "x.bin"

@@ -6,13 +6,14 @@ import faults
 import numpy as np
 import pytest
 from export.plain_readers import read_obj
+from exporting import export_frames
 from family_animations import family_animation, family_motion
 from family_models import family_figure
 from numpy.testing import assert_allclose, assert_array_equal
 from seamed import POSITIONS, seamed_actor
 
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.export._gaps import filled
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -49,7 +50,7 @@ def moving_roof():
 )
 def test_gaps_of_numbered_meshes_are_kept_or_interpolated(tmp_path, gaps, places):
     name = tmp_path / "m_{frame:02}.obj"
-    notes = faults.lines(export_animation(moving_roof(), name, "obj", MotionOptions(gaps=gaps)))
+    notes = faults.lines(export_frames(moving_roof(), name, "obj", ExportOptions(gaps=gaps)))
     files = {int(path.stem[2:]): read_obj(path).v for path in tmp_path.iterdir()}
     assert files.keys() == places.keys()
     for frame, x in places.items():
@@ -67,7 +68,7 @@ def test_gaps_of_numbered_meshes_are_kept_or_interpolated(tmp_path, gaps, places
 )
 def test_gaps_of_arrays_are_kept_or_interpolated(tmp_path, gaps, x):
     path = tmp_path / "a.npz"
-    notes = faults.lines(export_animation(moving_roof(), path, "npz", MotionOptions(gaps=gaps)))
+    notes = faults.lines(export_frames(moving_roof(), path, "npz", ExportOptions(gaps=gaps)))
     with np.load(path) as arrays:
         assert_allclose(arrays["vertices"][:, :, 0], np.add.outer(x, POSITIONS[:, 0]), atol=1e-12)
         assert_array_equal(arrays["present"], ~np.isnan(x))
@@ -78,7 +79,7 @@ def test_gaps_of_arrays_are_kept_or_interpolated(tmp_path, gaps, x):
 def test_arrays_are_not_split(tmp_path):
     message = 'gaps of arrays: expected hold or interpolate, found "split"'
     with pytest.raises(RigError, match=f"^{message}$"):
-        export_animation(moving_roof(), tmp_path / "a.npz", "npz", MotionOptions(gaps="split"))
+        export_frames(moving_roof(), tmp_path / "a.npz", "npz", ExportOptions(gaps="split"))
     assert not any(tmp_path.iterdir())
 
 
@@ -94,7 +95,7 @@ def test_gaps_of_folders_are_kept_or_interpolated(tmp_path, gaps, rows, note):
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
     animation = family_animation(family_figure("smpl", tmp_path), motion)
     out = tmp_path / "out"
-    notes = faults.lines(export_animation(animation, out, "easymocap", MotionOptions(gaps=gaps)))
+    notes = faults.lines(export_frames(animation, out, "easymocap", ExportOptions(gaps=gaps)))
     assert notes[1:] == [note]
     for frame, row in enumerate(rows, 5):
         people = json.loads((out / "smpl" / f"{frame:06}.json").read_text())
@@ -107,7 +108,7 @@ def test_interpolated_frames_of_folders_are_written(tmp_path):
     # The rotation half-way between two unit quaternions is their normalised sum.
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
     animation = family_animation(family_figure("smpl", tmp_path), motion)
-    export_animation(animation, tmp_path / "out", "easymocap", MotionOptions(gaps="interpolate"))
+    export_frames(animation, tmp_path / "out", "easymocap", ExportOptions(gaps="interpolate"))
     (person,) = json.loads((tmp_path / "out" / "smpl" / "000006.json").read_text())
     ends = [quaternion(motion.vectors[row, 4]) for row in (0, 2)]
     ends[1] = ends[1] if ends[0] @ ends[1] > 0 else -ends[1]
@@ -129,7 +130,7 @@ def test_unknown_gap_modes_are_refused(tmp_path, key):
     before = sorted(tmp_path.iterdir())
     message = 'handling of gaps: expected one of hold, interpolate, split, found "jump"'
     with pytest.raises(RigError, match=f"^{message}$"):
-        export_animation(animation, tmp_path / "m_{frame}", key, MotionOptions(gaps="jump"))
+        export_frames(animation, tmp_path / "m_{frame}", key, ExportOptions(gaps="jump"))
     assert sorted(tmp_path.iterdir()) == before
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import faults
 import numpy as np
 import pytest
+from exporting import export_frames
 from family_animations import family_animation, family_motion, waves
 from family_models import family_figure
 from formats.synthetic_smpl import model
@@ -19,7 +20,7 @@ from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_an
 
 import viewer
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export import MotionOptions, export, export_animation
+from viewer.export import ExportOptions, export
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh
@@ -65,7 +66,7 @@ def errors(notes: list[Diagnostic]) -> list[Diagnostic]:
 def write(
     animation: SampledAnimation, folder: Path, kind: str, name: str, **options
 ) -> list[Diagnostic]:
-    return export_animation(animation, folder / name, kind, MotionOptions(**options))
+    return export_frames(animation, folder / name, kind, ExportOptions(**options))
 
 
 # Changing shapes
@@ -269,7 +270,7 @@ def test_anim_reports_the_mesh_error(tmp_path):
     turns[1, 1] = [0.0, 0.0, np.sin(0.5), np.cos(0.5)]
     clip = SampledClip("bend", Timing(10.0, np.arange(3)), turns)
     animation = sample_animation(Actor(Figure("arm", mesh, skeleton, skin, unit="m"), clip=clip))
-    notes = export_animation(animation, tmp_path / "a.anim", "anim", MotionOptions())
+    notes = export_frames(animation, tmp_path / "a.anim", "anim", ExportOptions())
     found = said([notes[1]])
     assert found == {
         "vertices": (pytest.approx(2000 * np.sin(0.25), rel=TOLD), "vertex 1, frame 1")

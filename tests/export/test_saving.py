@@ -23,7 +23,7 @@ from viewer.media import saving
 
 # VRM files need a humanoid and are saved like glTF files.
 WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]
-SUFFIXES = [kind.suffixes[0] for kind in WRITERS if kind.writes_pose]
+SUFFIXES = [kind.suffixes[0] for kind in WRITERS if "pose" in kind.stores]
 # The files that each exporter writes for the figure below, which has two textures.
 SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1}
 # Existing files by the suffix of the output.

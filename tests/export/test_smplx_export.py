@@ -8,13 +8,14 @@ import faults
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
+from exporting import export_frames
 from family_animations import family_animation, family_motion, vertices_about_pelvis, waves
 from family_models import family_figure
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.formats import Source, read
 from viewer.rig.bodies.smpl_family import ShapeSpace
 
@@ -30,7 +31,7 @@ def family(tmp_path_factory):
 
 def written(animation, path, key="smplx", **options):
     """Export an animation; return the arrays in the file and the notes."""
-    notes = faults.lines(export_animation(animation, path, key, MotionOptions(**options)))
+    notes = faults.lines(export_frames(animation, path, key, ExportOptions(**options)))
     with np.load(path, allow_pickle=False) as arrays:
         return dict(arrays), notes
 
@@ -112,7 +113,7 @@ def test_gender_is_written_and_shapes_of_other_models_are_not(family, tmp_path):
 def test_file_is_read_back(family, tmp_path):
     motion = family_motion(55)
     animation = family_animation(family["smplx"], motion)
-    export_animation(animation, tmp_path / "a.npz", "smplx", MotionOptions(world_up="z"))
+    export_frames(animation, tmp_path / "a.npz", "smplx", ExportOptions(world_up="z"))
     again = read(Source(tmp_path / "a.npz"))
     assert again.up == "z" and again.joint_names == motion.joint_names
     assert_allclose(again.vectors[:, 1:], motion.vectors[:, 1:], atol=ATOL)

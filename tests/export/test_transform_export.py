@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from exporting import export_frames
 from family_models import family_figure
 from gltf_files import assert_drawn
 from plain_bvh import PlainBvh
 from plain_gltf import Gltf
 from rig.animated import NAMES, about, bow, channel, clip_of, leg, wave
 
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import pose_of, world_frames
 from viewer.rig.motion.sampled_animation import sample_animation
@@ -20,7 +21,7 @@ GROWS = channel(1, "scale", [0.0, 1.0], [[1.0, 1, 1], [2, 0.5, 1]])
 
 def written(animation, path, kind):
     """Return the notes of an export by key."""
-    notes = export_animation(animation, path, kind, MotionOptions())
+    notes = export_frames(animation, path, kind, ExportOptions())
     return {note.key: note for note in notes}
 
 

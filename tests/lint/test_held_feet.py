@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from exporting import export_frames
 from rig.retargeting.rest_twins import t_pose, written
 from rig.retargeting.standing_motions import jump, kneel, treadmill
 from rig.retargeting.test_standing_feet import jerky_walk
 from rig.retargeting.walking import RATE, walk
 
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.lint import lint_scene
 from viewer.loading import MotionSettings, bundled_body, load
 from viewer.loading.cleaning import clean_up
@@ -33,7 +34,7 @@ def path_of(name: str, folder: Path) -> Path:
     path = folder / f"{name}.bvh"
     motion = written(t_pose(), *MOTIONS[name](), rate=RATE)
     actor = Actor(motion.figure, clip=motion.clip)
-    export_animation(sample_animation(actor), path, "bvh", MotionOptions())
+    export_frames(sample_animation(actor), path, "bvh", ExportOptions())
     return path
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from exporting import export_frames
 from faults import told
 from rig.retargeting.rest_twins import t_pose, written
 from rig.retargeting.walking import RATE, walk
 
 from viewer.cli import run
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.loading import MotionSettings, bundled_body, load
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.scene import Actor
@@ -20,7 +21,7 @@ def walking(tmp_path_factory):
     path = tmp_path_factory.mktemp("walk") / "walk.bvh"
     motion = written(t_pose(), *walk(), rate=RATE)
     actor = Actor(motion.figure, clip=motion.clip)
-    export_animation(sample_animation(actor), path, "bvh", MotionOptions())
+    export_frames(sample_animation(actor), path, "bvh", ExportOptions())
     return path
 
 

@@ -115,8 +115,8 @@ def writers() -> str:
         (
             kind.title,
             ", ".join("folder" if suffix == "/" else f"`{suffix}`" for suffix in kind.suffixes),
-            "yes" if kind.writes_pose else "",
-            "yes" if kind.writes_motion else "",
+            "yes" if "pose" in kind.stores else "",
+            "yes" if kind.stores_motion else "",
             f"`--as {name}`",
         )
         for name, kind in EXPORTERS.items()

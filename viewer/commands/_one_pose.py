@@ -8,9 +8,8 @@ from pathlib import Path
 from viewer.commands._frames import numbering_of
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
-from viewer.export import EXPORTERS, MotionOptions
+from viewer.export import EXPORTERS, ExportOptions, Part
 from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.single_frame import upright_single_frame
 from viewer.rig.motion.timing import frame_at
 from viewer.rig.scene import Actor, Scene
@@ -39,10 +38,10 @@ def posed_actors(scene: Scene) -> list[Actor]:
     return _moving(scene) or [actor for actor in scene.actors if actor.pose is not None]
 
 
-def animation_of_pose(
-    arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
-) -> tuple[SampledAnimation, str]:
-    """Return an actor's current pose as a sampled animation, and its up axis, for an exporter.
+def part_of_pose(
+    arguments: argparse.Namespace, key: str, options: ExportOptions, scene: Scene, actor: Actor
+) -> Part:
+    """Return an actor's current pose as a motion of one frame, for an exporter.
 
     The frame has the number that ``--frame`` uses; between two frames, it is that of the displayed
     frame.
@@ -51,7 +50,9 @@ def animation_of_pose(
     time = frames.start if scene.time is None else scene.time
     number = frames.first + frame_at(time - frames.start, frames.rate)
     keeps_world = EXPORTERS[key].keeps_world and not options.up
-    return upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
+    return Part(
+        actor, None, *upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
+    )
 
 
 def pose_note(arguments: argparse.Namespace, scene: Scene) -> Diagnostic:

@@ -9,7 +9,7 @@ converted part by part (``convert_streamed``), if no option needs the whole moti
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -38,34 +38,26 @@ from viewer.commands._settings import settings_of, stated
 from viewer.commands._writing.baked_springs import bake_springs
 from viewer.commands._writing.motion_export import (
     add_motion_arguments,
-    check_frame_field,
     check_kind,
     check_numbered,
-    is_motion,
     motion_options,
     requested_frames,
-    write_motions,
-    writes_keys,
+    selected,
 )
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
-from viewer.commands._writing.written_actors import (
-    able_actors,
-    left_out_notes,
-    pose_or_point_actors,
-)
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, OutputError, RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
-    MotionOptions,
-    animation_for,
+    FOLDER,
+    ExportOptions,
     export,
-    export_clips,
-    export_figures,
-    exporter_for,
+    exporters_at,
     files_written,
+    output_files,
+    sampled,
 )
 from viewer.export._motion_paths import PERSON, motion_paths
 from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
@@ -73,11 +65,8 @@ from viewer.interrupts import raising
 from viewer.loading import Contents, MotionSettings, begin
 from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import printable
-from viewer.rig.motion.animation_choice import has_own_animations, own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, frame_range
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.upright import upright_actor, upright_placement
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
@@ -85,7 +74,6 @@ from viewer.streams import is_stdout, require_stdout, summary_stream
 if TYPE_CHECKING:
     from viewer.formats.bvh.streaming import BvhStream
 
-_OPTIMIZED = (".glb", ".gltf", ".vrm")
 # Streamed conversion.
 _PEEK = 1 << 16  # bytes that identify the format
 _LARGE = 8_000_000  # bytes; smaller files are read as a whole
@@ -139,7 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _known_suffixes() -> str:
     suffixes = dict.fromkeys(suffix for kind in EXPORTERS.values() for suffix in kind.suffixes)
-    return ", ".join("a folder for EasyMocap" if each == "/" else each for each in suffixes)
+    return ", ".join("a folder for EasyMocap" if each == FOLDER else each for each in suffixes)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -165,11 +153,15 @@ def _converted(
     arguments.fps = asked.frames.fps
     use_file_method(scene, skinning, stated(Skinning, arguments))
     baked = bake_springs(arguments, scene, output)
-    write = _write_motions if is_motion(arguments, output, scene) else _write_poses
-    if writes_keys(arguments, output, scene):
-        write = _write_clips
     with _saving_joint_map(arguments, asked, scene), shown_progress("converting"):
-        return [*write(arguments, asked, scene, output, skinning), *baked]
+        selection, options, chosen = selected(arguments, scene, output, skinning)
+        files, inputs = output_files(selection, output, options), inputs_of(asked, scene)
+        if output.suffix:
+            check_targets(files, inputs, arguments.force)
+        else:
+            check_folder_target(files[0], inputs, arguments.force)
+        with raising():
+            return [*export(selection, output, options=options), *chosen, *baked]
 
 
 def _check_suffix(arguments: argparse.Namespace, asked: SceneOptions, output: Path) -> None:
@@ -182,141 +174,19 @@ def _check_suffix(arguments: argparse.Namespace, asked: SceneOptions, output: Pa
             f"{name}: expected a suffix, which selects the format; use a link to {name} that has "
             f"one"
         )
-    suffix = output.suffix.lower() or "/"
-    kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
+    suffix, kinds = output.suffix.lower() or FOLDER, exporters_at(output)
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
-    if arguments.optimize and suffix not in _OPTIMIZED:
+    if arguments.optimize and not any("optimizes" in kind.options for kind in kinds):
         raise ViewerError(f"--optimize: expected .glb, .gltf or .vrm, found {printable(suffix)}")
     vrm_meta(arguments, output)
     check_kind(arguments, output)
     check_numbered(arguments, output)
-    if suffix == "/" or "{frame" in output.name:
+    if not output.suffix or "{frame" in output.name:
         return  # the files are unknown until the motion has been read
-    is_pose = all(kind.writes_pose for kind in kinds)
+    is_pose = all("pose" in kind.stores for kind in kinds)
     files = files_written(output) if is_pose else [output]
     check_targets(files, inputs_of(asked), arguments.force)
-
-
-def _write_poses(
-    arguments: argparse.Namespace,
-    asked: SceneOptions,
-    scene: Scene,
-    output: Path,
-    skinning: Skinning,
-) -> list[Diagnostic]:
-    """Write the current poses."""
-    return _write_actors(arguments, asked, scene, output, skinning, lambda _: None)
-
-
-def _write_clips(
-    arguments: argparse.Namespace,
-    asked: SceneOptions,
-    scene: Scene,
-    output: Path,
-    skinning: Skinning,
-) -> list[Diagnostic]:
-    """Write figures at rest with their animations, or only with the requested one."""
-    is_chosen, refused = bool(arguments.animation), list[FormatError]()
-
-    def clips_of(actor: Actor) -> Sequence[TransformClip] | None:
-        own = own_animations(actor, is_chosen, refused) if has_own_animations(actor) else ()
-        return own or None
-
-    notes = _write_actors(arguments, asked, scene, output, skinning, clips_of)
-    # Figures of one file share its animations.
-    problems = dict.fromkeys(map(str, refused))
-    return notes + [
-        Diagnostic("X003.invalid-animation", values={"problem": each}) for each in problems
-    ]
-
-
-def _write_actors(
-    arguments: argparse.Namespace,
-    asked: SceneOptions,
-    scene: Scene,
-    output: Path,
-    skinning: Skinning,
-    clips_of: Callable[[Actor], Sequence[TransformClip] | None],
-) -> list[Diagnostic]:
-    """Write the actors that are present, to one file each unless the format holds several."""
-    all_shown = pose_or_point_actors(scene)
-    shown, lacking = able_actors(all_shown, exporter_for(output))
-    actors = [actor for actor in shown if actor.is_present]
-    if not actors:
-        raise RigError("no person is present at that time: there is nothing to write")
-    if EXPORTERS[exporter_for(output)].writes_several and PERSON not in output.name:
-        notes = _write_together(arguments, asked, scene, output, skinning, actors, clips_of)
-    else:
-        places = dict(zip(shown, motion_paths(output, shown), strict=True))
-        found = {each: places[each] for each in actors}
-        notes = _write_apart(arguments, asked, scene, skinning, found, clips_of)
-    away = [actor.name for actor in shown if not actor.is_present]
-    notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
-    return notes + lacking + left_out_notes(scene, all_shown)
-
-
-def _write_together(
-    arguments: argparse.Namespace,
-    asked: SceneOptions,
-    scene: Scene,
-    output: Path,
-    skinning: Skinning,
-    actors: Sequence[Actor],
-    clips_of: Callable[[Actor], Sequence[TransformClip] | None],
-) -> list[Diagnostic]:
-    """Write all actors and cameras to one file."""
-    check_targets(files_written(output), inputs_of(asked, scene), arguments.force)
-    upright = []
-    for actor in actors:
-        placement = upright_placement(scene, actor)
-        upright.append(replace(upright_actor(scene, actor), placement=placement))
-    with raising():
-        clips = [clips_of(actor) for actor in upright]
-        optimizes = bool(arguments.optimize)
-        return export_figures(upright, output, skinning, clips, scene, optimizes)
-
-
-def _write_apart(
-    arguments: argparse.Namespace,
-    asked: SceneOptions,
-    scene: Scene,
-    skinning: Skinning,
-    places: Mapping[Actor, Path],
-    clips_of: Callable[[Actor], Sequence[TransformClip] | None],
-) -> list[Diagnostic]:
-    """Write each actor to a separate file."""
-    optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
-    files = [file for path in places.values() for file in files_written(path)]
-    check_targets(files, inputs_of(asked, scene), arguments.force)
-    notes: list[Diagnostic] = []
-    with all_or_none(files):
-        for actor, path in places.items():
-            with raising():
-                upright = upright_actor(scene, actor)
-                clips = clips_of(upright)
-                if clips is None:
-                    notes += export(upright, path, skinning, optimizes, meta)
-                else:
-                    notes += export_clips(upright, path, skinning, clips, optimizes)
-    return notes
-
-
-def _write_motions(
-    arguments: argparse.Namespace,
-    asked: SceneOptions,
-    scene: Scene,
-    output: Path,
-    skinning: Skinning,
-) -> list[Diagnostic]:
-    inputs, force = inputs_of(asked, scene), arguments.force
-    if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
-        check_frame_field(output)
-    elif not output.suffix:
-        check_folder_target(output / "smpl", inputs, force)
-    return write_motions(
-        arguments, scene, output, skinning, lambda files: check_targets(files, inputs, force)
-    )
 
 
 @contextmanager
@@ -427,18 +297,18 @@ class _Request:
     def actor(self) -> Actor:
         return self.scene.actors[0]
 
-    def parts(self, options: MotionOptions) -> Iterator[SampledAnimation]:
+    def parts(self, options: ExportOptions) -> Iterator[SampledAnimation]:
         """Yield the requested frames."""
         first, stop = self.span
         for clip in self.stream.clips(first, stop):
             motion = as_asked(replace(self.stream.motion, clip=clip), self.settings)
             actor = replace(self.actor, clip=motion.clip)
-            part = animation_for("bvh", options, self.scene, actor)[0]
+            part = sampled("bvh", options, self.scene, actor).animation
             yield replace(part, first_frame=first)
 
 
 def _opened(
-    arguments: argparse.Namespace, asked: SceneOptions, options: MotionOptions
+    arguments: argparse.Namespace, asked: SceneOptions, options: ExportOptions
 ) -> _Request | None:
     """Return the request, or None if the file must be read as a whole."""
     from viewer.formats.bvh.streaming import open_stream
@@ -465,5 +335,5 @@ def _opened(
     actor = scene.actors[0]
     assert isinstance(actor.clip, SampledClip)  # that of the stream
     span = frame_range(actor.clip, actor.clip.timing.frame_rate, requested_frames(arguments, actor))
-    up = animation_for("bvh", options, scene, actor, frames=(0, 1))[1]
+    up = sampled("bvh", options, scene, actor, frames=(0, 1)).up
     return _Request(stream, settings, scene, warnings, span, up)

@@ -39,7 +39,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
-from viewer.export import MotionOptions, animation_for, check_figure, export_animation, exporter_for
+from viewer.export import ExportOptions, Selection, check_figure, export, exporter_for, sampled
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
@@ -410,7 +410,7 @@ def _write_clips(rigged: Rigged, clips: list[_TransferredClip]) -> list[Diagnost
     notes: list[Diagnostic] = []
     for each in clips:
         actor = Actor(rigged.figure, figure_pose(rigged.figure), clip_for(rigged, each.clip))
-        key, options = each.path.suffix[1:], MotionOptions()
-        animation, _ = animation_for(key, options, Scene([actor]), actor)
-        notes += export_animation(animation, each.path, key, options)
+        options = ExportOptions(kind=each.path.suffix[1:])
+        part = sampled(options.kind, options, Scene([actor]), actor)
+        notes += export(Selection([part]), each.path, options=options)
     return notes

@@ -4,43 +4,53 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
-from viewer.diagnostics import Diagnostic
-from viewer.errors import UnsupportedFormatError
-from viewer.export._exporter import Exporter
-from viewer.export._left_out import other_animations_note
-from viewer.export._motion_paths import animation_files
-from viewer.export._options import MotionOptions, VrmMeta
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase, frame_range
+from viewer.errors import RigError, UnsupportedFormatError
+from viewer.export._exporter import FOLDER, Content, Exporter, Part, Selection
+from viewer.export._left_out import motion_notes
+from viewer.export._motion_paths import files_at, is_together, part_files, part_paths
+from viewer.export._options import ExportOptions, VrmMeta
 from viewer.formats import all_or_none
+from viewer.phrases import printable
 from viewer.rig.bodies.smpl_family import member_of
+from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.points import PointClip
+from viewer.rig.captures.sampled_points import sample_upright_points
 from viewer.rig.figure import Figure
-from viewer.rig.motion.animation_choice import own_animations
-from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.sampled_animation import upright_animation
+from viewer.rig.motion.upright import upright_actor, upright_placement
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 
 __all__ = [
     "EXPORTERS",
+    "FOLDER",
+    "ExportOptions",
     "Exporter",
-    "MotionOptions",
+    "Part",
+    "Selection",
     "VrmMeta",
-    "animation_for",
     "check_figure",
     "export",
-    "export_animation",
-    "export_clips",
-    "export_figures",
     "exporter_for",
+    "exporters_at",
+    "exporters_of",
     "files_written",
-    "motion_exporters",
+    "output_files",
+    "sampled",
     "suited_exporter",
 ]
 
+
+_POSE = frozenset[Content]({"pose"})
+_MOTION = frozenset[Content]({"frames"})
+_BOTH = _POSE | _MOTION
 
 EXPORTERS = {
     "obj": Exporter(
@@ -48,14 +58,17 @@ EXPORTERS = {
         (".obj",),
         "the posed mesh, textures",
         "joints, weights",
-        writes_motion=True,
+        _BOTH,
         needs="mesh",
+        is_numbered=True,
+        keeps_gaps=True,
     ),
     "ply": Exporter(
         "PLY: the posed mesh",
         (".ply",),
         "the posed mesh, texture coordinates",
         "joints, weights, textures",
+        _POSE,
         needs="mesh",
     ),
     "npz": Exporter(
@@ -63,13 +76,15 @@ EXPORTERS = {
         (".npz",),
         "posed vertices and joints as arrays",
         "weights, materials",
-        writes_motion=True,
+        _BOTH | {"points"},
+        keeps_gaps=True,
     ),
     "pose": Exporter(
         "pose: joints by name and the pose vector",
         (".json", ".txt"),
         "rotations of joints, shape",
         "mesh, weights",
+        _POSE,
         needs="skeleton",
     ),
     "rig": Exporter(
@@ -77,123 +92,164 @@ EXPORTERS = {
         (".skel", ".skin"),
         "mesh, joints, limits, weights, texture",
         "blend shapes, pose correctives",
+        _POSE,
         needs="skeleton",
-        is_particular=True,
+        written=dict.fromkeys((".skel", ".skin"), (".skel", ".skin")),
     ),
     "anim": Exporter(
         "clip: keys of a course rig",
         (".anim",),
         "keys of the clip, or one per frame",
         "mesh, shape, scale",
-        writes_pose=False,
-        writes_motion=True,
+        _MOTION,
         needs="skeleton",
-        is_particular=True,
+        joints="course",
     ),
     "gltf": Exporter(
         "glTF: mesh, skin and motion",
         (".glb", ".gltf"),
         "mesh, weights, materials, shapes, motion",
         "joint limits, pose correctives",
-        writes_motion=True,
-        writes_keys=True,
-        writes_several=True,
+        _BOTH | {"clips"},
+        stores_many=True,
+        options=frozenset({"optimizes"}),
+        written={".gltf": ("", ".bin")},
     ),
     "vrm": Exporter(
         "VRM: humanoid character",
         (".vrm",),
         "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
         "pose, motion, joint limits, pose correctives",
+        _POSE,
         needs="skeleton",
-        is_particular=True,
+        joints="human",
+        options=frozenset({"optimizes", "meta"}),
     ),
     "vrma": Exporter(
         "VRM animation: motion of a humanoid",
         (".vrma",),
         "motion of human bones, expressions",
         "mesh, other joints",
-        writes_pose=False,
-        writes_motion=True,
+        _MOTION,
         needs="skeleton",
-        is_particular=True,
+        joints="human",
     ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
         (".bvh",),
         "joints and their motion",
         "mesh, weights, changes of shape",
-        writes_pose=False,
-        writes_motion=True,
+        _MOTION,
         needs="skeleton",
+        options=frozenset({"safe_names"}),
     ),
     "amass": Exporter(
         "AMASS: parameters of the SMPL family",
         (".npz",),
         "pose, position and shape of an SMPL body",
         "scale",
-        writes_pose=False,
-        writes_motion=True,
+        _MOTION,
+        joints="smpl",
         keeps_world=True,
-        is_particular=True,
     ),
     "smplx": Exporter(
         "SMPL-X for robots (GMR, PHC)",
         (".npz",),
         "pose, position and mean shape of an SMPL body, z up",
         "scale, hands of SMPL",
-        writes_pose=False,
-        writes_motion=True,
-        is_particular=True,
+        _MOTION,
+        joints="smpl",
     ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
-        ("/",),
+        (FOLDER,),
         "pose, position and shape of SMPL bodies",
         "scale",
-        writes_pose=False,
-        writes_motion=True,
+        _MOTION,
+        stores_many=True,
+        joints="smpl",
+        folder="smpl",
+        keeps_gaps=True,
         keeps_world=True,
-        is_particular=True,
     ),
 }
-"""Modules in this folder, each with ``export(actor, path, skinning)``."""
+"""Modules in this folder; ``Exporter`` describes what they have."""
+
+
+def exporters_at(path: str | Path) -> list[Exporter]:
+    """Return the exporters that write files of this suffix, or folders if there is none."""
+    suffix = Path(path).suffix.lower() or FOLDER
+    return [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
+
+
+def exporters_of(path: str | Path, content: Content) -> list[str]:
+    """Return the keys in ``EXPORTERS`` that write this content to files of this suffix.
+
+    Raises ``UnsupportedFormatError`` if there is none, with the known suffixes; ``RigError`` if
+    there is none for captured points.
+    """
+    suffix = Path(path).suffix.lower()
+    kinds = {key: kind for key, kind in EXPORTERS.items() if content in kind.stores}
+    found = [key for key, kind in kinds.items() if (suffix or FOLDER) in kind.suffixes]
+    if found:
+        return found
+    if content == "points":
+        raise RigError(
+            "there are only keypoints: a motion of joints cannot be written (.npz stores points)"
+        )
+    known = ", ".join(dict.fromkeys(each for kind in kinds.values() for each in kind.suffixes))
+    what = "no motion exporter" if content == "frames" else "no exporter"
+    shown = suffix or FOLDER if content == "frames" else suffix
+    raise UnsupportedFormatError(f'{what} for "{shown}"; supported: {known}')
 
 
 def exporter_for(path: str | Path) -> str:
-    """Return the key in ``EXPORTERS`` that writes files of this suffix.
+    """Return the key in ``EXPORTERS`` that writes poses to files of this suffix.
 
-    Raises ``UnsupportedFormatError`` if there is none; the message lists the known suffixes.
+    Raises ``UnsupportedFormatError`` if there is none.
     """
-    suffix = Path(path).suffix.lower()
-    kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_pose}
-    for key, kind in kinds.items():
-        if suffix in kind.suffixes:
-            return key
-    known = ", ".join(suffix for kind in kinds.values() for suffix in kind.suffixes)
-    raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
+    return exporters_of(path, "pose")[0]
+
+
+def suited_exporter(path: str | Path, figure: Figure) -> str:
+    """Return the exporter that writes a figure's motion to a file of this suffix.
+
+    Arrays of bodies of the SMPL family are written in AMASS's layout. Raises
+    ``UnsupportedFormatError`` if no exporter writes motions with this suffix.
+    """
+    found = exporters_of(path, "frames")
+    skeleton = figure.skeleton
+    is_member = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
+    suited = [key for key in found if (EXPORTERS[key].joints == "smpl") == is_member]
+    return (suited or found)[0]
 
 
 def export(
-    actor: Actor,
+    selection: Actor | Selection,
     path: str | Path,
     skinning: Skinning | None = None,
     optimizes: bool = False,
     meta: VrmMeta | None = None,
+    options: ExportOptions | None = None,
 ) -> list[Diagnostic]:
-    """Write an actor in its current pose; its placement in the scene is omitted.
+    """Write an actor in its current pose, or a selection of actors with their motions.
 
     Parameters
     ----------
-    actor : Actor
-        Figure and pose.
+    selection : Actor or Selection
+        Figure and pose; its placement in the scene is omitted. A selection has several actors, with
+        their poses, their own keys, or frames, and the scene in which they are placed.
     path : str or Path
-        The suffix selects the exporter; existing files are replaced.
+        The suffix selects the exporter; existing files are replaced. Either all files are written
+        or none. ``{person}`` in the name selects a file for each actor.
     skinning : Skinning, optional
         Skinning method and options.
     optimizes : bool
         Quantise vertices, which glTF and VRM support.
     meta : VrmMeta, optional
         Name, authors and licence of a VRM character; those of its file if omitted.
+    options : ExportOptions, optional
+        All options, including those above.
 
     Returns
     -------
@@ -206,120 +262,39 @@ def export(
     UnsupportedFormatError
         If no exporter writes this suffix, or it cannot quantise.
     RigError
-        If the figure lacks the data that the format needs.
+        If the figure lacks the data that the format needs, or nobody is present.
     OutputError
         If a file cannot be written.
     """
-    key = exporter_for(path)
-    module = import_module(f"{__name__}.{key}")
-    options: dict[str, Any] = {"meta": meta} if key == "vrm" else {}
-    if optimizes and key not in ("gltf", "vrm"):
-        raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
-    options |= {"optimizes": True} if optimizes else {}
-    with all_or_none(files_written(path)):
-        notes: list[Diagnostic] = module.export(
-            actor, Path(path), skinning or Skinning(), **options
-        )
-    return notes + _hidden_note([actor])
-
-
-def export_clips(
-    actor: Actor,
-    path: str | Path,
-    skinning: Skinning | None = None,
-    clips: Sequence[TransformClip] | None = None,
-    optimizes: bool = False,
-) -> list[Diagnostic]:
-    """Write a figure at rest, with animations that keep their own keys.
-
-    ``actor``: see ``viewer.rig.motion.animation_choice.has_own_animations``. ``path``: as for
-    ``export``; a format that ``writes_keys``. ``clips``: all of the actor's animations if omitted.
-    Returns as for ``export``. Raises ``UnsupportedFormatError, RigError, OutputError``: as for
-    ``export``, and if the keys are invalid.
-    """
-    module = import_module(f"{__name__}.{exporter_for(path)}")
-    chosen = own_animations(actor) if clips is None else clips
-    how = skinning or Skinning()
-    with all_or_none(files_written(path)):
-        notes: list[Diagnostic] = module.export_clips(actor, Path(path), how, chosen, optimizes)
-    return notes + _hidden_note([actor])
-
-
-def export_figures(
-    actors: Sequence[Actor],
-    path: str | Path,
-    skinning: Skinning | None = None,
-    clips: Sequence[Sequence[TransformClip] | None] | None = None,
-    scene: Scene | None = None,
-    optimizes: bool = False,
-) -> list[Diagnostic]:
-    """Write figures to one file, placed as in their scene; raises as ``export`` does.
-
-    ``path``: as for ``export``; a format that ``writes_several``. ``clips``: animations of each
-    figure; None for a figure, or for all, to write the current pose. ``scene``: provides the up
-    axis of the placements, by default that of the first figure, and cameras.
-    """
-    module = import_module(f"{__name__}.{exporter_for(path)}")
-    own = [None] * len(actors) if clips is None else clips
-    how = skinning or Skinning()
-    with all_or_none(files_written(path)):
-        notes: list[Diagnostic] = module.export_figures(
-            actors, Path(path), how, own, scene, optimizes
-        )
-    return notes + _hidden_note(actors)
-
-
-def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
-    count = sum(len(actor.hidden_parts) for actor in actors)
-    return [Diagnostic("X005.hidden-parts", values={"n": count})] if count else []
-
-
-def motion_exporters(path: str | Path) -> list[str]:
-    """Return the keys in ``EXPORTERS`` that write motions to files of this suffix.
-
-    Raises ``UnsupportedFormatError`` if there is none; the message lists the known suffixes.
-    """
-    suffix = Path(path).suffix.lower() or "/"
-    kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_motion}
-    found = [key for key, kind in kinds.items() if suffix in kind.suffixes]
-    if not found:
-        known = ", ".join(dict.fromkeys(s for kind in kinds.values() for s in kind.suffixes))
-        raise UnsupportedFormatError(f'no motion exporter for "{suffix}"; supported: {known}')
-    return found
-
-
-def suited_exporter(path: str | Path, figure: Figure) -> str:
-    """Return the exporter that writes a figure's motion to a file of this suffix.
-
-    Arrays of bodies of the SMPL family are written in AMASS's layout.
-
-    Raises ``UnsupportedFormatError`` if no exporter writes motions with this suffix.
-    """
-    found = motion_exporters(path)
-    if "amass" not in found or len(found) == 1:
-        return found[0]
-    skeleton = figure.skeleton
-    is_member = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
-    return "amass" if is_member else next(key for key in found if key != "amass")
-
-
-def export_animation(
-    animation: SampledAnimation, path: str | Path, key: str, options: MotionOptions
-) -> list[Diagnostic]:
-    """Write a motion without its placement; returns notes and raises as ``export`` does.
-
-    ``key``: a key of ``EXPORTERS``, see ``motion_exporters``.
-    """
-    module = import_module(f"{__name__}.{key}")
-    from viewer.export._losses.between import rate_note
-
+    chosen = replace(options) if options is not None else ExportOptions()
+    chosen.skinning = chosen.skinning if skinning is None else skinning
+    chosen.meta, chosen.optimizes = meta or chosen.meta, optimizes or chosen.optimizes
+    plan = _plan(selection, Path(path), chosen)
+    module = import_module(f"{__name__}.{plan.key}")
+    notes = list[Diagnostic]()
     # A folder is written to a temporary one, which is renamed at the end.
-    files = [] if key == "easymocap" else animation_files(animation, Path(path), key, options)
-    with all_or_none(files):
-        notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
-    if len(animation.frames.present) == 1:
-        return notes  # a pose was requested
-    return notes + rate_note(animation) + other_animations_note(animation.figure, animation.motion)
+    with all_or_none([] if plan.kind.folder else plan.files(chosen)):
+        for each, file in plan.groups:
+            part = each.parts[0]
+            notes += module.export(each, file, replace(chosen, world_up=part.up))
+            if part.frames is None:
+                notes += _hidden_note(each.actors)
+            elif part.content == "frames" and not plan.kind.stores_many:
+                notes += motion_notes(part.animation)
+    return notes + _untracked_note(plan) + plan.omitted
+
+
+def output_files(selection: Actor | Selection, path: Path, options: ExportOptions) -> list[Path]:
+    """Return all files, or the folder, that ``export`` writes."""
+    return _plan(selection, path, options).files(options)
+
+
+def files_written(path: str | Path) -> list[Path]:
+    """Return all files that an export of a pose writes, such as two for a rig or a ``.gltf``.
+
+    Raises ``UnsupportedFormatError`` if no exporter writes this suffix.
+    """
+    return files_at(EXPORTERS[exporter_for(path)], Path(path))
 
 
 def check_figure(key: str, figure: Figure) -> None:
@@ -327,42 +302,150 @@ def check_figure(key: str, figure: Figure) -> None:
 
     ``key``: a key of ``EXPORTERS``. ``figure``: only its joints, their names and its unit matter.
     """
-    if EXPORTERS[key].is_particular:
+    if EXPORTERS[key].joints:
         import_module(f"{__name__}.{key}").require(figure)
 
 
-def animation_for(
+def sampled(
     key: str,
-    options: MotionOptions,
+    options: ExportOptions,
     scene: Scene,
     actor: Actor,
     rate: float | None = None,
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
-) -> tuple[SampledAnimation, str]:
-    """Sample an actor's clip for an exporter, and return it with its up axis.
+) -> Part:
+    """Sample an actor's motion for an exporter that can write its figure.
 
     Captures are written back in their own world, unless another up axis is requested; other
     formats expect upright people.
 
-    ``key``: a key of ``EXPORTERS``. ``scene``, ``actor``, ``rate``, ``frames``, ``interpolate``: as
-    for ``viewer.rig.motion.sampled_animation.upright_animation``.
+    ``key``: a key of ``EXPORTERS``. ``options``: states whether an up axis is requested. ``scene``,
+    ``actor``, ``rate``, ``frames``, ``interpolate``: as for
+    ``viewer.rig.motion.sampled_animation.upright_animation``.
     """
+    check_figure(key, actor.figure)
+    if isinstance(actor.clip, PointClip):
+        return Part(actor, None, *sample_upright_points(scene, actor, rate, frames, interpolate))
     keeps_world = EXPORTERS[key].keeps_world and not options.up
-    return upright_animation(scene, actor, rate, frames, interpolate, keeps_world)
+    found = upright_animation(scene, actor, rate, frames, interpolate, keeps_world)
+    return Part(actor, None, *found)
 
 
-def files_written(path: str | Path) -> list[Path]:
-    """Return all files that an export to ``path`` writes, such as two for a rig or a ``.gltf``.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """The files of an export."""
 
-    Raises ``UnsupportedFormatError`` if no exporter writes this suffix.
-    """
-    suffixes = EXPORTERS[exporter_for(path)].suffixes
-    if exporter_for(path) == "rig":
-        return [Path(path).with_suffix(suffix) for suffix in suffixes]
-    if Path(path).suffix.lower() == ".gltf":
-        return [Path(path), Path(path).with_suffix(".bin")]
-    return [Path(path)]
+    key: str
+    groups: list[tuple[Selection, Path]]
+    """What is written to each file, or to each pattern of names."""
+    omitted: list[Diagnostic]
+    """Notes about actors that are not written."""
+
+    @property
+    def kind(self) -> Exporter:
+        return EXPORTERS[self.key]
+
+    def files(self, options: ExportOptions) -> list[Path]:
+        """Return all files, or the folder, that are written."""
+        found = [
+            file
+            for each, path in self.groups
+            for file in part_files(self.kind, each.parts[0], path, options)
+        ]
+        return [*dict.fromkeys(found)]
+
+
+def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _Plan:
+    """Choose the exporter, the actors that it can write, and their files."""
+    if isinstance(selection, Actor):
+        # This actor was asked for, whether it is present or not.
+        selection = Selection([Part(replace(selection, is_present=True))])
+    if not selection.parts:
+        raise RigError("expected at least one actor to write, found none")
+    key = options.kind or _suited(selection.parts[0], path)
+    kind, scene = EXPORTERS[key], selection.scene
+    if options.optimizes and "optimizes" not in kind.options:
+        raise UnsupportedFormatError(f"{path.suffix}: only glTF files can be optimised")
+    for part in selection.parts:
+        if part.content not in kind.stores:
+            raise UnsupportedFormatError(f"{path.name}: {key} files cannot store {part.content}")
+    # If no figure has what the format needs, the exporter says so.
+    able = [part for part in selection.parts if kind.holds(part.actor.figure)]
+    able = able or [*selection.parts]
+    for part in able:
+        if part.frames is not None:
+            check_figure(key, part.actor.figure)
+    counted = selection.among or [part.actor for part in able]
+    paths = dict(zip(map(id, counted), part_paths(kind, path, counted, options), strict=True))
+    there = [part for part in able if part.present.any()]
+    if not there:
+        when = "at that time" if able[0].frames is None else f"in {_span(able[0])}"
+        raise RigError(f"no person is present {when}: there is nothing to write")
+    omitted = [_absent_note(part) for part in able if not part.present.any()]
+    omitted += [
+        Diagnostic(f"X003.no-{kind.needs}", values={"figure": part.actor.name})
+        for part in selection.parts
+        if part not in able
+    ]
+    if is_together(kind, path, options):
+        parts = [part if scene is None else _placed(scene, part) for part in there]
+        return _Plan(key, [(Selection(parts, scene), path)], omitted)
+    groups = [
+        (Selection([part if scene is None else _upright(scene, part)]), paths[id(part.actor)])
+        for part in there
+    ]
+    return _Plan(key, groups, omitted)
+
+
+def _suited(part: Part, path: Path) -> str:
+    """Return the exporter of a part's content that suits its figure."""
+    if part.content == "frames":
+        return suited_exporter(path, part.actor.figure)
+    return exporters_of(path, part.content)[0]
+
+
+def _upright(scene: Scene, part: Part) -> Part:
+    return replace(part, actor=upright_actor(scene, part.actor))
+
+
+def _placed(scene: Scene, part: Part) -> Part:
+    """Return a part whose figure stands upright in its own space, and its placement."""
+    placement = upright_placement(scene, part.actor)
+    return replace(part, actor=replace(upright_actor(scene, part.actor), placement=placement))
+
+
+def _span(part: Part) -> Phrase:
+    """Return the numbers of a part's frames."""
+    assert part.frames is not None  # the caller has checked it
+    first = part.frames.first_frame
+    return frame_range(first, first + len(part.present) - 1)
+
+
+def _absent_note(part: Part) -> Diagnostic:
+    if part.frames is None:
+        return Diagnostic("X003.absent-now", values={"figure": part.actor.name})
+    return Diagnostic("X003.absent", values={"figure": part.frames.name, "frames": _span(part)})
+
+
+def _untracked_note(plan: _Plan) -> list[Diagnostic]:
+    """Return a note about files of untracked people, or about these people in one file."""
+    names = []
+    for each, path in plan.groups:
+        for part in each.parts:
+            person = part.actor.person
+            if part.frames is None or person is None or is_tracked(person):
+                continue
+            if plan.kind.folder:
+                names.append(person_label(person))
+            else:
+                names.append(printable(path.name if len(each.parts) == 1 else part.frames.name))
+    return [Diagnostic("X005.untracked", values={"names": names})] if names else []
+
+
+def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
+    count = sum(len(actor.hidden_parts) for actor in actors)
+    return [Diagnostic("X005.hidden-parts", values={"n": count})] if count else []
 
 
 class _CallableModule(ModuleType):

@@ -11,7 +11,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.template import rendered
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.figure import Figure
@@ -87,7 +87,7 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
     return member
 
 
-def check_unit(options: MotionOptions, title: str) -> None:
+def check_unit(options: ExportOptions, title: str) -> None:
     """Check the requested unit.
 
     Raises RigError for units other than metres.
@@ -96,7 +96,7 @@ def check_unit(options: MotionOptions, title: str) -> None:
         raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
 
 
-def up_axis(options: MotionOptions) -> str:
+def up_axis(options: ExportOptions) -> str:
     """Return the up axis of the file, by default that of the scene.
 
     Raises RigError if the requested axis is neither y nor z; the scene's axis may be negative.
@@ -113,7 +113,7 @@ def family_frames(
     animation: SampledAnimation,
     frames: Frames,
     member: Member,
-    options: MotionOptions,
+    options: ExportOptions,
     model: str = "",
 ) -> tuple[FamilyFrames, list[Diagnostic]]:
     """Return an animation as parameters of the family.
@@ -222,7 +222,7 @@ def _losses(frames: Frames, skeleton: Skeleton, moved: Floats) -> list[Diagnosti
     return notes
 
 
-def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
+def read_frames(motion: BodyMotion, animation: SampledAnimation, options: ExportOptions) -> Frames:
     """Return the poses in a file for an animation's figure, in the animation's world and unit.
 
     ``motion``: the read motion, in metres.

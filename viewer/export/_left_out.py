@@ -10,8 +10,11 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.animation_choice import animation_labels
-from viewer.rig.motion.evaluation import Frames, JointMotion
+from viewer.rig.motion.evaluation import Frames, JointMotion, frame_rate
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.transform_keys.rate import is_regular
 
 _NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
 
@@ -75,3 +78,18 @@ def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnosti
     if not names:
         return []
     return [Diagnostic("X003.other-animations", values={"names": names, "n": len(names)})]
+
+
+def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
+    """Return a note about the rate that was chosen for keys at irregular times."""
+    motion, rate = animation.motion, animation.frame_rate
+    if not isinstance(motion, TransformClip) or is_regular(motion) or rate != frame_rate(motion):
+        return []
+    return [Diagnostic("X005.irregular-keys", values={"rate": rate})]
+
+
+def motion_notes(animation: SampledAnimation) -> list[Diagnostic]:
+    """Return notes about the rate of a motion, and other animations, unless it is a single pose."""
+    if animation.frames.n_frames == 1:
+        return []
+    return rate_note(animation) + other_animations_note(animation.figure, animation.motion)

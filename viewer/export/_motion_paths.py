@@ -8,18 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError
+from viewer.export._exporter import Exporter, Part
 from viewer.export._gaps import runs
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.phrases import printable
 from viewer.rig.captures.person import person_name
-from viewer.rig.captures.sampled_points import SampledPoints
-from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 
 PERSON = "{person}"
 """Placeholder in file names for the number of a person or actor."""
-
-_WITHOUT_SPLITS = ("npz",)  # exporters that write one file despite gaps
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
@@ -45,12 +42,31 @@ def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
     return [output.with_name(f"{output.stem}{name}{output.suffix}") for name in names]
 
 
-def is_together(output: Path, options: MotionOptions) -> bool:
-    """Return whether a format that holds several figures gets one file for all of them.
+def is_together(kind: Exporter, output: Path, options: ExportOptions) -> bool:
+    """Return whether all actors are written to one file, or folder.
 
-    This is not the case if the name has ``{person}``, or if motions are split at their gaps.
+    They have separate files if the format holds only one, if the name has ``{person}``, or if
+    motions are split at their gaps.
     """
-    return PERSON not in output.name and options.closing != "split"
+    is_apart = PERSON in output.name or options.closing == "split"
+    return bool(kind.folder) or (kind.stores_many and not is_apart)
+
+
+def part_paths(
+    kind: Exporter, output: Path, actors: Sequence[Actor], options: ExportOptions
+) -> list[Path]:
+    """Return the file of each actor, or the same one for all."""
+    if is_together(kind, output, options):
+        return [output] * len(actors)
+    return motion_paths(output, actors)
+
+
+def files_at(kind: Exporter, path: Path) -> list[Path]:
+    """Return all files that are written for a path: a folder, or a file and those beside it."""
+    if kind.folder:
+        return [path / kind.folder]
+    suffixes = kind.written.get(path.suffix.lower(), ("",))
+    return [path.with_suffix(each) if each else path for each in suffixes]
 
 
 def split_paths(path: Path, count: int) -> list[Path]:
@@ -75,24 +91,18 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
     return files
 
 
-def animation_files(
-    animation: SampledAnimation | SampledPoints, path: Path, key: str, options: MotionOptions
-) -> list[Path]:
-    """Return all files that ``export_animation`` writes for a requested name.
+def part_files(kind: Exporter, part: Part, path: Path, options: ExportOptions) -> list[Path]:
+    """Return all files that are written for a part: several if it is split, or one per frame.
 
-    ``animation``: the motion.
-    ``path``: the requested file, with ``{frame}`` for numbered files.
-    ``key``: a key of ``EXPORTERS``, except those that write a folder.
-    ``options``: options of the export.
+    ``path``: its file, with ``{frame}`` for numbered files.
     """
-    if isinstance(animation, SampledPoints) or key in _WITHOUT_SPLITS:
-        return [path]
-    present = animation.frames.present
-    if key == "obj":
+    if part.content == "frames" and kind.is_numbered:
+        present, first = part.present, part.animation.first_frame
         is_whole = options.gaps in ("hold", "interpolate")
-        frames = np.arange(len(present)) if is_whole else np.flatnonzero(present)
-        return numbered_paths(path, animation.first_frame + frames)
-    is_split = options.closing == "split" and not present.all()
-    files = split_paths(path, len(runs(present)) if is_split else 1)
-    beside = [file.with_suffix(".bin") for file in files if file.suffix.lower() == ".gltf"]
-    return files + beside
+        return numbered_paths(
+            path, first + (np.arange(len(present)) if is_whole else np.flatnonzero(present))
+        )
+    paths = [path]
+    if part.content == "frames" and not kind.keeps_gaps and options.closing == "split":
+        paths = split_paths(path, len(runs(part.present)))
+    return [file for each in paths for file in files_at(kind, each)]

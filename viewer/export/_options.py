@@ -1,4 +1,4 @@
-"""Options of motion export; each exporter uses the options of its format."""
+"""Options of exports; each exporter uses the options of its format."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAFE_NAMES = (
     "write joint names with letters, digits and underscores only, each name once, for programs "
     "that cannot read others; changed names are listed"
 )
-"""What ``MotionOptions.safe_names`` does, for the help of the option and of the check box."""
+"""What ``ExportOptions.safe_names`` does, for the help of the option and of the check box."""
 
 _CLOSED = "hold"  # default of formats that do not support missing frames
 
@@ -44,9 +44,11 @@ class VrmMeta:
 
 
 @dataclass(slots=True)
-class MotionOptions:
-    """Options for writing a motion."""
+class ExportOptions:
+    """Options for writing poses and motions."""
 
+    kind: str = ""
+    """A key of ``EXPORTERS``; empty for the one that suits the suffix and the figures."""
     unit: str = ""
     """A key of ``viewer.rig.units.METRES``; empty for the format's default."""
     up: str = ""
@@ -71,6 +73,8 @@ class MotionOptions:
     """Skinning method and options, if vertices are written."""
     optimizes: bool = False
     """Quantise the vertices of glTF files."""
+    meta: VrmMeta = field(default_factory=VrmMeta)
+    """Name, authors and licence of a VRM character."""
 
     @property
     def closing(self) -> str:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._family import (
     FamilyFrames,
     check_unit,
@@ -32,7 +33,7 @@ from viewer.export._gaps import filled, gaps_note, runs
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import GAPS, MotionOptions
+from viewer.export._options import GAPS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.rig.arrays import Floats
@@ -50,9 +51,7 @@ _CLOSED = {
 _TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write a motion in its own world unless another up axis is requested.
 
     ``path``: the file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
@@ -61,6 +60,7 @@ def export_animation(
     joints or an unknown unit, a unit other than metres is requested, or no frame is present. Raises
     ``OutputError`` if a file cannot be written.
     """
+    animation = selection.part.animation
     notes = write_layout(animation, path, options, "AMASS", _arrays)
     if len(animation.frames.shape_weights) > 1:
         notes.append(Diagnostic("X005.shape-rows"))
@@ -73,9 +73,9 @@ def require(figure: Figure) -> None:
 
 
 def write_layout(
-    animation: SampledAnimation, path: Path, options: MotionOptions, title: str, layout: Layout
+    animation: SampledAnimation, path: Path, options: ExportOptions, title: str, layout: Layout
 ) -> list[Diagnostic]:
-    """Write a motion as arrays in the layout of a format; see ``export_animation``.
+    """Write a motion as arrays in the layout of a format; see ``export``.
 
     ``title``: name of the format, for messages.
     ``layout``: returns the arrays of a range of rows.
@@ -87,8 +87,6 @@ def write_layout(
         raise RigError(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
-    if not present.any():
-        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     frames = filled(animation.frames, options.closing == "interpolate")
     model = title if title == "SMPL-X" else member.title
     body, notes = family_frames(animation, frames, member, options, model)

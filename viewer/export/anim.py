@@ -9,12 +9,13 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._gaps import filled, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import between_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import GAPS, MotionOptions
+from viewer.export._options import GAPS, ExportOptions
 from viewer.export.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.rig.arrays import Floats
@@ -32,10 +33,8 @@ _BLOCK = 4096  # frames measured per block
 _SAME = 1e-9  # tolerance, in frames or length units
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
-    """Write a motion as a clip of keys, see ``viewer.export.export_animation``.
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write a motion as a clip of keys, see ``viewer.export.export``.
 
     A keyframed clip that is requested as a whole is written exactly, with its own keys. Any other
     motion gets a key per frame, with linear or smooth tangents, whichever give the smaller joint
@@ -47,6 +46,7 @@ def export_animation(
     that the format cannot store. Raises ``RigError`` if the figure has other DOFs, or no frame is
     present. Raises ``OutputError`` if a file cannot be written.
     """
+    animation = selection.part.animation
     figure, frames = animation.figure, animation.frames
     require(figure)
     skeleton = figure.require_skeleton()
@@ -54,8 +54,6 @@ def export_animation(
         raise RigError(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
-    if not frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     if isinstance(animation.motion, Clip) and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
             write(animation.motion, path)
@@ -78,7 +76,7 @@ def require(figure: Figure) -> None:
 
 
 def _export_frames(
-    animation: SampledAnimation, skeleton: Skeleton, path: Path, options: MotionOptions
+    animation: SampledAnimation, skeleton: Skeleton, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
     """Write a key per frame, in one file or one for each run of frames."""
     frames = animation.frames
@@ -111,7 +109,7 @@ def _export_frames(
 
 
 def _losses(
-    animation: SampledAnimation, source: Source, span: tuple[int, int], options: MotionOptions
+    animation: SampledAnimation, source: Source, span: tuple[int, int], options: ExportOptions
 ) -> list[Diagnostic]:
     """Read a file back and return notes about its errors on and between the frames.
 
@@ -134,7 +132,7 @@ def _middles(times: Floats) -> Floats:
     return 0.5 * (times[1:] + times[:-1])
 
 
-def _remarks(animation: SampledAnimation, options: MotionOptions) -> list[Diagnostic]:
+def _remarks(animation: SampledAnimation, options: ExportOptions) -> list[Diagnostic]:
     frames, first = animation.frames, animation.first_frame
     notes = gaps_note(frames.present, first, options.closing, interpolate="interpolated")
     return notes + _left_out(animation.figure, frames)

@@ -28,6 +28,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError, RigError
+from viewer.export._exporter import Selection
 from viewer.export._family import (
     FamilyFrames,
     check_unit,
@@ -37,9 +38,10 @@ from viewer.export._family import (
     up_axis,
 )
 from viewer.export._gaps import kept_gaps, kept_note
-from viewer.export._losses.between import rate_note, resampling_losses
+from viewer.export._left_out import rate_note
+from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.formats._text.number_text import fixed_texts
 from viewer.interrupts import hold, poll
 from viewer.media.unfinished import new_prefix
@@ -61,20 +63,8 @@ _DIGITS = 7  # decimals, as in EasyMocap's newer writer
 _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
-    """Write one person, with number 0; see ``export_animations``."""
-    return export_animations([animation], path, options)
-
-
-def export_animations(
-    animations: Sequence[SampledAnimation],
-    path: Path,
-    options: MotionOptions,
-    persons: Sequence[int] | None = None,
-) -> list[Diagnostic]:
-    """Write several people into one folder, with seven decimals.
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write people into one folder, with seven decimals.
 
     Frames keep the numbers of the animations. Frames without people contain an empty list.
 
@@ -87,7 +77,14 @@ def export_animations(
     frame is present. Raises ``OutputError`` if the folder cannot be written, or contains other
     files.
     """
-    persons = range(len(animations)) if persons is None else persons
+    ups = sorted({part.up for part in selection.parts})
+    if len(ups) > 1:
+        raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")
+    animations = [part.animation for part in selection.parts]
+    persons = [
+        index if actor.person is None else actor.person
+        for index, actor in enumerate(selection.actors)
+    ]
     check_unit(options, "EasyMocap")
     _check(animations, persons)
     people: list[_Person] = []
@@ -156,7 +153,7 @@ class _Person:
         self.again.add(text)
         return text
 
-    def losses(self, path: Path, options: MotionOptions) -> list[Diagnostic]:
+    def losses(self, path: Path, options: ExportOptions) -> list[Diagnostic]:
         """Return notes with the largest errors, if there are any."""
         place = np.maximum(np.cumsum(self.animation.frames.present) - 1, 0)
         found = read_frames(self.again.motion(self.animation.frame_rate), self.original, options)
@@ -166,9 +163,7 @@ class _Person:
 
 
 def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> None:
-    if not animations:
-        raise RigError("expected at least one person to write, found none")
-    if len(set(persons)) < len(animations) or len(persons) != len(animations):
+    if len(set(persons)) < len(animations):
         raise RigError(
             f"expected a number for each of {len(animations)} people, found {list(persons)}"
         )
@@ -180,10 +175,6 @@ def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> No
         if animation.first_frame < 0:
             raise RigError(
                 f"{animation.name}: expected frame numbers from 0, found {animation.first_frame}"
-            )
-        if not animation.frames.present.any():
-            raise RigError(
-                f"{animation.name}: every frame is missing, so there is nothing to write"
             )
 
 

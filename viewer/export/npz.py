@@ -28,9 +28,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._gaps import kept_gaps
 from viewer.export._losses.posed import PoseLosses
-from viewer.export._options import QUATERNIONS, MotionOptions
+from viewer.export._options import QUATERNIONS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
@@ -42,12 +43,16 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.evaluation import pose_of, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
 from viewer.rig.posing.pose_vector import write_vector
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rig.skinning import deform, joint_matrices
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write float64 arrays in the figure's own space and unit; see ``viewer.export.export``."""
+    if isinstance(selection.part.frames, SampledPoints):
+        return _export_points(selection.part.frames, path, options)
+    if selection.part.frames is not None:
+        return _export_frames(selection.part.animation, path, options)
+    actor, skinning = selection.part.actor, options.skinning
     figure, pose, mesh = actor.figure, actor.pose, actor.figure.mesh
     arrays = {
         "name": np.array(figure.name),
@@ -83,10 +88,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     return [Diagnostic("X001.arrays", path, values={"names": [*arrays]}), *notes]
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
+def _export_frames(
+    animation: SampledAnimation, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
-    """Write float64 arrays of all frames; see ``viewer.export.export_animation``."""
+    """Write float64 arrays of all frames; see ``viewer.export.export``."""
     figure = animation.figure
     _check(animation.name, animation.frames.present, figure.unit, options)
     up = options.up or options.world_up
@@ -133,7 +138,7 @@ def export_animation(
 
 
 def _motion_losses(
-    animation: SampledAnimation, again: Archive, path: Path, options: MotionOptions
+    animation: SampledAnimation, again: Archive, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
     """Return a note with the largest errors of a file that was read back, in its own frames."""
     figure, frames, up = animation.figure, animation.frames, options.up or options.world_up
@@ -158,7 +163,9 @@ def _read(archive: Archive, key: str) -> Floats | None:
     return np.asarray(values.values(), dtype=np.float64)
 
 
-def export_points(animation: SampledPoints, path: Path, options: MotionOptions) -> list[Diagnostic]:
+def _export_points(
+    animation: SampledPoints, path: Path, options: ExportOptions
+) -> list[Diagnostic]:
     """Write captured points of all frames as float64 arrays.
 
     ``path``: the file to write, replaced if it exists. ``options``: options; ``world_up`` is
@@ -192,7 +199,7 @@ def _turn(up: str) -> Floats:
     return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
 
 
-def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None:
+def _check(name: str, present: Bools, unit: str, options: ExportOptions) -> None:
     """Raise RigError if another unit or an unknown axis is requested, or no frame is present."""
     if options.unit not in ("", unit):
         raise RigError(
@@ -203,8 +210,6 @@ def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None
     if options.quaternions not in QUATERNIONS:
         known = " or ".join(QUATERNIONS)
         raise RigError(f'quaternions: expected {known}, found "{options.quaternions}"')
-    if not present.any():
-        raise RigError(f"{name}: every frame is missing, so there is nothing to write")
 
 
 def _point_arrays(

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export import MotionOptions
-from viewer.export._exporter import require_mesh
+from viewer.export._exporter import Selection, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._losses.posed import PoseLosses, look_at_mesh
 from viewer.export._motion_paths import numbered_paths
+from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, free_path, save_bytes, save_parts
 from viewer.formats._text.number_text import row_texts
 from viewer.media.png import encode_png
@@ -48,8 +48,11 @@ _MAPS = {
 _ONE_NUMBER = ("metallic_texture", "roughness_texture")
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write ``v``, ``vt``, ``vn`` and triangles; see ``viewer.export.export``."""
+    if selection.part.frames is not None:
+        return _export_frames(selection.part.animation, path, options)
+    actor, skinning = selection.part.actor, options.skinning
     losses = PoseLosses(actor.figure, skinning)
     odd, textures = _write(actor, path, skinning, losses)
     figure, mesh = actor.figure, actor.figure.require_mesh()
@@ -58,10 +61,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     return notes + _changed(figure)
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
+def _export_frames(
+    animation: SampledAnimation, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
-    """Write one numbered file per frame; see ``viewer.export.export_animation``.
+    """Write one numbered file per frame; see ``export``.
 
     ``{frame}`` in the name is replaced by the frame number, as in ``walk_{frame:05}.obj``. Missing
     frames have no file unless ``options.gaps`` requests holding or interpolation.

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._exporter import require_mesh
+from viewer.export._exporter import Selection, require_mesh
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._losses.posed import mesh_losses
+from viewer.export._options import ExportOptions
 from viewer.formats import Source, save_bytes
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import Mesh, bounding_box, box_size
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning, deform
+from viewer.rig.skinning import deform
 from viewer.rig.srgb import encode_srgb
 from viewer.rig.units import UNIT_NAMES
 
@@ -24,12 +24,13 @@ _TYPES = {"float": "<f4", "double": "<f8"}
 _COLORS = ("red", "green", "blue", "alpha")
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write positions, normals and triangles; see ``viewer.export.export``.
 
     Numbers are single precision, unless that moves a vertex by more than a millionth of the
     figure's size: far from the origin, positions are written in double precision.
     """
+    actor, skinning = selection.part.actor, options.skinning
     require_mesh(actor, ".ply")
     mesh = actor.figure.require_mesh()
     positions, normals = deform(actor.figure, actor.pose, skinning)

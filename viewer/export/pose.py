@@ -8,27 +8,30 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._left_out import not_held_note
 from viewer.export._losses.posed import PoseLosses
+from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, write
 from viewer.formats.pose import read
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.posing.pose_record import apply_record, record_of
-from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.skinning import Skinning, deform, joint_matrices
+from viewer.rig.skinning import deform, joint_matrices
 
 _TURNED = 1e-6  # difference of rotation matrices, larger than the rounding of angles
 _SAME = 1e-9  # difference of a number up to which it counts as stored
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write a pose that ``--pose`` and the window read; see ``viewer.export.export``.
 
     The file is read back and applied to the figure at rest. ``.json`` holds the whole pose,
     ``.txt`` only the numbers of the model's pose vector.
     """
+    actor, skinning = selection.part.actor, options.skinning
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no skeleton and therefore no pose")

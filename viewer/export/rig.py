@@ -12,8 +12,10 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.posed import PoseLosses
+from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, free_path, keeping_written, read, write
 from viewer.formats.skel import KEYWORDS
 from viewer.formats.skin import lost_parts
@@ -39,15 +41,17 @@ _SAME = 1e-12  # tolerance of rotation matrices and scales
 _CUBE = 0.01  # half the edge length of default boxes, relative to the skeleton's size
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write skeleton and skin, read them back, and report the error of the posed mesh.
 
     The shape is applied to the rest mesh, the pose becomes the file's pose, and the figure's
     translation is added to the root's offset.
     """
+    actor, skinning = selection.part.actor, options.skinning
     figure, pose = actor.figure, actor.pose
-    require(figure)
-    assert figure.skeleton is not None and pose is not None  # figures with joints have a pose
+    if figure.skeleton is None:
+        raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
+    assert pose is not None  # figures with joints have a pose
     course, rig, sources = _as_rig(actor, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
     rig = _with_picture_names(rig, skin)
@@ -64,12 +68,6 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
             counts = {"before": figure.mesh.n_vertices, "after": rig.mesh.n_vertices}
             notes.append(Diagnostic("X005.seams", values=counts))
     return notes + _changed(actor, course) + _lost(figure) + error
-
-
-def require(figure: Figure) -> None:
-    """Raise RigError for a figure that the format cannot hold."""
-    if figure.skeleton is None:
-        raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:

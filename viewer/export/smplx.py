@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
+from viewer.export._exporter import Selection
 from viewer.export._family import FamilyFrames, member_of_figure
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.export.amass import padded, write_layout
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
-from viewer.rig.motion.sampled_animation import SampledAnimation
 
 _MEMBER = FAMILY[55]
 _PARTS = {
@@ -40,15 +40,14 @@ _PARTS = {
 """Joints of each array, in the order of SMPL-X."""
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write a motion of a body of the family, z up unless another up axis is requested.
 
     ``path``: the file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
     Returns notes: the written files, then the data that the format cannot store. Raises ``RigError,
-    OutputError``: as for ``viewer.export.amass.export_animation``.
+    OutputError``: as for ``viewer.export.amass.export``.
     """
+    animation = selection.part.animation
     wanted = replace(options, up=options.up or "z")
     notes = write_layout(animation, path, wanted, "SMPL-X", _arrays)
     if len(animation.frames.shape_weights) > 1:

@@ -17,9 +17,10 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note
 from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.vrm.humanoid import bone_above, human_bones
 from viewer.export.vrm.made import PRESETS
@@ -39,18 +40,15 @@ from viewer.rig.units import METRES
 _EXTENSION = "VRMC_vrm_animation"
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
-    """Write the motion of a humanoid; see ``viewer.export.export_animation``.
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write the motion of a humanoid; see ``viewer.export.export``.
 
     Raises ``RigError`` if the figure lacks a required bone, no frame is present, or gaps are to be
     split. Raises ``OutputError`` if the file cannot be written.
     """
+    animation = selection.part.animation
     if options.closing == "split":
         raise RigError("gaps of .vrma: expected hold or interpolate, found split")
-    if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     bones = human_bones(animation.figure)
     figure, frames = _unhidden(
         animation.figure, filled(animation.frames, options.closing == "interpolate")

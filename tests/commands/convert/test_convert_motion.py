@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from app.tiny import write_rig
 from export.gltf.two_parts import two_parts
+from exporting import export_clips
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.export import export_clips
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor
 

@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from export.seamed import UVS, seamed_mesh
+from exporting import export_clips, export_figures
 from formats.gltf.files import File, animated, skinned
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 import viewer
-from viewer.export import export, export_clips, export_figures
+from viewer.export import export
 from viewer.formats._source import Source
 from viewer.formats.gltf import read_nodes
 from viewer.rig.figure import Figure

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from exporting import export_clips
 from numpy.testing import assert_allclose, assert_array_equal
 from two_parts import clips, quaternions, two_parts
 
 import viewer
-from viewer.export import export_clips
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rig.scene import Actor, Scene
@@ -221,9 +221,7 @@ def test_times_below_zero_delay_the_animation(tmp_path):
 
 def test_animation_without_channels_of_the_figure_is_reported(tmp_path):
     # An animation of a file may move only other figures, or a mesh that is not drawn.
-    notes = export_clips(
-        Actor(two_parts()), tmp_path / "a.glb", None, [TransformClip("x", (), 0, 1)]
-    )
+    notes = export_clips(Actor(two_parts()), tmp_path / "a.glb", [TransformClip("x", (), 0, 1)])
     assert "animations" not in Plain(tmp_path / "a.glb").root
     assert [note.key for note in notes if note.code == "X003"] == ["X003.idle-animations"]
 

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from exporting import export_clips
 from numpy.testing import assert_allclose
 from two_parts import two_parts
 
 import viewer
-from viewer.export import export, export_clips
+from viewer.export import export
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from exporting import export_clips, export_figures
 from formats.gltf.spec_evaluator import Evaluator
 from numpy.testing import assert_allclose
 from two_parts import clips, two_parts
 
 import viewer
-from viewer.export import export_clips, export_figures
 from viewer.rig.captures.cameras import CameraView
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
@@ -48,7 +48,7 @@ def test_figures_are_placed_as_in_the_scene(tmp_path: Path, optimizes: bool, up:
     turned = np.linalg.inv(UP) if up == "z" else np.eye(4)
     placed = [replace(each, placement=turned @ each.placement) for each in actors]
     scene = Scene(placed, world_up=up)
-    notes = export_figures(placed, path, None, every, scene, optimizes=optimizes)
+    notes = export_figures(placed, path, every, scene, optimizes=optimizes)
     assert [note.key for note in notes if note.code == "X001"] == ["X001.gltf-figures"]
     assert not [note for note in notes if note.values.get("distance", 0.0) > 1e-3]
     plain = Evaluator(path)
@@ -82,7 +82,7 @@ def test_sizes_are_in_metres_whatever_the_unit_of_the_scene(
     first, second = (replace(two_parts(), unit=unit) for unit in units)
     actors, path = [Actor(first), Actor(second, placement=scaled)], tmp_path / "both.glb"
     every = [[each.clip() for each in actor.figure.animations] for actor in actors]
-    export_figures(actors, path, None, every, Scene(actors))
+    export_figures(actors, path, every, Scene(actors))
     expected = np.concatenate([metres[0] * posed(actor, 1, 0.6) for actor in actors])
     found = np.concatenate(Evaluator(path).meshes(1, 0.6))
     apart = np.linalg.norm(found[:, None] - expected, axis=2)
@@ -92,7 +92,7 @@ def test_sizes_are_in_metres_whatever_the_unit_of_the_scene(
 def test_animations_of_different_length_remain_separate(tmp_path: Path) -> None:
     longer = [replace(clip, end=clip.end + 1.0) for clip in clips()]
     actors, path = [Actor(two_parts()), Actor(two_parts())], tmp_path / "both.glb"
-    export_figures(actors, path, None, [clips(), longer])
+    export_figures(actors, path, [clips(), longer])
     names = [each["name"] for each in Evaluator(path).root["animations"]]
     assert names == ["wave", "jump", "wave", "jump"]
 
@@ -103,7 +103,7 @@ def test_cameras_are_read_back(tmp_path: Path) -> None:
     view = CameraView("front", intrinsic, turn, np.array([0.1, 0.2, 5.0]), (800, 600))
     lens = replace(view, name="lens", distortion=np.array([0.1]), near=0.25, far=40.0)
     path = tmp_path / "seen.glb"
-    notes = export_figures([Actor(two_parts())], path, None, None, Scene([], views=(view, lens)))
+    notes = export_figures([Actor(two_parts())], path, None, Scene([], views=(view, lens)))
     (lost,) = [note for note in notes if note.key == "X003.camera-lenses"]
     assert lost.values["names"] == ["lens"]
     camera = Evaluator(path).root["cameras"][0]["perspective"]

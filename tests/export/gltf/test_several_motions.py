@@ -13,8 +13,7 @@ from two_parts import two_parts
 
 import viewer
 from viewer.errors import RigError
-from viewer.export import MotionOptions
-from viewer.export.gltf import export_animations
+from viewer.export import ExportOptions, Part, Selection, export
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.sampled_animation import upright_animation
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -63,9 +62,10 @@ def crowd() -> Scene:
 
 
 def write(scene: Scene, path: Path, **options: str) -> list:
-    chosen = MotionOptions(**options)
-    motions = [(each, *upright_animation(scene, each)) for each in scene.actors[:2]]
-    return export_animations(motions, path, chosen, scene, scene.actors[2:])
+    chosen = ExportOptions(**options)
+    parts = [Part(each, None, *upright_animation(scene, each)) for each in scene.actors[:2]]
+    parts += [Part(each) for each in scene.actors[2:]]
+    return export(Selection(parts, scene), path, options=chosen)
 
 
 def apart(one: np.ndarray, two: np.ndarray) -> float:
@@ -104,8 +104,8 @@ def test_sizes_are_in_metres_whatever_figure_is_written_first(tmp_path, unit):
     clip = moving("take", [True] * 3, 1.0)
     mover = Actor(chain(other), clip=clip, placement=scaled)
     scene = Scene([Actor(replace(chain(unit), name="post")), mover])
-    motions = [(mover, *upright_animation(scene, mover))]
-    export_animations(motions, tmp_path / "both.glb", MotionOptions(), scene, scene.actors[:1])
+    parts = [Part(mover, None, *upright_animation(scene, mover)), Part(scene.actors[0])]
+    export(Selection(parts, scene), tmp_path / "both.glb")
     found = np.concatenate(Evaluator(tmp_path / "both.glb").meshes(0, 0.1))
     metres = 1.0 if unit == "m" else 0.01
     points = np.concatenate([expected(scene.actors[0], 0, 0.0), expected(mover, 1, 1.0)])

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from exporting import export_frames
 from rig import hand_made
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.clip import Channel, Clip, evaluate
@@ -22,7 +23,7 @@ TOLD = 5e-3  # messages have three digits
 
 
 def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> list[Diagnostic]:
-    return export_animation(animation, folder / name, kind, MotionOptions())
+    return export_frames(animation, folder / name, kind, ExportOptions())
 
 
 def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 3, 4)) -> Actor:

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from export.vrm.test_vrm_export import Written
+from exporting import export_frames
 from formats.vrm.swinging import BONES, swinging
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
 from viewer.diagnostics import Diagnostic
-from viewer.export import MotionOptions, export_animation
+from viewer.export import ExportOptions
 from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.single_frame import single_frame
@@ -124,4 +125,4 @@ def test_scale_that_the_format_cannot_hold_is_reported(tmp_path: Path) -> None:
 
 
 def _exported(actor: Actor, path: Path) -> list[Diagnostic]:
-    return export_animation(single_frame(actor), path, "vrma", MotionOptions())
+    return export_frames(single_frame(actor), path, "vrma", ExportOptions())

@@ -21,18 +21,18 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
+    FOLDER,
     Exporter,
-    MotionOptions,
-    animation_for,
-    check_figure,
-    export_animation,
-    export_clips,
-    export_figures,
+    ExportOptions,
+    Part,
+    Selection,
+    export,
+    exporters_at,
+    sampled,
     suited_exporter,
 )
-from viewer.export._motion_paths import is_together, motion_paths
+from viewer.export._motion_paths import files_at, is_together, motion_paths, part_paths
 from viewer.export._options import SAFE_NAMES
-from viewer.export.gltf.sampled import placed_actor
 from viewer.export.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import printable
@@ -46,15 +46,9 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.timing import frame_at
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.upright import upright_actor
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
 
-_MANY = (".obj",)  # one file per frame: exported by the command line only
-_ALL_ANIMATIONS = (".gltf", ".glb")  # these contain all animations of a figure, not only one
-_FRAMES = "smpl"  # folder of the frames within a capture's folder
-FOLDER = "/"
-"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
 N_ROWS = 6.5
 """Height of the list in lines: half a line shows that the list continues."""
 _COLUMNS = (("Format", 0.3), ("Keeps", 0.4), ("Omits", 0.3))
@@ -69,7 +63,7 @@ class _Selection:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
+class _Motion:
     """One actor to export: its state at the start of the export, target file and frames.
 
     ``saved``: the edited clips and the pose that the file will contain.
@@ -79,7 +73,6 @@ class _Part:
     path: Path
     frames: tuple[int, int] | None
     rate: float | None
-    number: int
     saved: tuple[object, ...]
 
 
@@ -130,7 +123,8 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
     actor = _first(state, selection)
     _draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))
     suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
-    why = "" if suffix == ".bvh" else "for .bvh only"
+    kinds = exporters_at(f"motion{suffix}")
+    why = "" if any("safe_names" in kind.options for kind in kinds) else "for .bvh only"
     selection.safe_names = checkbox(state, "Safe names", selection.safe_names, why)
     explain(SAFE_NAMES, why)
 
@@ -142,10 +136,9 @@ def _moving_actors(state: AppState) -> list[Actor]:
 
 def motion_suffixes() -> tuple[str, ...]:
     """Return the suffixes of files that contain one actor's motion; the default is first."""
-    kinds = [kind for kind in EXPORTERS.values() if kind.writes_motion]
-    found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
-    others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
-    return (".bvh", *(suffix for suffix in others if suffix != ".bvh"))
+    kinds = [kind for kind in EXPORTERS.values() if kind.stores_motion and not kind.is_numbered]
+    found = dict.fromkeys(suffix for kind in kinds if not kind.folder for suffix in kind.suffixes)
+    return (".bvh", *(suffix for suffix in found if suffix != ".bvh"))
 
 
 def motion_formats(actor: Actor) -> dict[str, Exporter]:
@@ -154,43 +147,38 @@ def motion_formats(actor: Actor) -> dict[str, Exporter]:
         suffix: EXPORTERS[suited_exporter(f"motion{suffix}", actor.figure)]
         for suffix in motion_suffixes()
     }
-    return {**found, FOLDER: EXPORTERS["easymocap"]}
+    return {**found, FOLDER: EXPORTERS[suited_exporter("motion", actor.figure)]}
 
 
 def unsuited_formats(actor: Actor) -> dict[str, str]:
     """Return the reasons why formats cannot store the motion of an actor, by suffix."""
-    skeleton = actor.figure.skeleton
-    is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
-    found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
+    skeleton, whys = actor.figure.skeleton, dict[str, str]()
+    if skeleton is None or member_of(tuple(skeleton.parents.tolist())) is None:
+        whys["smpl"] = "for bodies of the SMPL family only"
     if skeleton is not None and not is_humanoid(actor.figure):
-        found[".vrma"] = "for humanoids only: some human bones were not found"
-    return found
+        whys["human"] = "for humanoids only: some human bones were not found"
+    formats = motion_formats(actor)
+    return {suffix: whys[kind.joints] for suffix, kind in formats.items() if kind.joints in whys}
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
-    """Return all files that are written for a name.
+    """Return all files that are written for a name, or the folder of frames.
 
-    ``path``: a file, or a folder: a name without suffix. ``everyone``: whether all actors are
-    written, or only the chosen one. Returns one file per actor, or one for all if the format holds
-    several figures, and a ``.bin`` next to each ``.gltf``; for a folder, its folder of frames.
+    ``state``: state with the scene and the chosen actor. ``path``: a file, or a folder: a name
+    without suffix. ``everyone``: whether all actors are written, or only the chosen one.
     """
-    if not path.suffix:
-        return [path / _FRAMES]
     actors = _moving_actors(state) if everyone else [state.actor]
-    paths = _paths(path, actors) if actors else []
-    beside = [file.with_suffix(".bin") for file in paths if file.suffix.lower() == ".gltf"]
-    return [*paths, *beside]
+    kinds = [kind for kind in exporters_at(path) if kind.stores_motion]
+    if not kinds or not actors:
+        return [path]
+    paths = part_paths(kinds[0], path, actors, ExportOptions())
+    return [*dict.fromkeys(file for each in paths for file in files_at(kinds[0], each))]
 
 
 def _is_one_file(path: Path) -> bool:
-    """Return whether a name selects one file with all actors."""
-    kinds = [kind for kind in EXPORTERS.values() if path.suffix.lower() in kind.suffixes]
-    return any(kind.writes_several for kind in kinds) and is_together(path, MotionOptions())
-
-
-def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
-    """Return the distinct files of actors."""
-    return [path] if _is_one_file(path) else motion_paths(path, actors)
+    """Return whether a name selects one file, or folder, with all actors."""
+    kinds = [kind for kind in exporters_at(path) if kind.stores_motion]
+    return any(is_together(kind, path, ExportOptions()) for kind in kinds)
 
 
 def save_motion(
@@ -203,14 +191,14 @@ def save_motion(
     ``path``: target, whose suffix selects the format; without a suffix, it is an EasyMocap folder.
     Either all files are written or none. ``everyone``: whether all actors are written, or only the
     chosen one. Folders, and formats that hold several figures, contain all of them, including those
-    that do not move; other formats get one file per actor. ``safe_names``: as in ``MotionOptions``.
+    that do not move; other formats get one file per actor. ``safe_names``: as in ``ExportOptions``.
     """
     if why := no_job_room(state):
         state.error = why
         return
     try:
-        parts, left_out = _parts(state, path, everyone)
-        key = suited_exporter(path, parts[0].actor.figure)
+        motions, counted, left_out = _motions(state, path, everyone)
+        kind = suited_exporter(path, motions[0].actor.figure)
         files = motion_files(state, path, everyone)
         # The dialog has already asked whether to replace existing files.
         if path.suffix:
@@ -221,51 +209,44 @@ def save_motion(
         state.error = str(problem)
         return
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
-    still = [each.copy() for each in state.scene.actors if everyone and each.clip is None]
-    in_one_file = _is_one_file(path) and (len(parts) + len(still) > 1 or bool(scene.views))
-    known, written = state.of(SavedWork), [one for part in parts for one in part.saved]
-    if in_one_file:
-        written += [
-            SavedPose(each, pose_key(each.pose))
-            for each in state.scene.actors
-            if everyone and each.clip is None and each.pose is not None
-        ]
-    options = MotionOptions(skinning=replace(state.options.skinning), safe_names=safe_names)
-    n_paths = len({part.path for part in parts})
+    options = ExportOptions(kind, skinning=replace(state.options.skinning), safe_names=safe_names)
+    has_still = everyone and "pose" in EXPORTERS[kind].stores and _is_one_file(path)
+    still = [each for each in state.scene.actors if has_still and each.clip is None]
+    known, written = state.of(SavedWork), [one for each in motions for one in each.saved]
+    written += [SavedPose(each, pose_key(each.pose)) for each in still if each.pose is not None]
+    still = [each.copy() for each in still]
+    n_paths = len({each.path for each in motions})
     more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
-    title = f"Writing {printable(parts[0].path.name, 60)}{more}"
+    title = f"Writing {printable(motions[0].path.name, 60)}{more}"
 
     def write(report: Report) -> list[str]:
         def receive(done: int, total: int, unit: str, what: str) -> None:
             report(done, total, f"{title}: {what}" if what else "")
 
-        with receiving(receive):
-            if key == "easymocap":
-                return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
-            with all_or_none(files):
-                if in_one_file:
-                    notes = _write_together(scene, parts, still, path, options)
-                else:
-                    notes = _write(scene, parts, key, options)
+        with receiving(receive), all_or_none(files if path.suffix else []):
+            parts = _parts(scene, motions, still, path, options)
+            notes = export(Selection(parts, scene, counted), path, options=options)
+            if path.suffix:
                 report(1, 1, "")  # as in save_in_background
-                return [*map(str, [*notes, *left_out])]
+            return [*map(str, [*notes, *left_out])]
 
     state.job = CountedJob(title, write, lambda: known.add(*written), "export")
 
 
-def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
-    """Return the parts to write, and notes about omitted actors."""
+def _motions(
+    state: AppState, path: Path, everyone: bool
+) -> tuple[list[_Motion], list[Actor], list[Diagnostic]]:
+    """Return the motions to write, all actors that count in names, and notes about omitted ones."""
     actors = _moving_actors(state) if everyone else [state.actor]
-    is_one = not path.suffix or _is_one_file(path)
-    paths = [path] * len(actors) if is_one else motion_paths(path, actors)
-    parts, notes = list[_Part](), list[Diagnostic]()
-    for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):
+    paths = [path] * len(actors) if _is_one_file(path) else motion_paths(path, actors)
+    motions, counted, notes = list[_Motion](), [*actors], list[Diagnostic]()
+    for index, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
             notes.append(Diagnostic("X003.absent-in-range", values={"figure": actor.name}))
             continue
         # Edits made during the export must not change the written motion.
-        copied = actor.copy()
+        copied = counted[index] = actor.copy()
         copied.figure = with_edited_keys(state.of(Animations), actor)
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None
@@ -277,19 +258,20 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
         is_keyed = isinstance(actor.clip, Clip | TransformClip)
         rate = state.clock.frame_rate if is_keyed else None
         saved = () if frames is not None else _written_keys(state, actor, file)
-        parts.append(_Part(copied, file, frames, rate, number, saved))
-    if not parts:
+        motions.append(_Motion(copied, file, frames, rate, saved))
+    if not motions:
         raise RigError("all actors are absent in the playback range: nothing to export")
     points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
     if everyone and points:
         names = [actor.name for actor in points]
         notes.append(Diagnostic("X003.points", values={"names": names}))
-    return parts, notes
+    return motions, counted, notes
 
 
 def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ...]:
     """Return the edited clips of an actor that a file contains, and the pose under its clip."""
-    has_all = file.suffix.lower() in _ALL_ANIMATIONS and keeps_keys(state.scene, actor)
+    stores_all = any("clips" in kind.stores for kind in exporters_at(file))
+    has_all = stores_all and keeps_keys(state.scene, actor)
     clips = (actor.clip, *(edited_aside(state.of(Animations), actor).values() if has_all else ()))
     if actor.pose is None:
         return clips
@@ -297,67 +279,36 @@ def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ..
     return (*clips, SavedPose(actor, pose_key(state.clock.posed(actor, actor.pose))))
 
 
-def _write(
-    scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions
-) -> list[Diagnostic]:
-    notes: list[Diagnostic] = []
-    for part in parts:
-        check_figure(key, part.actor.figure)
-    for part in parts:
-        if EXPORTERS[key].writes_keys and part.frames is None and keeps_keys(scene, part.actor):
-            actor = upright_actor(scene, part.actor)
-            notes += export_clips(actor, part.path, options.skinning)
-            continue
-        animation, up = animation_for(key, options, scene, part.actor, part.rate, part.frames)
-        notes += export_animation(animation, part.path, key, replace(options, world_up=up))
-    return notes
-
-
-def _write_together(
+def _parts(
     scene: Scene,
-    parts: Sequence[_Part],
+    motions: Sequence[_Motion],
     still: Sequence[Actor],
     path: Path,
-    options: MotionOptions,
-) -> list[Diagnostic]:
-    """Write all actors into one file, with their own keys if all of them have keys.
+    options: ExportOptions,
+) -> list[Part]:
+    """Return what is written: keys if the format holds them, otherwise frames.
 
-    Frames are written instead if an actor begins later than another one, because animations are
-    shared and have no delay.
+    In one file, all actors have keys, or all have frames, as if one of them begins later than
+    another: animations are shared and have no delay.
     """
-    from viewer.export.gltf import export_animations
-
-    has_delays = len({part.actor.offset for part in parts}) > 1
-    is_keyed = all(part.frames is None and keeps_keys(scene, part.actor) for part in parts)
-    if is_keyed and not has_delays:
-        actors = [placed_actor(scene, each) for each in (*(part.actor for part in parts), *still)]
-        clips = [
-            own_animations(each) or None if has_own_animations(each) else None for each in actors
-        ]
-        return export_figures(actors, path, options.skinning, clips, scene)
-    found = [
-        (part.actor, *animation_for("gltf", options, scene, part.actor, part.rate, part.frames))
-        for part in parts
+    kind = EXPORTERS[options.kind]
+    keyed = [
+        "clips" in kind.stores and each.frames is None and keeps_keys(scene, each.actor)
+        for each in motions
     ]
-    return export_animations(found, path, options, scene, still)
-
-
-def _write_capture(
-    scene: Scene, parts: Sequence[_Part], path: Path, options: MotionOptions
-) -> list[Diagnostic]:
-    """Write all actors into one folder."""
-    from viewer.export.easymocap import export_animations
-
-    found = [
-        animation_for("easymocap", options, scene, part.actor, part.rate, part.frames)
-        for part in parts
+    if is_together(kind, path, options):
+        has_delays = len({each.actor.offset for each in motions}) > 1
+        keyed = [all(keyed) and not has_delays] * len(motions)
+    parts = [
+        Part(each.actor, own_animations(each.actor) or None)
+        if is_keyed
+        else sampled(options.kind, options, scene, each.actor, each.rate, each.frames)
+        for each, is_keyed in zip(motions, keyed, strict=True)
     ]
-    ups = sorted({up for _, up in found})
-    if len(ups) > 1:
-        raise RigError(f"expected one up axis for all people, found {' and '.join(ups)}")
-    people = [part.number if part.actor.person is None else part.actor.person for part in parts]
-    animations = [animation for animation, _ in found]
-    return export_animations(animations, path, replace(options, world_up=ups[0]), people)
+    for actor in still:
+        has_keys = all(keyed) and has_own_animations(actor)
+        parts.append(Part(actor, own_animations(actor) or None if has_keys else None))
+    return parts
 
 
 def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
@@ -374,7 +325,7 @@ def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
 
 def pose_formats() -> dict[str, Exporter]:
     """Return the exporters of poses by suffix; none of them keeps a motion then."""
-    kinds = [_of_pose(kind) for kind in EXPORTERS.values() if kind.writes_pose]
+    kinds = [_of_pose(kind) for kind in EXPORTERS.values() if "pose" in kind.stores]
     return {suffix: kind for kind in kinds for suffix in kind.suffixes}
 
 
@@ -393,7 +344,9 @@ def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
     record = state.actor.figure.record
     is_vrm = record is not None and record.vrm is not None
     why = "other figures need an author and a licence, which viewer convert takes"
-    _draw_formats(state, dialog, pose_formats(), {} if is_vrm else {".vrm": why})
+    formats = pose_formats()
+    missing = [suffix for suffix, kind in formats.items() if "meta" in kind.options and not is_vrm]
+    _draw_formats(state, dialog, formats, dict.fromkeys(missing, why))
 
 
 def _draw_formats(

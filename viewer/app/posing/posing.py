@@ -18,7 +18,7 @@ from viewer.app.files.files import Files
 from viewer.app.files.saving import save_files, save_in_background
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
-from viewer.export import export, files_written
+from viewer.export import ExportOptions, Part, Selection, export, files_written
 from viewer.export.pose import export as export_pose
 from viewer.formats import FORMATS, Source, file_stem
 from viewer.rig.arrays import Floats
@@ -254,7 +254,8 @@ def save_pose(state: AppState, path: Path) -> None:
     actor, skinning = state.actor, state.options.skinning
 
     def act() -> None:
-        state.say(*export_pose(actor, path, skinning)[1:])
+        options = ExportOptions(skinning=skinning)
+        state.say(*export_pose(Selection([Part(actor)]), path, options)[1:])
 
     if actor.pose is not None:
         save_files(state, act, [path], _saved(actor))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
+from viewer.export import exporters_at
 from viewer.phrases import printable
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
@@ -27,7 +28,7 @@ def add_spring_argument(group: argparse._ArgumentGroup) -> None:
 
 def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> list[Diagnostic]:
     """Replace motions of figures with spring joints by frames, if requested; return notes."""
-    holds_motion = output.suffix.lower() not in (".vrm", ".vrma")
+    holds_motion = not any(kind.joints == "human" for kind in exporters_at(output))
     actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
     actors = actors if holds_motion else []
     bakes = arguments.springs == "on"

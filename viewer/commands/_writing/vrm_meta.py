@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from viewer.errors import ViewerError
-from viewer.export import VrmMeta
+from viewer.export import VrmMeta, exporters_at
 from viewer.phrases import printable
 
 
@@ -50,7 +50,8 @@ def vrm_meta(arguments: argparse.Namespace, output: Path | None) -> VrmMeta:
     version = getattr(arguments, "vrm_version", None)
     given["--vrm-version"] = version
     named = next((option for option, value in given.items() if value), "")
-    if named and (output is None or output.suffix.lower() != ".vrm"):
+    kinds = [] if output is None else exporters_at(output)
+    if named and not any("meta" in kind.options for kind in kinds):
         suffix = printable(output.suffix) if output is not None and output.suffix else "no suffix"
         raise ViewerError(f"{named}: expected an output with .vrm, found {suffix}")
     return VrmMeta(

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 from viewer.commands._one_pose import asks_one_pose, posed_actors
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.export import EXPORTERS
 from viewer.rig.captures.points import PointClip
 from viewer.rig.scene import Actor, Scene
 
@@ -25,19 +23,6 @@ def left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
     if points:
         notes.append(Diagnostic("X003.keypoints", values={"names": points}))
     return notes
-
-
-def able_actors(actors: Sequence[Actor], key: str) -> tuple[list[Actor], list[Diagnostic]]:
-    """Return the actors whose figures an exporter can write, and notes about the others.
-
-    If there are none, all are returned, and the exporter raises an error.
-    """
-    able = [actor for actor in actors if EXPORTERS[key].holds(actor)]
-    if not able:
-        return list(actors), []
-    part = EXPORTERS[key].needs
-    left = [actor.name for actor in actors if actor not in able]
-    return able, [Diagnostic(f"X003.no-{part}", values={"figure": name}) for name in left]
 
 
 def pose_or_point_actors(scene: Scene) -> list[Actor]:

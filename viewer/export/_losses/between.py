@@ -26,13 +26,12 @@ from viewer.export._losses.skinned import (
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import SHORTEST, Channel, Clip
-from viewer.rig.motion.evaluation import Frames, frame_rate, frames_of
+from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skinning import Skinning
-from viewer.rig.transform_keys.rate import is_regular
 
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
 # Search for the times of the largest errors
@@ -77,14 +76,6 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
         return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
 
     return with_values(between_losses(path, animation, found, how), rate=rate)
-
-
-def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
-    """Return a note about the rate that was chosen for keys at irregular times."""
-    motion, rate = animation.motion, animation.frame_rate
-    if not isinstance(motion, TransformClip) or is_regular(motion) or rate != frame_rate(motion):
-        return []
-    return [Diagnostic("X005.irregular-keys", values={"rate": rate})]
 
 
 def between_losses(

@@ -11,12 +11,13 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.export._exporter import Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
+from viewer.export._options import GAPS, ROTATION_ORDERS, ExportOptions
 from viewer.export.bvh.angles import unrolled
 from viewer.export.bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export.bvh.reading import BvhFile, read_back
@@ -44,9 +45,7 @@ _NO_SIZE = 0.1  # metres: length of an end in a skeleton without bones
 _DEFAULT_END = 1.0  # length of such an end if the unit is unknown
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write a motion, read it back, and report the errors of its joints and of a bound skin.
 
     Offsets are those of the shape in the first present frame. The root has offset 0 and its
@@ -62,9 +61,8 @@ def export_animation(
     the format cannot hold. Raises ``RigError`` if no frame is present, numbers are not finite, or
     an option is unknown. Raises ``OutputError`` if a file cannot be written.
     """
+    animation = selection.part.animation
     check_options(options)
-    if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     reference = int(animation.frames.present.argmax())
     is_split = options.closing == "split" and not animation.frames.present.all()
     frames = filled(animation.frames, options.closing == "interpolate")
@@ -92,7 +90,7 @@ def export_animation(
     return notes + lost + remarks(writer, reference)
 
 
-def check_options(options: MotionOptions) -> None:
+def check_options(options: ExportOptions) -> None:
     """Raise RigError for an option that the format does not have."""
     for what, value, known in (
         ("unit", options.unit, ("", *METRES)),
@@ -114,7 +112,7 @@ def check_finite(animation: SampledAnimation, *parts: Floats) -> None:
         raise RigError(f"{animation.name}: expected finite numbers in every frame")
 
 
-def space_of(figure: Figure, options: MotionOptions) -> Space:
+def space_of(figure: Figure, options: ExportOptions) -> Space:
     """Return the transform to the requested unit and up axis."""
     up = options.up or "y"
     factor = 1.0
@@ -186,7 +184,7 @@ class Writer:
     body: Body
     ends: dict[int, Floats]
     space: Space
-    options: MotionOptions
+    options: ExportOptions
 
     @property
     def names(self) -> tuple[str, ...]:

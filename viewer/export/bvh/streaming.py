@@ -1,6 +1,6 @@
 """Part-by-part export of long motions to ``.bvh``, with memory use independent of their length.
 
-The file and the notes are those of ``viewer.export.bvh.export_animation``.
+The file and the notes are those of ``viewer.export.bvh.export``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.export._losses.lines import JointLosses
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.export.bvh import (
     Writer,
     check_finite,
@@ -53,14 +53,14 @@ class Parts:
     parent."""
 
 
-def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[Diagnostic]:
-    """Write a motion part by part; see ``viewer.export.bvh.export_animation``.
+def export_parts(animation: Parts, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write a motion part by part; see ``viewer.export.bvh.export``.
 
     The parts are read once, or twice if joints with a parent are translated, since a file has
     position channels only for joints that move.
 
-    ``options``: as for ``export_animation``. Raises ``RigError, OutputError``: as for
-    ``export_animation``.
+    ``options``: as for ``export``. Raises ``RigError, OutputError``: as for
+    ``export``.
     """
     check_options(options)
     stream = _Stream(animation, options)
@@ -74,7 +74,7 @@ def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[D
 class _Stream:
     """Text of a file, and its comparison with the motion."""
 
-    def __init__(self, animation: Parts, options: MotionOptions) -> None:
+    def __init__(self, animation: Parts, options: ExportOptions) -> None:
         self._animation, self._options = animation, options
         self.first = next(animation.parts())
         figure, rigged = one_root(self.first.figure, self.first.frames, 0)

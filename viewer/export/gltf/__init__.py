@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.export._exporter import Part, Selection
 from viewer.export._gaps import frames_phrase, runs
-from viewer.export._left_out import other_animations_note
-from viewer.export._losses.between import rate_note, resampling_losses
+from viewer.export._left_out import motion_notes, other_animations_note, rate_note
+from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import MotionOptions
+from viewer.export._options import ExportOptions
 from viewer.export.gltf.body import Body, Built
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.gltf.figures import Added, add_figure, figure_losses, place_figures
@@ -30,13 +31,13 @@ from viewer.export.gltf.materials import material_losses
 from viewer.export.gltf.nodes import Tree, to_metres
 from viewer.export.gltf.reading import GltfFile, parsed
 from viewer.export.gltf.sampled import (
-    PlacedMotion,
     add_sampled,
     common_name,
     motion_remarks,
-    placed_actor,
     sampled_losses,
     sampled_of,
+    seconds_of,
+    start_of,
     written_part,
 )
 from viewer.formats import all_or_none, save_bytes
@@ -45,7 +46,6 @@ from viewer.rig.captures.cameras import CameraPath, CameraView
 from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
-from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene, scene_unit
@@ -63,49 +63,30 @@ _CENTRED = 0.5 + 1e-6
 _EXACT = 1e-9  # tolerance for a matrix that is a rotation
 
 
-def export(
-    actor: Actor,
-    path: Path,
-    skinning: Skinning,
-    optimizes: bool = False,
-    extend: _Extend | None = None,
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write figures in their poses, with their animations, or with frames, and cameras."""
+    if all(part.frames is None for part in selection.parts):
+        return write_poses(selection, path, options)
+    # The cameras of a scene are written together with the joints that carry them.
+    if len(selection.parts) == 1 and not (selection.scene and selection.scene.views):
+        return _write_motion(selection.part, path, options)
+    return _write_motions(selection, path, options)
+
+
+def write_poses(
+    selection: Selection, path: Path, options: ExportOptions, extend: _Extend | None = None
 ) -> list[Diagnostic]:
-    """Write a figure in its current pose; see ``viewer.export.export``.
-
-    ``extend`` adds the extensions of a VRM character, and returns notes about them.
-    """
-    return export_figures([actor], path, skinning, [None], optimizes=optimizes, extend=extend)
-
-
-def export_clips(
-    actor: Actor,
-    path: Path,
-    skinning: Skinning,
-    clips: Sequence[TransformClip],
-    optimizes: bool = False,
-) -> list[Diagnostic]:
-    """Write a figure at rest with its animations; see ``viewer.export.export_clips``."""
-    return export_figures([actor], path, skinning, [clips], optimizes=optimizes)
-
-
-def export_figures(
-    actors: Sequence[Actor],
-    path: Path,
-    skinning: Skinning,
-    clips: Sequence[Sequence[TransformClip] | None],
-    scene: Scene | None = None,
-    optimizes: bool = False,
-    extend: _Extend | None = None,
-) -> list[Diagnostic]:
-    """Write figures and cameras to one file; see ``viewer.export.export_figures``.
+    """Write figures in their poses, or at rest with their animations.
 
     Several figures are placed as in their scene; the placement of a single figure is omitted.
-    ``extend``: as for ``export``.
+    ``extend`` adds the extensions of a VRM character, and returns notes about them.
     """
+    scene, actors, skinning = selection.scene, selection.actors, options.skinning
+    clips = [part.clips for part in selection.parts]
     document = Document(actors[0].figure.name)
     together = Clips(document)
     added = [
-        add_figure(document, actor, skinning, own, together, optimizes)
+        add_figure(document, actor, skinning, own, together, options.optimizes)
         for actor, own in zip(actors, clips, strict=True)
     ]
     first, views = actors[0], [] if scene is None else [*scene.views]
@@ -154,18 +135,12 @@ def _of_figure(actor: Actor, note: Diagnostic) -> Diagnostic:
     return Diagnostic(f"{note.code}.of-figure", note.path, values=values)
 
 
-def export_animation(
-    animation: SampledAnimation, path: Path, options: MotionOptions
-) -> list[Diagnostic]:
-    """Write a figure at rest and its motion; see ``viewer.export.export_animation``.
+def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write a figure at rest and its frames; gaps may be filled, or split into several files.
 
     A changing shape that must be baked into the mesh is taken from the first present frame.
-
-    ``path``: the file; ``gaps="split"`` writes ``name-1.glb``, ``name-2.glb`` … if there are gaps.
-    Returns notes: the written files, then the data that the format cannot store, with errors.
-    Raises ``RigError`` if no frame is present, numbers are not finite, or an option is unknown.
-    Raises ``OutputError`` if a file cannot be written.
     """
+    animation = part.animation
     sampled = sampled_of(animation, options)
     present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
     if options.closing == "split" and not present.all():
@@ -195,36 +170,28 @@ def export_animation(
         lost += sampled_losses(written, sampled, options, span)
     notes += _remarks(sampled.body, sampled.up) + motion_remarks(sampled, options)
     lost += resampling_losses(path, animation, options.skinning)
-    return notes + lost + not_held(animation.figure, sampled.body.shape)
+    lost += not_held(animation.figure, sampled.body.shape)
+    return notes + lost + motion_notes(animation)
 
 
-def export_animations(
-    motions: Sequence[tuple[Actor, SampledAnimation, str]],
-    path: Path,
-    options: MotionOptions,
-    scene: Scene,
-    still: Sequence[Actor] = (),
-) -> list[Diagnostic]:
-    """Write figures to one file, placed as in their scene, with one animation that moves them all.
+def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
+    """Write figures placed as in their scene, with one animation that moves them all.
 
-    Frames of different figures keep their relative times; the earliest frame is at 0.
-
-    ``motions``: the moving figures, and what ``animation_for`` returns for each: frames, at least
-    one of which is present, and their up axis. ``options``: skinning, and handling of gaps except
-    ``split``. Returns as for ``export_animation``, each with its figure. Raises ``RigError,
-    OutputError``: as for ``export_animation``.
+    Frames of different figures keep their relative times; the earliest frame is at 0. Figures
+    without frames are in their current pose. Gaps may be filled, but not split.
     """
-    parts = [PlacedMotion(placed_actor(scene, who), each, up) for who, each, up in motions]
-    others = [placed_actor(scene, actor) for actor in still]
+    parts = [part for part in selection.parts if part.frames is not None]
+    others = [part.actor for part in selection.parts if part.frames is None]
+    scene = selection.scene or Scene(selection.actors)
     document, actors = Document(path.stem), [*(part.actor for part in parts), *others]
     found = [
         sampled_of(each.animation, replace(options, world_up=each.up), each.actor.color)
         for each in parts
     ]
-    begin, name, index = min(each.start for each in parts), common_name(parts, path.stem), -1
+    begin, name, index = min(map(start_of, parts)), common_name(parts, path.stem), -1
     built = []
     for part, sampled in zip(parts, found, strict=True):
-        delay = part.start - begin
+        delay = start_of(part) - begin
         made, index = add_sampled(document, sampled, options, None, delay, name, index)
         built.append(made)
     together, how = Clips(document), options.skinning
@@ -236,7 +203,7 @@ def export_animations(
     placing = place_figures(document, actors, built, to_file)
     lenses = _add_cameras(document, scene.views, to_file, [*zip(actors, built, strict=True)])
     (data,) = _files([(path, document)])
-    seconds = max(each.start + each.seconds for each in parts) - begin
+    seconds = max(start_of(each) + seconds_of(each.animation) for each in parts) - begin
     notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
     notes += _beside(data, path, document)
     file = _unplaced(data, placing)

@@ -11,8 +11,9 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.export._exporter import Part
 from viewer.export._gaps import filled, gaps_note
-from viewer.export._options import GAPS, MotionOptions
+from viewer.export._options import GAPS, ExportOptions
 from viewer.export.gltf.body import Body, Built, add_body, body_of
 from viewer.export.gltf.document import Document
 from viewer.export.gltf.keyed import add_animation, moving, still_locals
@@ -23,31 +24,8 @@ from viewer.export.gltf.reading import GltfFile, frame_keys
 from viewer.export.gltf.skin import shape_of
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.upright import upright_actor, upright_placement
-from viewer.rig.scene import Actor, Scene, figure_pose
+from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import joint_label
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlacedMotion:
-    """A sampled motion of an actor in a scene."""
-
-    actor: Actor
-    """The actor, as returned by ``placed_actor``."""
-    animation: SampledAnimation
-    """Its frames."""
-    up: str
-    """One of "y" or "z": the up axis of the frames."""
-
-    @property
-    def start(self) -> float:
-        """Time of the first frame on the scene's clock, seconds."""
-        return self.actor.offset + float(self.animation.frames.times[0])
-
-    @property
-    def seconds(self) -> float:
-        """Time from the first to the last frame, seconds."""
-        return (self.animation.frames.n_frames - 1) / self.animation.frame_rate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,19 +44,24 @@ class Sampled:
     """Linear colour of surfaces without a colour; None for the default."""
 
 
-def placed_actor(scene: Scene, actor: Actor) -> Actor:
-    """Return an actor whose figure stands upright in its own space, and its placement."""
-    return replace(upright_actor(scene, actor), placement=upright_placement(scene, actor))
+def start_of(part: Part) -> float:
+    """Return the time of a part's first frame on the scene's clock, seconds."""
+    return part.actor.offset + float(part.animation.frames.times[0])
 
 
-def common_name(parts: Sequence[PlacedMotion], stem: str) -> str:
+def seconds_of(animation: SampledAnimation) -> float:
+    """Return the time from the first to the last frame."""
+    return (animation.frames.n_frames - 1) / animation.frame_rate
+
+
+def common_name(parts: Sequence[Part], stem: str) -> str:
     """Return the name that all motions share, or else the file's name."""
     names = {part.animation.motion.name for part in parts}
     return names.pop() if len(names) == 1 and "" not in names else stem
 
 
 def sampled_of(
-    animation: SampledAnimation, options: MotionOptions, color: Color | None = None
+    animation: SampledAnimation, options: ExportOptions, color: Color | None = None
 ) -> Sampled:
     """Return a motion in the form that glTF can store.
 
@@ -92,7 +75,7 @@ def sampled_of(
     return Sampled(animation, frames, body, options.world_up, color)
 
 
-def _check(animation: SampledAnimation, options: MotionOptions) -> None:
+def _check(animation: SampledAnimation, options: ExportOptions) -> None:
     for what, value, known in (
         ("unit", options.unit, ("", "m")),
         ("up axis", options.up, ("", "y")),
@@ -103,14 +86,12 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
             listed = ", ".join(filter(None, known))
             one = "one of " * (len(list(filter(None, known))) > 1)
             raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
-    if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
 
 
 def add_sampled(
     document: Document,
     sampled: Sampled,
-    options: MotionOptions,
+    options: ExportOptions,
     span: tuple[int, int] | None = None,
     delay: float = 0.0,
     name: str = "",
@@ -166,7 +147,7 @@ def written_part(path: Path, file: GltfFile, built: Built) -> Written:
 def sampled_losses(
     written: Written,
     sampled: Sampled,
-    options: MotionOptions,
+    options: ExportOptions,
     span: tuple[int, int] | None = None,
 ) -> list[Diagnostic]:
     """Return notes with the largest errors of the present frames of a range."""
@@ -184,7 +165,7 @@ def sampled_losses(
     )
 
 
-def motion_remarks(sampled: Sampled, options: MotionOptions) -> list[Diagnostic]:
+def motion_remarks(sampled: Sampled, options: ExportOptions) -> list[Diagnostic]:
     """Return notes about gaps, and about joints with translations."""
     animation, frames = sampled.animation, sampled.frames
     skeleton = animation.figure.require_skeleton()

@@ -19,7 +19,8 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import gltf
-from viewer.export._options import VrmMeta
+from viewer.export._exporter import Part, Selection
+from viewer.export._options import ExportOptions, VrmMeta
 from viewer.export.gltf.body import Body, Built
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.vrm.humanoid import human_bones
@@ -38,7 +39,6 @@ from viewer.rig.file_record import VrmRecord
 from viewer.rig.humanoid import REQUIRED_BONES
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _STRAIGHT = 1e-4  # radians
@@ -49,20 +49,15 @@ _TRANSFORM = "KHR_texture_transform"
 _AXES = "XYZ"
 
 
-def export(
-    actor: Actor,
-    path: Path,
-    skinning: Skinning,
-    optimizes: bool = False,
-    meta: VrmMeta | None = None,
-) -> list[Diagnostic]:
+def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
     """Write a figure in its rest pose; see ``viewer.export.export``.
 
     ``meta``: name, authors and licence; those of the file if omitted or empty. Raises ``RigError``
     if the figure lacks a required bone, or its authors or licence are unknown. Raises
     ``OutputError`` if the file cannot be written.
     """
-    figure, given = actor.figure, meta or VrmMeta()
+    actor = selection.part.actor
+    figure, given = actor.figure, options.meta
     bones = human_bones(figure)
     record = None if figure.record is None else figure.record.vrm
     notes = _left_out(actor)
@@ -81,7 +76,7 @@ def export(
             notes.append(Diagnostic("X003.vrm-upgrade", values={"names": lost, "n": len(lost)}))
     if record is not None:
         extend = partial(_add_kept, record, given)
-        return gltf.export(still, path, skinning, optimizes, extend) + notes
+        return gltf.write_poses(Selection([Part(still)]), path, options, extend) + notes
     added_meta = checked_meta(given, figure.name)
     pose = figure_pose(figure)
     pose.shape_weights = actor.require_pose().shape_weights.copy()
@@ -91,7 +86,7 @@ def export(
         notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
     notes += _unit_notes(actor.figure)
     extend = partial(_add_made, bones, added_meta)
-    return gltf.export(still, path, skinning, optimizes, extend) + notes
+    return gltf.write_poses(Selection([Part(still)]), path, options, extend) + notes
 
 
 def require(figure: Figure) -> None:
