@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,8 +15,13 @@ from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
+from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.rendering.options import DisplayOptions
+    from viewer.rendering.recorder import Recording
 
 _MOST_FRAMES = 1_000_000
 _ROTATION_SECONDS = 6.0  # duration of a turntable of a still scene
@@ -30,28 +34,6 @@ class Turntable:
 
     degrees: float
     seconds: float | None
-
-
-@dataclass(slots=True, eq=False)
-class Shots:
-    """Frames to draw."""
-
-    times: Floats
-    """(F,). Scene times in seconds."""
-    numbers: list[int]
-    """Frame numbers in file names and contact sheets."""
-    rate: float
-    """Frames per second of the result."""
-    moves: bool
-    """Whether the figures are posed by motions."""
-    turntable: float
-    """Rotation of the camera over all frames, in degrees."""
-    seconds: float
-    """Duration of all frames."""
-    remark: str = ""
-    """Note about the frame rate, or an empty string."""
-    notes: list[str] = field(default_factory=list)
-    """Messages about unexpected results."""
 
 
 def parse_turntable(text: str) -> Turntable:
@@ -120,12 +102,25 @@ class Request:
         """Whether it is one image."""
         return self.kind in ("", "onion")
 
+    @property
+    def step(self) -> int:
+        """Every ``step``-th frame of the motion is drawn."""
+        return 1 if self.range is None else self.range.step
 
-def shots_of(request: Request, frames: Frames, pose: PoseOptions, scene: Scene) -> Shots:
-    """Return the frames of a scene to draw.
+    def skips(self, fps: float | None) -> bool:
+        """Return whether a video shows each frame for the time of the skipped ones, too."""
+        return self.step > 1 and self.kind == "video" and fps is None
+
+
+def recording_of(
+    request: Request, frames: Frames, pose: PoseOptions, scene: Scene, options: DisplayOptions
+) -> tuple[Recording, list[str]]:
+    """Return the frames of a scene to draw, without their camera, and messages.
 
     Raises ViewerError if nothing moves, or there are no frames or too many.
     """
+    from viewer.rendering.recorder import Recording
+
     is_still = frames.is_one
     moves = not is_still and any(actor.clip is not None for actor in scene.actors)
     if not moves and request.turntable is None:
@@ -142,7 +137,6 @@ def shots_of(request: Request, frames: Frames, pose: PoseOptions, scene: Scene) 
     else:
         assert request.turntable is not None  # something moves: figures or the camera
         places = np.zeros(_count((request.turntable.seconds or _ROTATION_SECONDS) * rates.drawn))
-    seconds = len(places) / rates.drawn
     if request.contact_sheet is not None:
         places = _spread(places, request.contact_sheet, moves)
         notes += _too_few("contact-sheet", len(places), request.contact_sheet)
@@ -155,8 +149,19 @@ def shots_of(request: Request, frames: Frames, pose: PoseOptions, scene: Scene) 
     numbers = np.rint(places).astype(int) if is_counted else np.arange(len(places))
     turntable = 0.0 if request.turntable is None else request.turntable.degrees
     times = (numbering.start if moves else 0.0) + places / numbering.rate
-    called = (first + numbers).tolist()
-    return Shots(times, called, rates.drawn, moves, turntable, seconds, rates.remark, notes)
+    recording = Recording(
+        scene,
+        times,
+        Camera(up=scene.up),
+        (1, 1),
+        options,
+        numbers=(first + numbers).tolist(),
+        rate=rates.drawn,
+        moves=moves,
+        interpolate=frames.interpolates,
+        turntable=turntable,
+    )
+    return recording, notes
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,16 +170,13 @@ class _Rates:
 
     played: float
     drawn: float
-    remark: str
     notes: tuple[str, ...]
 
 
 def _rates(request: Request, fps: float | None, counted: float) -> _Rates:
     """Return the frame rates; videos that skip frames keep the motion's speed."""
-    step = 1 if request.range is None else request.range.step
-    skips = step > 1 and request.kind == "video" and fps is None
     # A frame is also shown for the time of the skipped frames.
-    played = counted / step if skips else counted
+    played = counted / request.step if request.skips(fps) else counted
     is_gif = request.kind == "video" and request.output.suffix.lower() == ".gif"
     drawn = min(played, MOST_GIF_RATE) if is_gif else played
     notes: tuple[str, ...] = ()
@@ -182,8 +184,7 @@ def _rates(request: Request, fps: float | None, counted: float) -> _Rates:
         notes = (
             f"GIFs show at most {drawn:g} frames per second: drawn at {drawn:g}, not {played:g}",
         )
-    remark = f" (one of {step} frames, at the motion's own speed; --fps sets it)" if skips else ""
-    return _Rates(played, drawn, remark, notes)
+    return _Rates(played, drawn, notes)
 
 
 def _places(request: Request, numbering: Numbering, rates: _Rates) -> tuple[Floats, list[str]]:
@@ -193,8 +194,7 @@ def _places(request: Request, numbering: Numbering, rates: _Rates) -> tuple[Floa
     behind = f"frames {first + max(total, start)} to {first + stop - 1}"
     notes = [f"--frames: {behind} are beyond the end of the motion"] if stop > total else []
     # Step between drawn frames, in frames of the motion.
-    step = 1 if request.range is None else request.range.step
-    pace = step * (request.speed or 1.0) * rates.played / rates.drawn
+    pace = request.step * (request.speed or 1.0) * rates.played / rates.drawn
     length = stop - start
     begin = start if pace > 0.0 else stop - 1
     seconds = None if request.turntable is None else request.turntable.seconds

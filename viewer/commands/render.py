@@ -29,7 +29,7 @@ from viewer.commands._scene import (
     print_warnings,
     scene_options,
 )
-from viewer.commands._sequence import Request
+from viewer.commands._sequence import Request, recording_of
 from viewer.commands._settings import add_settings, settings_of, stated
 from viewer.commands._view import (
     VIEWS,
@@ -60,7 +60,6 @@ from viewer.rig.skinning import Skinning
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
-    from viewer.commands._sequence import Shots
     from viewer.media.picture_sinks import PictureSink, SheetSink
     from viewer.media.video import VideoSink
     from viewer.rendering.recorder import Recording
@@ -236,24 +235,24 @@ def _draw_still(drawing: _Drawing, scene: Scene) -> None:
 
 def _draw_onion(drawing: _Drawing, scene: Scene) -> None:
     """Draw several poses of a motion in one image."""
-    from viewer.commands._sequence import shots_of
     from viewer.formats import save_image
     from viewer.rendering.camera_views import with_cameras
     from viewer.rig.motion.onion import onion
 
     asked, options, size = drawing.asked, drawing.options, drawing.size
     output = drawing.request.output
-    shots = shots_of(drawing.request, asked.frames, asked.pose, scene)
+    frames, pose = asked.frames, asked.pose
+    recording, notes = recording_of(drawing.request, frames, pose, scene, options)
     drawing.check([output], scene)
-    print_warnings(shots.notes)
-    poses = onion(scene, shots.times.tolist(), interpolate=asked.frames.interpolates)
+    print_warnings(notes)
+    poses = onion(scene, recording.times.tolist(), interpolate=recording.interpolate)
     points = scene_points(poses, options.show)
     camera = camera_of(drawing.view, poses, with_cameras(poses, options, points), size)
     box = bounding_box(points)
     pixels = draw_scene(poses, size, camera, options, box, drawing.device, drawing.is_chosen)
     save_image(output, pixels)
-    frames = ", ".join(map(str, shots.numbers))
-    line = f"{printable(output)}: {size[0]} x {size[1]}, poses of frames {frames}"
+    numbers = ", ".join(map(str, recording.numbers))
+    line = f"{printable(output)}: {size[0]} x {size[1]}, poses of frames {numbers}"
     print(line, file=summary_stream(output))
 
 
@@ -455,9 +454,15 @@ def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
     Raises OutputError if a file already exists, or cannot be written.
     """
     from viewer.commands._progress import Progress
-    from viewer.commands._sequence import shots_of
     from viewer.rendering.camera_views import with_cameras
-    from viewer.rendering.framing import fit_turntable, frame_motion, framed_poses, seen_aspect
+    from viewer.rendering.framing import (
+        find_follow,
+        fit_turntable,
+        frame_motion,
+        framed_poses,
+        level_shifts,
+        seen_aspect,
+    )
     from viewer.rendering.gpu.context import thread_graphics
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
@@ -465,19 +470,26 @@ def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
 
     asked, request, view = drawing.asked, drawing.request, drawing.view
     options, size = drawing.options, drawing.size
-    shots = shots_of(request, asked.frames, asked.pose, scene)
-    outputs = _outputs(request, shots)
+    recording, notes = recording_of(request, asked.frames, asked.pose, scene, options)
+    outputs = [request.output]
+    if request.kind == "pictures":
+        pattern = str(request.output)
+        outputs = [Path(pattern.format(frame=number)) for number in recording.numbers]
     drawing.check(outputs, scene)
-    recording = _recording(drawing, scene, shots)
+    if view.follow is not None:
+        recording.follow = find_follow(scene, view.follow)
+    elif request.kind == "sheet" and view.view is None and recording.moves:
+        recording.shifts = level_shifts(recording)
     points, recording.box = frame_motion(recording)
     points = with_cameras(scene, options, points, framed_poses(recording))
     aspect = seen_aspect(camera_of(view, scene, points, size), points)
-    sink = _sink(request, options, shots, outputs, size, aspect)
-    print_warnings([*shots.notes, *follow_notes(view, scene), *getattr(sink, "notes", [])])
+    sink = _sink(request, recording, outputs, size, aspect)
+    print_warnings([*notes, *follow_notes(view, scene), *getattr(sink, "notes", [])])
     recording.size = frame_size = getattr(sink, "cell", size)
     recording.camera = camera_of(view, scene, points, frame_size)
     if view.distance is None and view.look_at is None:
-        fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
+        shape = frame_size[0] / frame_size[1]
+        fit_turntable(recording.camera, points, shape, recording.turntable)
     title = f"drawing {printable(outputs[0].name)}"
     hold()
     with Offscreen(graphics=thread_graphics(drawing.device)) as offscreen, offscreen.context:
@@ -498,20 +510,12 @@ def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
                 print_warnings([f"{kept} of {len(outputs)} pictures were written, and are kept"])
             raise
         print_warnings(offscreen.renderer.notes)
-    return _summary(request, shots, outputs, frame_size, sink)
-
-
-def _outputs(request: Request, shots: Shots) -> list[Path]:
-    if request.kind != "pictures":
-        return [request.output]
-    pattern = str(request.output)
-    return [Path(pattern.format(frame=number)) for number in shots.numbers]
+    return _summary(request, recording, outputs, sink, request.skips(asked.frames.fps))
 
 
 def _sink(
     request: Request,
-    options: DisplayOptions,
-    shots: Shots,
+    recording: Recording,
     outputs: list[Path],
     size: tuple[int, int],
     aspect: float,
@@ -519,54 +523,32 @@ def _sink(
     if request.kind == "video":
         from viewer.media.video import VideoSink
 
-        is_transparent = options.background == "transparent"
-        return VideoSink(outputs[0], size, shots.rate, request.video_quality, is_transparent)
+        is_transparent = recording.options.background == "transparent"
+        return VideoSink(outputs[0], size, recording.rate, request.video_quality, is_transparent)
     from viewer.media.picture_sinks import PictureSink, SheetSink
 
     if request.kind == "sheet":
-        return SheetSink(outputs[0], size, shots.numbers, min(max(aspect, _NARROW), _WIDE))
+        return SheetSink(outputs[0], size, recording.numbers, min(max(aspect, _NARROW), _WIDE))
     return PictureSink(outputs)
-
-
-def _recording(drawing: _Drawing, scene: Scene, shots: Shots) -> Recording:
-    """Return the recording, without its camera, box and size."""
-    from viewer.rendering.camera import Camera
-    from viewer.rendering.framing import find_follow, level_shifts
-    from viewer.rendering.recorder import Recording
-
-    view = drawing.view
-    recording = Recording(
-        scene,
-        shots.times,
-        Camera(up=scene.up),
-        (1, 1),
-        drawing.options,
-        moves=shots.moves,
-        interpolate=drawing.asked.frames.interpolates,
-        turntable=shots.turntable,
-        follow=None if view.follow is None else find_follow(scene, view.follow),
-    )
-    is_free = view.follow is None and view.view is None
-    if drawing.request.kind == "sheet" and is_free and shots.moves:
-        recording.shifts = level_shifts(recording)
-    return recording
 
 
 def _summary(
     request: Request,
-    shots: Shots,
+    recording: Recording,
     outputs: list[Path],
-    size: tuple[int, int],
     sink: PictureSink | SheetSink | VideoSink,
+    skips: bool,
 ) -> str:
-    name, count = printable(outputs[0]), len(shots.times)
+    name, count, seconds = printable(outputs[0]), recording.n_frames, recording.seconds
     frames = "1 frame" if count == 1 else f"{count} frames"
-    pixels = f"{size[0]} x {size[1]}"
+    pixels = "{} x {}".format(*recording.size)
     weight = f"{sink.n_bytes / 1e6:.2f} MB"
     if request.kind == "video":
-        seconds, rate = count / shots.rate, f"{shots.rate:g} frames per second{shots.remark}"
+        own = "at the motion's own speed; --fps sets it"
+        remark = f" (one of {request.step} frames, {own})" if skips else ""
+        rate = f"{recording.rate:g} frames per second{remark}"
         return f"{name}: {frames}, {seconds:.3g} s, {pixels}, {rate}, {weight}"
     if request.kind == "sheet":
         return f"{name}: {frames} of {pixels}, {weight}"
     last = f" to {printable(outputs[-1].name)}" if count > 1 else ""
-    return f"{name}{last}: {frames}, {shots.seconds:.3g} s, {pixels}, {weight}"
+    return f"{name}{last}: {frames}, {seconds:.3g} s, {pixels}, {weight}"

@@ -57,6 +57,10 @@ class Recording:
     size: tuple[int, int]
     """Width and height in pixels."""
     options: DisplayOptions = field(default_factory=DisplayOptions)
+    numbers: Sequence[int] = ()
+    """F numbers of the frames, in file names and contact sheets."""
+    rate: float = 30.0
+    """Frames per second of the result."""
     box: Floats | None = None
     """(2, 3) or None. Bounds for the ground grid and the depth range; None for the current scene's
     bounds."""
@@ -82,6 +86,11 @@ class Recording:
     def n_frames(self) -> int:
         """Number of frames, F."""
         return len(self.times)
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the result."""
+        return self.n_frames / self.rate
 
 
 @dataclass(frozen=True, slots=True, eq=False)

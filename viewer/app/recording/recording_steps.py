@@ -30,7 +30,6 @@ from viewer.rendering.overlay.annotation import Annotation, mark_annotation
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Recording, Sink, record
 from viewer.rendering.renderer import Renderer
-from viewer.rig.arrays import Floats
 from viewer.rig.inspection.explanation import explain
 from viewer.rig.scene import Scene
 
@@ -83,16 +82,15 @@ def _recording_steps(
     ``state``: state with the scene, which is copied: later edits do not affect the recording.
     ``path``: target file; ``{frame}`` in the name of numbered images stands for their number.
     """
-    times, numbers, rate = recorded_times(state, settings)
-    size = settings.pixels((state.view_rect[2], state.view_rect[3]))
+    recording = _recording(state, settings)
     files = [path]
     if settings.kind == "pictures":
-        files = _numbered(path, numbers)
+        files = _numbered(path, recording.numbers)
     # The dialog asks before replacing a single file, but not for numbered files.
     is_asked = settings.kind != "pictures"
     check_targets(files, state.inputs, is_asked, hint="choose another name")
-    sink, size = _sink(settings, files, size, rate, numbers)
-    recording = _recording(state, settings, times, size)
+    sink = _sink(settings, files, recording)
+    recording.size = getattr(sink, "cell", recording.size)
     renderer = Renderer(programs)
     renderer.ghost = ghost
     try:
@@ -109,19 +107,21 @@ def _recording_steps(
         renderer.release()
     name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")
     notes = [*getattr(sink, "notes", []), *renderer.notes]
-    return [f"Saved {name}: {len(times)} frames, {size[0]} x {size[1]}", *notes]
+    width, height = recording.size
+    return [f"Saved {name}: {recording.n_frames} frames, {width} x {height}", *notes]
 
 
-def _recording(
-    state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
-) -> Recording:
+def _recording(state: AppState, settings: RecordSettings) -> Recording:
     """Return the parameters of a recording of the view, without tools and panels."""
+    times, numbers, rate = recorded_times(state, settings)
     return Recording(
         replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
         times,
         state.camera.copy(),
-        size,
+        settings.pixels((state.view_rect[2], state.view_rect[3])),
         recorded_options(state, settings, len(times)),
+        numbers=numbers,
+        rate=rate,
         box=state.box.copy(),
         moves=state.clock.has_motion,
         interpolate=state.clock.interpolate_gaps,
@@ -132,7 +132,7 @@ def _recording(
     )
 
 
-def _numbered(path: Path, numbers: list[int]) -> list[Path]:
+def _numbered(path: Path, numbers: Sequence[int]) -> list[Path]:
     try:
         files = [path.with_name(path.name.format(frame=number)) for number in numbers]
     except (ValueError, KeyError, IndexError, AttributeError):
@@ -145,26 +145,18 @@ def _numbered(path: Path, numbers: list[int]) -> list[Path]:
     return files
 
 
-def _sink(
-    settings: RecordSettings,
-    files: list[Path],
-    size: tuple[int, int],
-    rate: float,
-    numbers: list[int],
-) -> tuple[Sink, tuple[int, int]]:
-    """Return the sink of the frames, and their size."""
+def _sink(settings: RecordSettings, files: list[Path], recording: Recording) -> Sink:
+    """Return the sink of the frames; that of a contact sheet has the size of its cells."""
+    from viewer.media.picture_sinks import PictureSink, SheetSink
+
     if settings.kind == "pictures":
-        from viewer.media.picture_sinks import PictureSink
-
-        return PictureSink(files), size
+        return PictureSink(files)
     if settings.kind == "sheet":
-        from viewer.media.picture_sinks import SheetSink
-
-        sheet = SheetSink(files[0], size, numbers)
-        return sheet, sheet.cell
+        return SheetSink(files[0], recording.size, recording.numbers)
     from viewer.media.video import VideoSink
 
-    return VideoSink(files[0], size, rate, settings.quality, settings.is_transparent), size
+    quality, is_transparent = settings.quality, settings.is_transparent
+    return VideoSink(files[0], recording.size, recording.rate, quality, is_transparent)
 
 
 def start_recording(state: AppState, renderer: Renderer) -> None:
