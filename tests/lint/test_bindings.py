@@ -9,7 +9,7 @@ from faults import told
 from lint.sound import column, scene_of
 
 from viewer.lint import lint_scene
-from viewer.lint.bindings import are_singular
+from viewer.rig.inspection.faults import are_singular
 
 
 def test_singularity_does_not_depend_on_scale() -> None:

@@ -13,11 +13,11 @@ from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.inspection.faults import NO_INDICES
 
 MAX_ROTATION = 3400.0
 """Default limit of the rotation rate of a joint relative to its parent, degrees per second."""
 
-NO_INDICES: Ints = np.zeros(0, dtype=np.int32)
 NO_TIMES: Floats = np.zeros(0)
 
 

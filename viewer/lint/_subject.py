@@ -9,7 +9,7 @@ the frame numbers that the timeline shows.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import field
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.lint._finding import NO_INDICES, NO_TIMES, Finding, LintOptions
+from viewer.lint._finding import NO_TIMES, Finding, LintOptions
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
@@ -28,6 +28,7 @@ from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.motion.clip import Clip
@@ -75,10 +76,8 @@ class Subject:
     """Thresholds of the checks."""
     counting: Counting | None = None
     """Frame numbering of keyed clips; None to number each clip separately."""
-    invalid: Mapping[str, Ints] = field(default_factory=dict)
-    """Data that a reader replaced because the data in the file is invalid: vertices by
-    ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and ``"joints"``,
-    rows by ``"frames"``."""
+    invalid: Invalid = field(default_factory=dict)
+    """Data that a reader replaced."""
     people: tuple[Actor, ...] = ()
     """All captured people of the scene, in its order."""
     # Results that several checks need are computed once: ``track_of`` caches them here.
@@ -86,14 +85,8 @@ class Subject:
     """Cached track of the actor's clip; may be empty."""
 
     def valid(self, part: str, count: int) -> Bools:
-        """Return which items are valid data of the file.
-
-        ``part``: a key of ``invalid``. Returns (count,), false for items whose data was replaced.
-        """
-        result = np.ones(count, dtype=np.bool_)
-        lost = self.invalid.get(part, NO_INDICES)
-        result[lost[lost < count]] = False
-        return result
+        """Return which of ``count`` items of a part, a key of ``invalid``, are valid: (count,)."""
+        return valid(self.invalid, part, count)
 
     def length(self, length: float) -> str:
         """Return a length as text: in millimetres if the unit is known, else relative to size."""
@@ -137,6 +130,21 @@ class Subject:
     def _relative(self, length: float) -> str:
         size = self.size()
         return f" ({rounded(100.0 * length / size)} % of its size)" if size > 0.0 else ""
+
+    def faults(self, faults: Iterable[Fault]) -> list[Finding]:
+        """Return faults of the actor's figure as findings about it."""
+        return [
+            self.found(
+                fault.key,
+                severity=fault.severity,
+                vertices=fault.vertices,
+                triangles=fault.triangles,
+                joints=fault.joints,
+                at=fault.at,
+                **fault.values,
+            )
+            for fault in faults
+        ]
 
     def found(
         self,

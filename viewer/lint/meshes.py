@@ -9,7 +9,8 @@ from viewer.lint._subject import Indices, Subject
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import Edges, edges_of, orientations, welded
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import Mesh, flat_triangles, typical_place
+from viewer.rig.inspection.faults import stray_vertices
+from viewer.rig.mesh import Mesh, flat_triangles
 
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # maximum length of a zero normal
@@ -18,9 +19,6 @@ _AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are sm
 # reliable.
 _CLOSED = 0.25
 _HOLLOW = 1e-6  # volume within rounding, relative to area^1.5, as of two coincident caps
-# Multiple of the median distance of vertices from their median: feet are at 16 times that distance
-# in models with half of their vertices in the face.
-_FAR = 40.0
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -302,19 +300,4 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
                 at=("positions", int(unused[0])),
             )
         )
-    center, typical = typical_place(mesh)
-    distances = np.abs(mesh.positions - center).max(axis=1)
-    far = np.flatnonzero(distances > _FAR * typical) if typical > 0.0 else np.zeros(0, np.int64)
-    if len(far):
-        far = far[np.argsort(-distances[far], kind="stable")]
-        findings.append(
-            subject.found(
-                "M010.vertices",
-                n=len(far),
-                vertex=int(far[0]),
-                ratio=float(distances[far[0]] / typical),
-                vertices=far,
-                at=("positions", int(far[0])),
-            )
-        )
-    return findings
+    return findings + subject.faults(stray_vertices(subject.actor.figure))

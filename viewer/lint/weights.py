@@ -7,29 +7,23 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
-from viewer.lint.bindings import are_singular
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.topology import components, welded
-from viewer.rig.mesh import Mesh
+from viewer.rig.inspection.faults import are_singular, weight_faults
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import FIRST_ROTATION, clamp_dofs, joint_labels
 from viewer.rig.skin import (
     Skin,
-    has_influence,
     idle_joints,
     influence_counts,
     merged,
     owners,
-    weight_sums,
 )
 from viewer.rig.skinning import Skinning, deform
 
-_NOTED = 1e-3  # minimum deviation of a sum from 1: files round to three digits
-_WRONG = 5e-3  # four influences with three digits, each with an error of half a digit, and a margin
 # Poses in which the effect of fewer influences is measured
 _COUNT = 4  # number of poses in addition to the rest pose and the current pose
 _SWING = 0.6  # radians: roughly the largest rotation of most joints in a walk
@@ -43,100 +37,12 @@ def check(subject: Subject) -> list[Finding]:
         return []
     # Weights missing from the file cannot be judged.
     known = subject.valid("weights", figure.skin.n_vertices)
-    moved = has_influence(figure.skin)
     return [
-        *_sums(subject, figure.skin, moved & known),
-        *_negative(subject, figure.skin),
-        *_bare(subject, figure.skin, figure.mesh, moved | ~known),
+        *subject.faults(weight_faults(figure, subject.invalid)),
         *_idle_joints(subject, figure, figure.skin),
         *_doubled(subject, figure.skin, known),
         *_crowded(subject, figure, known),
     ]
-
-
-def _sums(subject: Subject, skin: Skin, moved: Bools) -> list[Finding]:
-    sums = weight_sums(skin)
-    errors = np.where(moved, np.abs(sums - 1.0), 0.0)
-    off = np.flatnonzero(errors > _NOTED)
-    if len(off) == 0:
-        return []
-    off = off[np.argsort(-errors[off], kind="stable")]
-    worst = int(off[0])
-    return [
-        subject.found(
-            "W001.sums",
-            n=len(off),
-            sum=float(sums[worst]),
-            vertex=worst,
-            error=float(errors[worst]),
-            severity="warning" if errors[worst] > _WRONG else "note",
-            vertices=off,
-            at=("weights", worst),
-        )
-    ]
-
-
-def _negative(subject: Subject, skin: Skin) -> list[Finding]:
-    negative = np.flatnonzero(skin.weights < 0.0)
-    if len(negative) == 0:
-        return []
-    negative = negative[np.argsort(skin.weights[negative], kind="stable")]
-    vertices = owners(skin)[negative]
-    first = negative[0]
-    return [
-        subject.found(
-            "W002.negative",
-            n=len(negative),
-            weight=float(skin.weights[first]),
-            vertex=int(vertices[0]),
-            joint=_label(subject, int(skin.joints[first])),
-            vertices=_distinct(vertices),
-            joints=_distinct(skin.joints[negative]),
-            at=("weights", int(vertices[0])),
-        )
-    ]
-
-
-def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Finding]:
-    """Report islands without any weights, and single vertices apart from them."""
-    bare = ~moved
-    if not bare.any():
-        return []
-    findings = []
-    corners = welded(mesh.positions, mesh.triangles)
-    pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
-    islands = components(mesh.n_vertices, pairs)[corners[:, 0]]
-    # Islands consist of triangles; a loose vertex is not an island.
-    held = np.bincount(islands, moved[mesh.triangles].any(axis=1), minlength=mesh.n_vertices)
-    lost = held[islands] == 0
-    if lost.any():
-        vertices = np.unique(mesh.triangles[lost])
-        names = np.unique(islands[lost])
-        findings.append(
-            subject.found(
-                "W005.islands",
-                n=len(names),
-                n_vertices=len(vertices),
-                vertex=int(vertices[0]),
-                vertices=vertices,
-                triangles=np.flatnonzero(lost),
-                at=("weights", int(vertices[0])),
-            )
-        )
-        bare = bare.copy()
-        bare[vertices] = False
-    single = np.flatnonzero(bare)
-    if len(single):
-        findings.append(
-            subject.found(
-                "W004.vertices",
-                n=len(single),
-                vertex=int(single[0]),
-                vertices=single,
-                at=("weights", int(single[0])),
-            )
-        )
-    return findings
 
 
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
@@ -243,12 +149,6 @@ def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
 def _label(subject: Subject, joint: int) -> str:
     skeleton = subject.actor.figure.skeleton
     return f"#{joint}" if skeleton is None else joint_labels(skeleton)[joint]
-
-
-def _distinct(values: np.ndarray) -> np.ndarray:
-    """Return each value once, in the given order."""
-    _, first = np.unique(values, return_index=True)
-    return values[np.sort(first)]
 
 
 def _some_poses(actor: Actor) -> list[Pose]:

@@ -1,0 +1,219 @@
+"""Faults of a figure that spoil its deformation: weights, bind matrices, stray vertices.
+
+They are cheap to find: ``load`` reports them as warnings, ``lint`` reports them among other things.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from viewer.data_classes import dataclass
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, bounding_box, typical_place
+from viewer.rig.skeleton import joint_labels
+from viewer.rig.skin import Skin, has_influence, owners, weight_sums
+
+# The tolerances of all formats. Readers that normalise report what they changed themselves.
+_NOTED = 1e-3  # minimum deviation of a sum of weights from 1: files round to three digits
+_WRONG = 5e-3  # four influences with three digits, each with an error of half a digit, and a margin
+# Maximum determinant of a singular matrix, relative to the product of its column lengths.
+_SINGULAR = 1e-12
+_NEARLY = 1e6  # minimum condition number of an ill-conditioned matrix
+_AFFINE = 1e-6  # maximum absolute error of the last row
+# Multiple of the median distance of vertices from their median: feet are at 16 times that distance
+# in models with half of their vertices in the face.
+_FAR = 40.0
+
+NO_INDICES: Ints = np.zeros(0, dtype=np.int32)
+Invalid = Mapping[str, Ints]
+"""Data that a reader replaced because the data in the file is invalid: vertices by ``"positions"``
+and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and ``"joints"``, rows by
+``"frames"``."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fault:
+    """A message about elements of a figure."""
+
+    key: str
+    """A key of ``MESSAGES``."""
+    at: tuple[str, int]
+    """Kind and index of the element to look at first, as for ``Source.remember``."""
+    values: Mapping[str, Any]
+    """Values of the message."""
+    vertices: Ints = field(default_factory=lambda: NO_INDICES)
+    triangles: Ints = field(default_factory=lambda: NO_INDICES)
+    joints: Ints = field(default_factory=lambda: NO_INDICES)
+    """(N,): indices, worst first."""
+    severity: str = ""
+    """Severity, if different from that of the code."""
+
+
+def faults_of(figure: Figure) -> Iterator[Fault]:
+    """Yield all faults of a figure, in the order of the checks of ``lint``."""
+    # Products of huge numbers overflow; vertices that far away are reported as strays.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        yield from weight_faults(figure, {})
+        yield from bind_faults(figure, {})
+        yield from stray_vertices(figure)
+
+
+def valid(invalid: Invalid, part: str, count: int) -> Bools:
+    """Return which of ``count`` items of a part are valid data of the file: (count,)."""
+    result = np.ones(count, dtype=np.bool_)
+    lost = invalid.get(part, NO_INDICES)
+    result[lost[lost < count]] = False
+    return result
+
+
+def weight_faults(figure: Figure, invalid: Invalid) -> Iterator[Fault]:
+    """Yield sums of weights that are not 1, negative weights, and vertices without weights."""
+    skin, mesh = figure.skin, figure.mesh
+    if skin is None or mesh is None:
+        return
+    # Weights missing from the file cannot be judged.
+    known, moved = valid(invalid, "weights", skin.n_vertices), has_influence(skin)
+    yield from _sums(skin, moved & known)
+    yield from _negative(figure, skin)
+    bare = known & ~moved
+    if bare.any():
+        yield from _bare(mesh, bare)
+
+
+def _sums(skin: Skin, moved: Bools) -> Iterator[Fault]:
+    sums = weight_sums(skin)
+    errors = np.where(moved, np.abs(sums - 1.0), 0.0)
+    off = np.flatnonzero(errors > _NOTED)
+    if len(off):
+        off = off[np.argsort(-errors[off], kind="stable")]
+        worst = int(off[0])
+        error = float(errors[worst])
+        values = {"n": len(off), "sum": float(sums[worst]), "vertex": worst, "error": error}
+        severity = "warning" if error > _WRONG else "note"
+        yield Fault("W001.sums", ("weights", worst), values, off, severity=severity)
+
+
+def _negative(figure: Figure, skin: Skin) -> Iterator[Fault]:
+    negative = np.flatnonzero(skin.weights < 0.0)
+    if len(negative):
+        negative = negative[np.argsort(skin.weights[negative], kind="stable")]
+        vertices, joints = owners(skin)[negative], skin.joints[negative]
+        values = {
+            "n": len(negative),
+            "weight": float(skin.weights[negative[0]]),
+            "vertex": int(vertices[0]),
+            "joint": _labels(figure, joints[:1])[0],
+        }
+        yield Fault(
+            "W002.negative",
+            ("weights", int(vertices[0])),
+            values,
+            _distinct(vertices),
+            joints=_distinct(joints),
+        )
+
+
+def _bare(mesh: Mesh, bare: Bools) -> Iterator[Fault]:
+    """Yield islands without any weights, and single vertices apart from them."""
+    from viewer.rig.geometry.topology import components, welded
+
+    corners = welded(mesh.positions, mesh.triangles)
+    pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
+    islands = components(mesh.n_vertices, pairs)[corners[:, 0]]
+    # Islands consist of triangles; a loose vertex is not an island.
+    has_weights = (~bare)[mesh.triangles].any(axis=1)
+    held = np.bincount(islands, has_weights, minlength=mesh.n_vertices)
+    lost = held[islands] == 0
+    if lost.any():
+        vertices = np.unique(mesh.triangles[lost])
+        first = int(vertices[0])
+        n_islands = len(np.unique(islands[lost]))
+        values = {"n": n_islands, "n_vertices": len(vertices), "vertex": first}
+        yield Fault("W005.islands", ("weights", first), values, vertices, np.flatnonzero(lost))
+        bare = bare.copy()
+        bare[vertices] = False
+    single = np.flatnonzero(bare)
+    if len(single):
+        first = int(single[0])
+        values = {"n": len(single), "vertex": first}
+        yield Fault("W004.vertices", ("weights", first), values, single)
+
+
+def are_singular(matrices: Floats) -> Bools:
+    """Return which affine matrices (J, 4, 4) have a determinant of 0 within rounding: (J,)."""
+    linear = matrices[:, :3, :3]
+    lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
+    return np.abs(np.linalg.det(linear)) <= _SINGULAR * lengths
+
+
+def bind_faults(figure: Figure, invalid: Invalid) -> Iterator[Fault]:
+    """Yield inverse bind matrices that are singular, ill-conditioned, reflected or not affine."""
+    skin = figure.skin
+    if skin is None or skin.n_joints == 0:
+        return
+    known = valid(invalid, "bindings", skin.n_joints)
+    linear = np.where(known[:, None, None], skin.inverse_bind[:, :3, :3], np.eye(3))
+    determinants, flat = np.linalg.det(linear), are_singular(linear)
+    conditions = np.zeros(len(linear))
+    conditions[~flat] = np.linalg.cond(linear[~flat])
+    off = affine_errors(skin) * known
+    for key, wrong, numbers in (
+        ("B002.singular", flat, determinants),
+        ("B003.ill-conditioned", conditions > _NEARLY, conditions),
+        ("B005.reflected", (determinants < 0.0) & ~flat, determinants),
+        ("B006.not-affine", off > _AFFINE, off),
+    ):
+        joints = np.flatnonzero(wrong)
+        if len(joints):
+            first, names = int(joints[0]), _labels(figure, joints)
+            values = {"n": len(joints), "all": len(linear), "names": names}
+            values["value"] = float(numbers[first])
+            yield Fault(key, ("bindings", first), values, joints=joints)
+
+
+def affine_errors(skin: Skin) -> Floats:
+    """Return the largest error of the last row of each inverse bind matrix: (J,)."""
+    errors: Floats = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1)
+    return errors
+
+
+def are_usable(skin: Skin) -> Bools:
+    """Return which inverse bind matrices are affine and can be inverted: (J,)."""
+    usable: Bools = ~are_singular(skin.inverse_bind) & (affine_errors(skin) <= _AFFINE)
+    return usable
+
+
+def stray_vertices(figure: Figure) -> Iterator[Fault]:
+    """Yield vertices that are much farther from the middle of the mesh than most."""
+    mesh = figure.mesh
+    if mesh is None or mesh.n_vertices == 0:
+        return
+    center, typical = typical_place(mesh)
+    # The box is computed faster than the distances of all vertices.
+    farthest = np.abs(bounding_box(mesh.positions) - center).max()
+    if not farthest > _FAR * typical > 0.0:
+        return
+    distances = np.abs(mesh.positions - center).max(axis=1)
+    far = np.flatnonzero(distances > _FAR * typical)
+    far = far[np.argsort(-distances[far], kind="stable")]
+    first = int(far[0])
+    values = {"n": len(far), "vertex": first, "ratio": float(distances[first] / typical)}
+    yield Fault("M010.vertices", ("positions", first), values, far)
+
+
+def _labels(figure: Figure, joints: Ints) -> list[str]:
+    if figure.skeleton is None:
+        return [f"#{joint}" for joint in joints]
+    labels = joint_labels(figure.skeleton)
+    return [labels[joint] for joint in joints]
+
+
+def _distinct(values: Ints) -> Ints:
+    """Return each value once, in the given order."""
+    _, first = np.unique(values, return_index=True)
+    return values[np.sort(first)]
