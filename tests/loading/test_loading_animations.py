@@ -10,13 +10,14 @@ from viewer.commands._info_clips import animation_lines, describe_animations
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading import Contents, MotionSettings, begin
-from viewer.rig.figure import Figure, FigureGroup
+from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.motion.transform_clip import Animation
 
 
 def opened(*figures, animation="", files=None):
     paths = files or [Path("hero.glb")] * len(figures)
-    contents = Contents(figures=list(zip(paths, figures, strict=True)))
+    read = [read_from(path, figure) for path, figure in zip(paths, figures, strict=True)]
+    contents = Contents(figures=list(zip(paths, read, strict=True)))
     return begin(contents, MotionSettings(animation=animation))[0]
 
 

@@ -338,7 +338,16 @@ def _detect_archive(source: Source) -> str:
 
 def read(source: Source) -> Content:
     """Read a file of any format; see the format modules for the errors that they raise."""
-    return kept_or_read(source, lambda one: import_module(f"{__name__}.{detect(one)}").read(one))
+    return kept_or_read(source, _read)
+
+
+def _read(source: Source) -> Content:
+    content: Content = import_module(f"{__name__}.{detect(source)}").read(source)
+    from viewer.rig.figure import Figure, read_from
+
+    if isinstance(content, Figure) and not content.origins:
+        return read_from(source.path, content)
+    return content
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:

@@ -82,7 +82,6 @@ class Source:
         self._is_stored = data is None  # whether the data can be read again
         self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
-        self._pointers: dict[int, tuple[object, Callable[[str, int], str]]] = {}
 
     @classmethod
     def open(
@@ -277,32 +276,29 @@ class Source:
     def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
         """Register a function that finds the offset of the index-th element of a kind.
 
-        Readers of JSON register pointers instead, with ``remember_pointers``.
+        Readers of JSON give their figures pointers instead, see ``Origin``.
 
         ``kind``: ``"positions"``, ``"normals"``, ``"weights"``, ``"triangles"``, ``"bindings"``,
         ``"joints"``, ``"channels"`` or ``"frames"``.
         """
         self._offsets[kind] = self, offset_of
 
-    def remember_pointers(self, skeleton: object, pointer_of: Callable[[str, int], str]) -> None:
-        """Register a function that returns JSON pointers to the elements of one figure.
-
-        ``pointer_of``: takes a kind, as for ``remember``, and an index; returns an empty string if
-        there is no such element.
-        """
-        self._pointers[id(skeleton)] = skeleton, pointer_of
-
-    def pointer_of(self, skeleton: object, kind: str, index: int) -> str:
-        """Return the JSON pointer to an element of a figure; empty if none is registered."""
-        known = self._pointers.get(id(skeleton))
-        return "" if known is None else known[1](kind, index)
-
     def offset_of(self, kind: str, index: int) -> int:
         """Return the offset of an element of a registered kind; slow, for errors only."""
         return self._offsets[kind][1](index)
 
+    @property
+    def has_places(self) -> bool:
+        """Whether the lines of its elements are known."""
+        return bool(self._offsets)
+
     def place(self, kind: str, index: int) -> tuple[Path, int] | None:
-        """Return the file and line of an element; None if its kind is not registered."""
+        """Return the file and line of an element; None if its kind is not registered.
+
+        If a file has no normals, they are computed: only the vertices can be corrected.
+        """
+        if kind == "normals" and kind not in self._offsets:
+            kind = "positions"
         if kind not in self._offsets:
             return None
         source, offset_of = self._offsets[kind]

@@ -37,7 +37,7 @@ from viewer.formats._text.table import read_table
 from viewer.media.file_names import folder_name
 from viewer.phrases import printable
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
@@ -45,11 +45,10 @@ from viewer.rig.hierarchy import cycle_members
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, weight_sums
+from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
 
 _Indices = NDArray[np.int64]
 _JOINT, _VERTEX = "noun-joint", "noun-vertex"  # keys of phrases
-_ODD_SUM = 0.01  # tolerance of sums, well above the rounding error of the authors' files
 
 _CORE = {
     "vertices": 3,
@@ -182,7 +181,7 @@ def read(source: Source) -> Figure:
         parts[name].remember(kind, lambda index: index)
     names = _JOINTS if n_joints == len(_JOINTS) else tuple(f"joint_{j}" for j in range(n_joints))
     mesh = _mesh(source, parts, positions)
-    skin = _skin(source, parts, joints, n_vertices)
+    skin = _skin(parts, joints, n_vertices)
     regressor = _regressor(parts, n_joints, n_vertices)
     return Figure(
         name=folder_name(source.path) if source.is_folder else source.path.stem,
@@ -352,7 +351,7 @@ def _mesh(source: Source, parts: dict[str, _Part], positions: Floats) -> Mesh:
     return Mesh(positions, normals, triangles, uvs, uv_triangles=uv_triangles)
 
 
-def _skin(source: Source, parts: dict[str, _Part], joints: Floats, n_vertices: int) -> Skin:
+def _skin(parts: dict[str, _Part], joints: Floats, n_vertices: int) -> Skin:
     part = parts["skinning_weights"]
     columns = _indices(part, 0, len(joints), _JOINT, parts["t_pose_joints"])
     vertices = _indices(part, 1, n_vertices, _VERTEX, parts["vertices"])
@@ -378,57 +377,13 @@ def _skin(source: Source, parts: dict[str, _Part], joints: Floats, n_vertices: i
             joint=int(columns[row]),
             vertex=int(vertices[row]),
         )
-    skin = skin_from_entries(n_vertices, vertices, columns, weights, translation_matrix(-joints))
-    known: Bools = np.ones(n_vertices, dtype=np.bool_)
-    known[lost] = False
-    _check_weights(source, part.name, skin, known)
-    return skin
+    return skin_from_entries(n_vertices, vertices, columns, weights, translation_matrix(-joints))
 
 
 def _row_of(rows: _Indices, vertices: Ints, vertex: int) -> int:
     """Return the first row with a weight of a vertex; row 0 if there is none."""
     found = np.flatnonzero(vertices == vertex)
     return int(rows[found[0]]) if len(found) else 0
-
-
-def _check_weights(source: Source, name: str, skin: Skin, known: Bools) -> None:
-    """Report incorrect weight sums of vertices whose rows are all valid."""
-    moved = has_influence(skin)
-    bare = np.flatnonzero(~moved & known)
-    if len(bare):
-        source.warn(
-            "W004.pig-vertices",
-            part="weights",
-            places=bare,
-            name=name,
-            n=len(bare),
-            vertex=int(bare[0]),
-        )
-    negative = np.flatnonzero(skin.weights < 0.0)
-    if len(negative):
-        of = owners(skin)[negative]
-        source.warn(
-            "W002.pig-negative",
-            part="weights",
-            places=of,
-            name=name,
-            n=len(negative),
-        )
-    sums = np.where(moved & known, weight_sums(skin), 1.0)
-    off = np.abs(sums - 1.0)
-    wrong = np.flatnonzero(off > _ODD_SUM)
-    if len(wrong):
-        worst = int(off.argmax())
-        source.warn(
-            "W001.pig-sums",
-            part="weights",
-            places=wrong,
-            name=name,
-            n=len(wrong),
-            most=_ODD_SUM,
-            vertex=worst,
-            found=float(sums[worst]),
-        )
 
 
 def _regressor(parts: dict[str, _Part], n_joints: int, n_vertices: int) -> JointRegressor | None:

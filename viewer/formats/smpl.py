@@ -32,7 +32,6 @@ from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
@@ -99,7 +98,7 @@ def read(source: Source) -> Figure:
         name=source.path.stem,
         mesh=mesh,
         skeleton=ball_skeleton(names, parents, joints),
-        skin=_skin(source, archive, joints, mesh.n_vertices, used),
+        skin=_skin(archive, joints, mesh.n_vertices, used),
         up="z" if animal is not None and upright_axis(animal, joints) == "z" else "y",
         unit="m",
         blend_shapes=shapes,
@@ -335,33 +334,11 @@ def _shape_space(source: Source, archive: Archive, title: str, used: list[str]) 
     return ShapeSpace("SMIL" if kind == "smil" else title, gender or gender_of(variant))
 
 
-def _skin(
-    source: Source, archive: Archive, joints: Floats, n_vertices: int, used: list[str]
-) -> Skin:
+def _skin(archive: Archive, joints: Floats, n_vertices: int, used: list[str]) -> Skin:
     matrix = _matrix(archive, "weights", (n_vertices, len(joints)))
     vertices, columns, numbers = matrix.entries()
     weights = finite(archive, "weights", numbers, "weights", vertices)
-    if (weights < 0.0).any():
-        archive.refuse(
-            "W002.vertex",
-            item="weights",
-            count=int((weights < 0.0).sum()),
-            vertex=int(vertices[weights.argmin()]),
-            found=float(weights.min()),
-        )
     sums = np.bincount(vertices, weights, minlength=n_vertices)
-    known = np.ones(n_vertices, dtype=np.bool_)
-    known[vertices[~(np.abs(numbers) <= LARGEST)]] = False
-    errors = np.where(known, np.abs(sums - 1.0), 0.0)
-    worst = int(errors.argmax())
-    if errors[worst] > _ROUNDED:
-        archive.refuse(
-            "W001.vertex",
-            item="weights",
-            count=int((errors > _ROUNDED).sum()),
-            vertex=worst,
-            found=float(sums[worst]),
-        )
     used.append("weights")
     kept = weights != 0.0
     # Only rounding errors are corrected.

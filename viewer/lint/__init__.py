@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from viewer.diagnostics import CODES as ALL_CODES
 from viewer.diagnostics import SEVERITIES, Code
-from viewer.lint._files import lint_files
+from viewer.lint._files import Recheck, lint_files, recheck
 from viewer.lint._finding import MAX_ROTATION, Finding, LintOptions
 from viewer.lint._places import Places, places_of, points_of
-from viewer.lint._rechecks import Recheck, recheck
 from viewer.lint._report import describe, finding_text, summary, worst_first
 from viewer.lint._running import CHECKS, Check, Progress, lint_scene
 from viewer.lint._subject import Subject

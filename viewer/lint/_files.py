@@ -3,11 +3,13 @@
 Each file is read to its end, with all its errors. Files that match are assembled as in ``load``; a
 file that does not match is reported and taken out, and its figures are checked alone. Findings
 about the scene then get the file from which the part of the actor came, and messages of readers
-get their actor. What a reader and a check both found is reported once.
+get their actor. What a check finds in a figure, its reader does not report.
 """
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
@@ -16,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import SEVERITIES, Collector, Diagnostic
+from viewer.diagnostics import Collector, Diagnostic
 from viewer.diagnostics.diagnostic import merged
 from viewer.diagnostics.wording import PLACES
 from viewer.errors import FormatError, ViewerError
@@ -24,36 +26,22 @@ from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding, LintOptions
 from viewer.lint._running import Progress, lint_scene
 from viewer.loading import Contents, MotionSettings, begin, read_source
-from viewer.phrases import printable
+from viewer.phrases import listed, printable
 from viewer.rig.arrays import Ints
-from viewer.rig.figure import Figure
+from viewer.rig.figure import Figure, Origin
 from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-Owners = dict[str, int]
-"""For each ``Finding.part``, the index of the opened actor that has the same part."""
-
-# Lists of contents that can be assembled, or taken out of the scene
-_LISTS = (
-    "figures",
-    "clips",
-    "poses",
-    "pictures",
-    "body_motions",
-    "skeleton_motions",
-    "captures",
-    "morphs",
-)
-_INVALID = {"mesh": ("positions", "weights", "triangles", "bindings"),
-            "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
+_LISTED = 3  # maximum number of files that a note lists
+_INVALID: dict[str, tuple[str, ...]] = {
+    "mesh": ("positions", "weights", "triangles", "bindings"),
+    "skeleton": ("joints",),
+    "clip": ("frames",),
+}
 """Diagnostic parts for each part of an actor."""
-_CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
-"""Codes of warnings that the checks of the scene report too, with all locations."""
-_INSTEAD = {"normals": "positions"}
-"""Items whose line is given if a file does not have those of the finding."""
 
 
 def lint_files(
@@ -75,8 +63,9 @@ def lint_files(
     """
     size = MAX_SIZE if max_size is None else max_size
     opened = open_files(paths, settings, size, progress)
-    findings = lint_scene(opened.scene, options, progress, invalid_parts(opened))
-    return opened.scene, with_files(opened, findings)
+    invalid = [_invalid(actor, opened) for actor in opened.scene.actors]
+    findings = lint_scene(opened.scene, options, progress, invalid)
+    return opened.scene, with_files(opened, opened.scene, findings)
 
 
 @dataclass(slots=True)
@@ -89,8 +78,8 @@ class Opened:
     """Contents of all files that were read."""
     findings: list[Finding] = field(default_factory=list)
     """Findings about files that cannot be read or assembled, and messages of readers."""
-    sources: dict[Path, Source] = field(default_factory=dict)
-    """All files that were read, with their errors and the positions of their data."""
+    changed: list[Path] = field(default_factory=list)
+    """Files whose contents are not those of the scene that was opened from them."""
 
 
 def open_files(
@@ -129,20 +118,21 @@ def _resolved(path: Path) -> Path:
 
 def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
     """Read one file, recording all recoverable errors; return the files that it refers to."""
-    contents, recorded = Contents(), Collector(keeps_errors=True)
+    contents, recorded = opened.contents, Collector(keeps_errors=True)
     named: tuple[Path, ...] = ()
     refusals: list[Finding] = []
     try:
-        opened.sources[path] = source = Source.open(path, max_size, recorded)
+        contents.sources[path] = source = Source.open(path, max_size, recorded)
         named = read_source(source, contents, settings)
-        contents.figures = [(path, _loaded(figure, refusals)) for path, figure in contents.figures]
+        contents.figures = [
+            (own, _loaded(figure, refusals) if own == path else figure)
+            for own, figure in contents.figures
+        ]
     except ViewerError as problem:
         refusals.append(_of_refusal(problem, path))
     opened.findings += map(of_diagnostic, merged(recorded.errors))
     opened.findings += refusals
     opened.findings += map(of_diagnostic, recorded.warnings)
-    for name in _LISTS:
-        getattr(opened.contents, name).extend(getattr(contents, name))
     return named
 
 
@@ -205,15 +195,16 @@ def _readable(animations: Iterable[Animation], refusals: list[Finding]) -> Itera
 
 def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
     """Build a scene; parts that do not match are removed, reported, and checked separately."""
-    contents = replace(opened.contents)
+    contents = opened.contents
     alone: list[Figure] = []
     for path, figure in opened.contents.figures:
-        if _is_unbound(figure, opened.sources[path]):
-            alone += _take_out(contents, path)
-    while any(getattr(contents, name) for name in _LISTS):
+        if _is_unbound(figure, contents.sources[path]):
+            alone += _figures_of(contents, path)
+            contents = contents.without(path)
+    while any(contents.items()):
         problem: ViewerError | None = None
         try:
-            opened.scene, builders = begin(contents, settings)
+            opened.scene, builders = begin(contents, settings, checks=False)
         except ViewerError as refused:
             problem = refused
         else:
@@ -228,7 +219,8 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
             if settings is not None:  # a requested animation may not exist
                 settings = replace(settings, animation="")
         else:
-            alone += _take_out(contents, culprit)
+            alone += _figures_of(contents, culprit)
+            contents = contents.without(culprit)
     opened.findings += [of_diagnostic(found) for found in opened.scene.diagnostics]
     opened.scene.actors += [Actor(figure) for figure in alone]
 
@@ -266,121 +258,77 @@ def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
 
     The result is None if the file was not read here.
     """
-    paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
+    paths = [path for path, _ in contents.items()]
     found = problem.diagnostic
     if found is None or found.path is None:
         return paths[-1]
     return found.path if found.path in paths else None
 
 
-def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
-    """Remove the contents of one file, and return its figures."""
-    figures = [figure for path, figure in contents.figures if path == culprit]
-    for name in _LISTS:
-        setattr(contents, name, [item for item in getattr(contents, name) if item[0] != culprit])
-    return figures
-
-
-def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
-    """Return the data of each actor that its readers replaced; see ``Subject``."""
-    return [_invalid(actor, opened) for actor in opened.scene.actors]
+def _figures_of(contents: Contents, path: Path) -> list[Figure]:
+    return [figure for own, figure in contents.figures if own == path]
 
 
 def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
+    """Return the data of an actor that its readers replaced; see ``Subject``."""
     lost: dict[str, Ints] = {}
     for part, keys in _INVALID.items():
-        for path in _files_of(actor, part, opened.contents):
-            for fault in opened.sources[path].diagnostics.errors:
-                if fault.part in keys and fault.places is not None:
-                    known = lost.get(fault.part, fault.places)
-                    lost[fault.part] = np.union1d(known, fault.places)
+        origin = origin_of(actor, part)
+        source = None if origin is None else opened.contents.sources.get(origin.path)
+        for fault in () if source is None else source.diagnostics.errors:
+            if fault.part in keys and fault.places is not None:
+                known = lost.get(fault.part, fault.places)
+                lost[fault.part] = np.union1d(known, fault.places)
     return lost
 
 
-def with_files(
-    opened: Opened,
-    findings: list[Finding],
-    checked: tuple[Scene, Sequence[Owners]] | None = None,
-) -> list[Finding]:
-    """Return all findings without duplicate messages, and with files for those about the scene.
+def origin_of(actor: Actor, part: str) -> Origin | None:
+    """Return the file of an actor's mesh, skeleton or clip; None for an edited one."""
+    if part == "clip":
+        path, clip = actor.clip_origin or (None, None)
+        if any(animation.plays(actor.clip) for animation in actor.figure.animations):
+            path, clip = actor.file, actor.clip
+        return None if path is None or clip is not actor.clip else Origin(path, {})
+    return actor.figure.origin_of("skeleton" if part == "skeleton" else "mesh")
 
-    ``findings``: findings about its scene, or about the scene that was checked instead.
-    ``checked``: (Scene, sequence of Owners), the scene that was checked instead, and for each of
-    its actors the parts equal to opened parts.
+
+def with_files(opened: Opened, scene: Scene, findings: list[Finding]) -> list[Finding]:
+    """Return readers' messages about the opened files, then findings about a scene, with places.
+
+    The scene may be another one than that of the files, opened from them earlier and edited.
     """
-    if checked is None:
-        actors = opened.scene.actors
-        everything = [dict.fromkeys(_INVALID, index) for index in range(len(actors))]
-        checked = opened.scene, everything
-    placed = [_placed(finding, opened, *checked) for finding in findings]
-    remarks: list[Finding] = []
-    for remark in _with_actors(opened, *checked):
-        twin = next((index for index, other in enumerate(placed) if _is_same(remark, other)), None)
-        if twin is None:
-            remarks.append(remark)
-            continue
-        # The reader's finding states whether the file is rejected; the check's finding has all
-        # locations.
-        severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
-        line = remark.line if placed[twin].at is None else None
-        file, pointer = placed[twin].file, remark.pointer or None
-        placed[twin] = placed[twin].located(file, line, severity, pointer)
-    return remarks + [_with_line(finding, opened) for finding in placed]
+    return [*_with_actors(opened, scene), *(_placed(one, opened, scene) for one in findings)]
 
 
-def _is_same(remark: Finding, other: Finding) -> bool:
-    # Messages about islands without weights differ from those about single vertices.
-    same = other.code == remark.code or (remark.code == "W004" and other.code == "W005")
-    is_checked = remark.code in _CHECKED
-    return is_checked and same and (other.file is None or other.file == remark.file)
-
-
-def _with_line(finding: Finding, opened: Opened) -> Finding:
-    """Return a finding with the line of the item it refers to, if the reader recorded it."""
-    source = None if finding.file is None else opened.sources.get(finding.file)
-    if source is None or finding.at is None:
-        return finding
-    kind, index = finding.at
-    # If the file has no normals, they are computed: only the vertex can be fixed.
-    place = source.place(kind, index) or source.place(_INSTEAD.get(kind, ""), index)
-    return finding if place is None else finding.located(*place)
-
-
-def _placed(finding: Finding, opened: Opened, scene: Scene, owners: Sequence[Owners]) -> Finding:
-    """Return a finding with the file that the part of the actor came from."""
+def _placed(finding: Finding, opened: Opened, scene: Scene) -> Finding:
+    """Return a finding with the file, line and pointer from which the part of the actor came."""
     if finding.actor is None:
         return finding
+    actor = scene.actors[finding.actor]
     # An animation that is not playing has not been edited: it comes with the skeleton.
-    playing = scene.actors[finding.actor].animation
-    part = "skeleton" if finding.animation not in (-1, playing) else finding.part
-    owner = owners[finding.actor].get(part or "mesh")
-    if owner is None:
+    is_other = finding.animation not in (-1, actor.animation)
+    origin = origin_of(actor, "skeleton" if is_other else finding.part)
+    if origin is None:
         return finding
-    actor = opened.scene.actors[owner]
-    paths = _files_of(actor, part, opened.contents)
-    if not paths:
-        return finding
-    pointer = _pointer(finding, actor, opened.sources[paths[0]])
-    return finding.located(paths[0], finding.line, pointer=pointer)
-
-
-def _pointer(finding: Finding, actor: Actor, source: Source) -> str | None:
-    """Return the JSON pointer to the first item of a finding, if the reader recorded one."""
+    path, line, pointer = origin.path, None, ""
+    if origin.path in opened.changed:
+        return finding.located(path)
+    if finding.at is not None:
+        path, line, pointer = opened.contents.place_of(origin, *finding.at)
     animations = actor.figure.animations
     if 0 <= finding.animation < len(animations):
-        return animations[finding.animation].place
-    if finding.at is None or finding.part == "clip":
-        return None
-    return source.pointer_of(actor.figure.skeleton, *finding.at)
+        pointer = animations[finding.animation].place
+    return finding.located(path, line, pointer=pointer)
 
 
-def _with_actors(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
+def _with_actors(opened: Opened, scene: Scene) -> list[Finding]:
     """Return readers' messages with their actors, if they refer to a location in one."""
     known: dict[tuple[Path, str], int] = {}
-    for number, parts in enumerate(owners):
-        for part, owner in parts.items():
-            for path in _files_of(opened.scene.actors[owner], part, opened.contents):
-                known.setdefault((path, part), number)
+    for number, actor in enumerate(scene.actors):
+        for part in _INVALID:
+            origin = origin_of(actor, part)
+            if origin is not None and origin.path not in opened.changed:
+                known.setdefault((origin.path, part), number)
     aimed = []
     for remark in opened.findings:
         found: Finding | None = None
@@ -428,30 +376,84 @@ def _in_clip(remark: Finding, actor: Actor) -> Finding | None:
     return replace(remark, joints=np.unique(skeleton.dof_joints[channels]))
 
 
-def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
-    """Return the files that a part of an actor may come from, the most likely first."""
-    mesh, skeleton = actor.figure.mesh, actor.figure.skeleton
-    if part == "clip":
-        # Motions become separate clips, except for keyed ones, which are kept as read.
-        paths = [path for path, clip in contents.clips if clip is actor.clip]
-        paths += [
-            path
-            for path, figure in contents.figures
-            if any(animation.plays(actor.clip) for animation in figure.animations)
-        ]
-        moving = [*contents.body_motions, *contents.skeleton_motions, *contents.captures]
-        return paths + ([moving[0][0]] if len(moving) == 1 and not paths else [])
-    if part == "skeleton" and skeleton is not None:
-        moved = [(path, motion.figure) for path, motion in contents.skeleton_motions]
-        own = [path for path, figure in contents.figures if figure.skeleton is skeleton]
-        return own or [
-            path
-            for path, figure in moved
-            if figure.skeleton is not None and figure.skeleton.names == skeleton.names
-        ]
-    return [
-        path
-        for path, figure in contents.figures
-        # Applying a texture creates another mesh with the same positions.
-        if mesh is not None and figure.mesh is not None and figure.mesh.positions is mesh.positions
-    ]
+@dataclass(frozen=True, slots=True, eq=False)
+class Recheck:
+    """Findings about an open scene and its files."""
+
+    findings: list[Finding]
+    """Findings as from ``lint_files``, for the current state of the scene."""
+    n_files: int
+    """Number of files that the scene was opened from."""
+    notes: tuple[str, ...]
+    """One line for each file that is missing or was changed."""
+
+
+def recheck(
+    scene: Scene,
+    paths: Sequence[Path] = (),
+    options: LintOptions | None = None,
+    settings: MotionSettings | None = None,
+    since: float | None = None,
+    progress: Progress | None = None,
+) -> Recheck:
+    """Check an open scene, and report messages of the readers of its files.
+
+    Parts unchanged since opening are reported with file and line, edited parts without them.
+
+    ``paths``: the files that the scene was opened from; if omitted, those of its figures.
+    ``settings``: with which its motions were interpreted. ``since``: time at which it was opened,
+    seconds since the epoch; files changed later are reported. ``progress``: as for ``lint_scene``;
+    reading files is included.
+    """
+    paths = paths or list(
+        dict.fromkeys(one.path for actor in scene.actors for one in actor.figure.origins)
+    )
+    opened = open_files(paths, settings, progress=progress)
+    findings = lint_scene(scene, options, progress)
+    notes = []
+    gone = [path for path in paths if not _is_there(path)]
+    if gone:
+        notes.append(f"{_names(gone, 'is', 'are')} missing: only the open scene was checked")
+        # The remaining files need not match each other.
+        opened.findings = [found for found in opened.findings if found.code != "F004"]
+    read = [path for path in opened.contents.sources if path not in gone]
+    opened.changed = [path for path in read if since is not None and _changed(path) > since]
+    if opened.changed:
+        which = _names(opened.changed, "was", "were")
+        notes.append(f"{which} changed after opening: readers' messages are about the new contents")
+    return Recheck(with_files(opened, scene, findings), len(paths), tuple(notes))
+
+
+def _names(paths: list[Path], one: str, many: str) -> str:
+    names = listed([printable(path.name, 60) for path in paths], _LISTED)
+    return f"{names} {one if len(paths) == 1 else many}"
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        path.stat()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _changed(path: Path) -> float:
+    """Return when a file, or any file in a folder, was last changed, as seconds since the epoch."""
+    return max(map(_last_change, _with_contents(path)), default=0.0)
+
+
+def _with_contents(path: Path) -> Iterator[Path]:
+    yield path
+    if path.is_dir():
+        for folder, _, names in os.walk(path):
+            yield from (Path(folder, name) for name in names)
+
+
+def _last_change(path: Path) -> float:
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return 0.0
+    # A copy may keep the old modification time; a folder's ctime changes when it is moved.
+    is_file = stat.S_ISREG(status.st_mode)
+    return max(status.st_mtime, status.st_ctime if is_file else 0.0)

@@ -29,6 +29,7 @@ from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
+from viewer.rig.inspection.faults import faults_of
 from viewer.rig.mesh import hidden_parts
 from viewer.rig.scene import Actor, Scene
 
@@ -63,7 +64,7 @@ def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scen
 
 
 def begin(
-    contents: Contents, settings: MotionSettings | None = None
+    contents: Contents, settings: MotionSettings | None = None, checks: bool = True
 ) -> tuple[Scene, list[Builder]]:
     """Create a scene that can be shown, and return the captures that are still to be read.
 
@@ -77,11 +78,9 @@ def begin(
     group_of = {figure: group for group in contents.groups for figure in group.figures}
     for pair, figure in joined_figures(figures):
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
-        origin = figures[pair[-1]][0]
         actor = Actor(
             figure,
             called=draft.free_title(called),
-            origin=origin,
             hidden_parts=hidden_parts(figure.mesh),
         )
         draft.add(actor, figure.up, placed=False, group=group_of.get(figure))
@@ -102,7 +101,8 @@ def begin(
     place_side_by_side(draft)
     draft.views += placed_views(draft)
     _note_unused_options(contents, draft, settings or MotionSettings())
-    found = (*contents.diagnostics, *draft.diagnostics)
+    faults = _faults(contents, draft.actors) if checks else []
+    found = (*contents.diagnostics, *draft.diagnostics, *faults)
     facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
     scene = Scene(draft.actors, found, "z" if world_up == "z" else "y", tuple(draft.views), facts)
     draft.files[:0] = contents.files
@@ -115,6 +115,22 @@ def begin(
         scene.space = switched[0].space
         scene.in_space = partial(_assembled_in, contents, settings, draft.builders)
     return scene, draft.builders
+
+
+def _faults(contents: Contents, actors: Sequence[Actor]) -> list[Diagnostic]:
+    """Return the warnings of ``lint`` that are cheap to find, about the figures of a scene."""
+    found = []
+    for figure in dict.fromkeys(actor.figure for actor in actors):
+        origin = figure.origin_of("mesh")
+        for fault in faults_of(figure):
+            if fault.severity == "note":
+                continue
+            one = Diagnostic(fault.key, values=fault.values, level=fault.severity)
+            if origin is not None:
+                path, line, pointer = contents.place_of(origin, *fault.at)
+                one = replace(one, path=path, line=line, pointer=pointer)
+            found.append(one)
+    return found
 
 
 def _lone_poses_as_motions(contents: Contents) -> Contents:
@@ -282,7 +298,7 @@ def _files(draft: SceneDraft) -> list[list[Actor]]:
     files: dict[object, list[Actor]] = {}
     for actor in draft.actors:
         if actor.figure.animations and actor.clip is None:
-            files.setdefault(actor if actor.origin is None else actor.origin, []).append(actor)
+            files.setdefault(actor.file or actor, []).append(actor)
     return [*files.values()]
 
 

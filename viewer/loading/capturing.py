@@ -236,7 +236,8 @@ class Builder:
         for actor, drive, clip, said in motions:
             # The user may have changed the frame rate of a motion that is already shown.
             rate = clip.timing.frame_rate if actor.clip is None else frame_rate(actor.clip)
-            actor.drive, actor.clip = drive, with_rate(clip, rate)
+            actor.drive = drive
+            self._replace_clip(actor, with_rate(clip, rate))
             self.plants_feet = self._is_behind = False
             notes += [replace(note, path=self.path) for note in said]
         return notes
@@ -260,7 +261,7 @@ class Builder:
             new.append(actor)
         else:
             assert isinstance(actor.clip, SampledClip)  # set when the actor was created
-            actor.clip = _extended(actor.clip, clip)
+            self._replace_clip(actor, _extended(actor.clip, clip))
             if drive is not None and actor.drive is not None:
                 actor.drive = _grown(actor.drive, drive)
 
@@ -285,14 +286,21 @@ class Builder:
                 "known": len(known.names),
             }
             return [Diagnostic("C005.keypoint-count", self.path, values=values)]
-        actor.clip = _joined_points(actor.clip, clip)
+        self._replace_clip(actor, _joined_points(actor.clip, clip))
         return []
 
     def _actor(self, figure: Figure, clip: SampledClip | PointClip, person: int) -> Actor:
         actor = Actor(figure, clip=clip, placement=self.placement.copy(), person=person)
         actor.called = self.called or self.capture.name
+        actor.clip_origin = None if self.path is None else (self.path, clip)
         scale_to_unit(actor, self.unit)
         return actor
+
+    def _replace_clip(self, actor: Actor, clip: SampledClip | PointClip) -> None:
+        """Give a person a later state of the motion, which is that of the file unless edited."""
+        if actor.clip_origin is not None and actor.clip is actor.clip_origin[1]:
+            actor.clip_origin = actor.clip_origin[0], clip
+        actor.clip = clip
 
     @property
     def actors(self) -> list[Actor]:
@@ -334,8 +342,8 @@ class Builder:
             notes += said
         self.target = target
         for actor, clip, drive in clips:
-            actor.figure, actor.clip, actor.color = target, clip, None
-            actor.drive = drive
+            self._replace_clip(actor, clip)
+            actor.figure, actor.color, actor.drive = target, None, drive
             actor.pose = figure_pose(target)
         notes = [replace(note, path=self.path) for note in notes] + self._finished()
         for actor, _, _ in clips:

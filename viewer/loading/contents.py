@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -15,7 +15,7 @@ from viewer.errors import FormatError, RigError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
-from viewer.rig.figure import Figure
+from viewer.rig.figure import Figure, Origin
 from viewer.rig.material import Material, Texture
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from viewer.rig.motion.skeleton_motion import SkeletonMotion
     from viewer.rig.posing.pose_record import PoseRecord
 
+Place = tuple[Path, int | None, str]
+"""File, line and JSON pointer of an element; None or empty if unknown."""
 _PEEK = 16  # number of bytes that identify an image
 _LISTS = {
     "Clip": "clips",
@@ -64,8 +66,30 @@ class Contents:
     """Messages from the readers."""
     files: tuple[Path, ...] = ()
     """All files that were read."""
+    sources: dict[Path, Source] = field(default_factory=dict)
+    """Files in which the lines of elements are known."""
     used_options: set[str] | None = None
     """Options that had an effect on the contents; None if unused options are not to be reported."""
+
+    def items(self) -> Iterator[tuple[Path, object]]:
+        """Yield everything that can be assembled, with its file."""
+        for name in (*_LISTS.values(), "pictures"):
+            yield from getattr(self, name)
+
+    def without(self, path: Path) -> Contents:
+        """Return the contents of all other files."""
+        others = replace(self)
+        for name in (*_LISTS.values(), "pictures"):
+            setattr(others, name, [item for item in getattr(self, name) if item[0] != path])
+        return others
+
+    def place_of(self, origin: Origin, kind: str, index: int) -> Place:
+        """Return where an element of a part from one of the files is: file, line, JSON pointer."""
+        source = self.sources.get(origin.path)
+        line = None if source is None else source.place(kind, index)
+        path = origin.path if line is None else line[0]
+        pointer = "" if origin.pointer_of is None else origin.pointer_of(kind, index)
+        return path, None if line is None else line[1], pointer
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -117,6 +141,9 @@ def read_files(
     contents.diagnostics = tuple(
         found for source in sources for found in source.diagnostics.warnings
     )
+    contents.sources = {source.path: source for source in sources if source.has_places}
+    for source in contents.sources.values():
+        source.release()  # it is read again if the line of a fault is needed
     contents.used_options = {name for source in sources for name in source.used_options}
     read = (path for source in sources for path in (source.path, *source.also_read))
     contents.files = tuple(dict.fromkeys(read))

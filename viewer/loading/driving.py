@@ -59,6 +59,7 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     """
     for path, clip in contents.clips:
         _give_clip(path, clip, draft, contents)
+        draft.note_motions(path)
     drives = bool(contents.skeleton_motions) and settings.drives
     models = BodyModels(draft, settings)
     named = models.named("") if drives else None
@@ -69,9 +70,11 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     for path, motion in contents.skeleton_motions:
         alone = give_skeleton_motion(path, motion, draft, settings, named)
         lone += [] if alone is None else [alone]
+        draft.note_motions(path)
     _check_footage(contents, settings)
     for path, body in contents.body_motions:
         _give_body_motion(path, body, draft, models)
+        draft.note_motions(path)
     for path, capture in contents.captures:
         _begin_capture(path, capture, draft, models)
     agree_on_units(draft, lone)

@@ -67,4 +67,5 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
         values = {"n": skin.n_joints, "skeleton": paths[0], "joints": skeleton.n_joints}
         raise RigError(Diagnostic("B001.joints", paths[1], values=values))
     facts = (*figures[0].facts, *figures[1].facts)
-    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts)
+    origins = (*figures[0].origins, *figures[1].origins)
+    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts, origins=origins)

@@ -46,6 +46,12 @@ class SceneDraft:
         """Record a message, with the values of its template, about a file if ``path`` is given."""
         self.diagnostics.append(Diagnostic(key, path, values=values))
 
+    def note_motions(self, path: Path) -> None:
+        """Record the file of the motions that actors have received since the last call."""
+        for actor in self.actors:
+            if actor.clip is not None and actor.clip_origin is None:
+                actor.clip_origin = path, actor.clip
+
     def free_title(self, title: str) -> str:
         """Return an unused title for a new actor, or for all people of a new capture."""
         return free_title(self.actors, title)

@@ -21,7 +21,7 @@ from viewer.formats import Source
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure, FigureGroup
+from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.animation_choice import chosen_animation
 from viewer.rig.motion.sampled_animation import baked
@@ -92,8 +92,9 @@ def give_skeleton_motion(
         if refusal:
             draft.note("F007.stands-alone", path, problem=refusal)
     called = draft.free_title(motion.figure.name)
-    actor = Actor(motion.figure, clip=motion.clip, placement=placement, called=called)
-    draft.add(actor, motion.figure.up, placed=False)
+    figure = read_from(path, motion.figure)
+    actor = Actor(figure, clip=motion.clip, placement=placement, called=called)
+    draft.add(actor, figure.up, placed=False)
     return Lone(path, motion, actor)
 
 
@@ -188,8 +189,9 @@ def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
             unit, facts = one.motion.figure.unit, dict(one.motion.figure.facts)
             scaled = _in_metres(one.motion, unit, str(facts.get("unit", unit)))
             place = next(n for n, actor in enumerate(draft.actors) if actor is one.actor)
+            figure, origin = read_from(one.path, scaled.figure), (one.path, scaled.clip)
             draft.actors[place] = replace(
-                one.actor, figure=scaled.figure, clip=scaled.clip, pose=None
+                one.actor, figure=figure, clip=scaled.clip, clip_origin=origin, pose=None
             )
         if one.motion.unit_note is not None:
             key = "F007.unit-taken-and-scaled" if one in chosen else "F007.unit-taken"
@@ -258,7 +260,7 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
         except RigError:
             continue  # reported when the animations are started
         drive = Drive(motion, joint_map=settings.joint_map, plants_feet=settings.feet)
-        path = actor.origin or Path(figure.name)
+        path = actor.file or Path(figure.name)
         if drive_somebody(path, drive, draft, np.eye(4), others)[0]:
             draft.take(next(n for n, other in enumerate(draft.actors) if other is actor))
             found = True

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +18,8 @@ from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from viewer.diagnostics import Diagnostic
     from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
     from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
@@ -27,6 +31,23 @@ if TYPE_CHECKING:
     from viewer.rig.motion.transform_clip import Animation
     from viewer.rig.posing.pose_vector import PoseLayout
     from viewer.rig.skin import Skin
+
+
+FilePart: TypeAlias = Literal["mesh", "skeleton"]
+"""A part of a figure that comes from one file: the mesh with its skin, or the skeleton."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Origin:
+    """The file that parts of a figure were read from."""
+
+    path: Path
+    parts: dict[FilePart, tuple[object, ...]]
+    """The parts as read, None for a missing one. An edited part consists of other objects, whose
+    origin is therefore unknown."""
+    pointer_of: Callable[[str, int], str] | None = None
+    """Returns the JSON pointer to an element of a kind, as for ``Source.remember``; empty if there
+    is none."""
 
 
 class AttachedFigure(NamedTuple):
@@ -84,6 +105,8 @@ class Figure:
     """Model and gender whose shape coefficients apply to it, if it is a body model."""
     record: FileRecord | None = None
     """Other data of its glTF or FBX file, to be written back."""
+    origins: tuple[Origin, ...] = ()
+    """The files that it was read from; a skin and its skeleton may come from two."""
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None and self.points is None:
@@ -102,6 +125,18 @@ class Figure:
                 f"figure {self.name}: the skin has {self.skin.n_joints} binding matrices, "
                 f"but the skeleton has {self.skeleton.n_joints} joints"
             )
+
+    def origin_of(self, part: FilePart) -> Origin | None:
+        """Return the file of a part that has not been edited since; None if there is none."""
+        own = _parts(self)[part]
+        for origin in self.origins:
+            known = origin.parts[part]
+            # Something that the file lacks may have been added when it was opened.
+            if known[0] is not None and all(
+                old is None or old is new for old, new in zip(known, own, strict=True)
+            ):
+                return origin
+        return None
 
     def _check_vertices(self) -> None:
         """Check that all per-vertex data fits the mesh."""
@@ -203,6 +238,20 @@ class Figure:
             If one of them is missing.
         """
         return AttachedFigure(self.require_mesh(), self.require_skeleton(), self.require_skin())
+
+
+def _parts(figure: Figure) -> dict[FilePart, tuple[object, ...]]:
+    """Return the objects that each part consists of; another texture leaves a mesh the same."""
+    mesh = figure.mesh
+    arrays = (None,) * 3 if mesh is None else (mesh.positions, mesh.normals, mesh.triangles)
+    return {"mesh": (*arrays, figure.skin), "skeleton": (figure.skeleton,)}
+
+
+def read_from(
+    path: Path, figure: Figure, pointer_of: Callable[[str, int], str] | None = None
+) -> Figure:
+    """Return a figure that knows the file from which all its parts were read."""
+    return replace(figure, origins=(Origin(path, _parts(figure), pointer_of),))
 
 
 def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:

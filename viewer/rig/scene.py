@@ -76,8 +76,6 @@ class Actor:
     """Name of the recording opened for this actor; empty to use the figure's name."""
     animation: int = -1
     """Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none."""
-    origin: Path | None = None
-    """File of its figure; figures from the same file play their animations together."""
     hidden_parts: frozenset[int] = frozenset()
     """Parts of the mesh that are not drawn, by index."""
     springs: Swinging | None = None
@@ -87,6 +85,9 @@ class Actor:
     of the figure that shows it."""
     drive: Drive | None = None
     """Motion of another skeleton from which the clip was retargeted; None for other clips."""
+    clip_origin: tuple[Path, Motion] | None = None
+    """File of its motion, and the clip as it was opened: an edited one is another object. Clips
+    that are animations of the figure come from the file of the figure."""
 
     @property
     def title(self) -> str:
@@ -103,6 +104,11 @@ class Actor:
         from viewer.rig.captures.person import person_name
 
         return f"{name} {person_name(self.person)}"
+
+    @property
+    def file(self) -> Path | None:
+        """File of its mesh; figures from the same file play their animations together."""
+        return self.figure.origins[-1].path if self.figure.origins else None
 
     @property
     def is_drawn(self) -> bool:

@@ -119,7 +119,7 @@ def hold_checks(monkeypatch):
         seen.append(scene)
         return lint_scene(scene, options)
 
-    monkeypatch.setattr("viewer.lint._rechecks.lint_scene", held)
+    monkeypatch.setattr("viewer.lint._files.lint_scene", held)
     return go, seen, is_held
 
 

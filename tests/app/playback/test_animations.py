@@ -16,6 +16,7 @@ from viewer.app.playback.animations import choose_animation, played
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.loading import Contents, begin
+from viewer.rig.figure import read_from
 from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, Scene, figure_pose
 
@@ -23,7 +24,8 @@ SIZE = (1180, 760)
 
 
 def scene_of(*figures) -> Scene:
-    return begin(Contents(figures=[(Path("hero.glb"), figure) for figure in figures]))[0]
+    path = Path("hero.glb")
+    return begin(Contents(figures=[(path, read_from(path, figure)) for figure in figures]))[0]
 
 
 @pytest.fixture

@@ -81,12 +81,9 @@ def test_normals_are_used_as_stored():
 
 def test_any_number_of_influences_is_kept():
     pairs = " ".join("1 0.001" for _ in range(5000))
-    figure, warnings = read(GOOD.replace("1 1 1\n}", f"5000 {pairs}\n}}"))
+    figure = silent(GOOD.replace("1 1 1\n}", f"5000 {pairs}\n}}"))
     assert figure.skin.starts.tolist() == [0, 1, 3, 5003]
     assert figure.skin.weights[3:].tolist() == [0.001] * 5000
-    assert warnings == [
-        "a.skin:14: weights of 1 vertex do not sum to 1 (worst: 5 at vertex 2); used as stored"
-    ]
 
 
 def test_zero_weights_and_a_joint_listed_twice_are_kept():
@@ -175,44 +172,3 @@ def test_extra_braces_are_reported_as_a_warning():
     figure, warnings = read(GOOD + "}}")
     assert_good(figure)
     assert warnings == ['a.skin: ignored 2 "}" outside any section']
-
-
-def test_vertices_without_influence_are_reported_as_a_warning():
-    figure, warnings = read(GOOD.replace("1 0 1.0", "0").replace("1 1 1\n", "1 1 0\n"))
-    assert figure.skin.starts.tolist() == [0, 0, 2, 3]
-    assert warnings == [
-        "a.skin:12: 2 vertices have no influence and stay in the bind pose (first: vertex 0)"
-    ]
-
-
-def test_negative_weights_are_reported_as_a_warning():
-    figure, warnings = read(GOOD.replace("0.25 1 0.75", "-0.25 1 1.25"))
-    assert figure.skin.weights.tolist() == [1, -0.25, 1.25, 1]
-    assert warnings == ["a.skin:13: 1 negative weight (first: -0.25 at vertex 1); used as stored"]
-
-
-def test_weights_that_do_not_sum_to_1_are_reported_as_a_warning():
-    figure, warnings = read(GOOD.replace("0 1.0", "0 0.98").replace("0.75", "0.5"))
-    assert figure.skin.weights.tolist() == [0.98, 0.25, 0.5, 1]
-    assert warnings == [
-        (
-            "a.skin:13: weights of 2 vertices do not sum to 1 (worst: 0.75 at vertex 1); "
-            "used as stored"
-        )
-    ]
-
-
-def test_weight_sums_within_a_hundredth_cause_no_warning():
-    silent(GOOD.replace("0 1.0", "0 0.991"))
-
-
-def test_ill_conditioned_bind_matrix_is_reported_as_a_warning():
-    _, warnings = read(GOOD.replace("0 0 1\n  5", "0 0 1e-8\n  5"))
-    assert warnings == ["a.skin:20: bindings: matrix 0 is ill-conditioned (condition number 1e+08)"]
-
-
-def test_stray_vertex_is_reported_as_a_warning():
-    figure, warnings = read(GOOD.replace("  0 2 0\n", "  0 1e30 0\n"))
-    assert figure.mesh.positions[2].tolist() == [0, 1e30, 0]
-    # Three vertices are sparse, with a median distance of 2.
-    assert warnings == ["a.skin:4: stray vertex 2, 1e+30 units from the others"]

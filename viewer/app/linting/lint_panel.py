@@ -30,7 +30,6 @@ from viewer.lint import (
     worst_first,
 )
 from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
-from viewer.loading import bundled_files
 from viewer.phrases import counted, printable
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rendering.picking import Pick
@@ -396,9 +395,7 @@ def start_check(state: AppState) -> None:
     settings, since = state.motion_settings, state.opened_at
 
     def check(report: Report) -> list[str]:
-        # The bundled figure is also read from files.
-        files, is_likely = paths or bundled_files(), not paths
-        found = recheck(copy, files, options, settings, since, report, is_likely)
+        found = recheck(copy, paths, options, settings, since, report)
         findings = tuple(worst_first(found.findings))
         running.result = Checked(source, copy, options, findings, found.n_files, found.notes)
         return [f"Checked: {summary(findings)}"]

@@ -97,12 +97,12 @@ def _clips(
 
 def _of_one_file(state: AppState, chosen: Actor) -> list[Actor]:
     """Return the actors with animations that were read from the chosen actor's file."""
-    if chosen.origin is None:
+    if chosen.file is None:
         return [chosen]
     return [
         actor
         for actor in state.scene.actors
-        if actor.figure.animations and actor.origin == chosen.origin
+        if actor.figure.animations and actor.file == chosen.file
     ]
 
 

@@ -84,9 +84,6 @@ MESSAGES = {
     "F002.root": _ROOT,
     "S002.root": _ROOT,
     "F002.roots": "{item:text}: expected one root, found joints 0 and {joint}",
-    "W001.vertex": "{item:text}: vertex {vertex}: expected weights that sum to 1, found "
-    "{found:.4g}",
-    "W002.vertex": "{item:text}: vertex {vertex}: expected non-negative weights, found {found:.4g}",
     "W010.vertex": "{item:text}: vertex {vertex}: expected a joint index from 0 to {last}, found "
     "{found}",
     # The SMPL family
@@ -182,11 +179,6 @@ MESSAGES = {
     "{partner} -> {back}",
     "F002.pig-lost": "{item:+{}: }rows with invalid entries",
     "F007.pig-texture": "no textures or faces_tex: drawn untextured",
-    "W001.pig-sums": "{name:text}: {n:#weight sum|differs|differ} from 1 by more than {most} "
-    "(worst: {found:.4g} at vertex {vertex})",
-    "W002.pig-negative": "{name:text}: {n:#negative weight}; used as stored",
-    "W004.pig-vertices": "{name:text}: {n:#vertex|has|have} no weights and {n:?stays|stay} at rest "
-    "(first: vertex {vertex})",
 }
 
 PHRASES = {

@@ -85,10 +85,6 @@ MESSAGES = {
     "{found:quoted}",
     "W010.skin-joint": "skinweights of vertex {vertex}: expected a joint index below {limit}, "
     "found {found}",
-    "W001.skin-sums": "weights of {n:#vertex} do not sum to 1 (worst: {sum:.6g} at vertex "
-    "{vertex}); used as stored",
-    "W002.skin-negative": "{n:#negative weight} (first: {weight:g} at vertex {vertex}); used as "
-    "stored",
     "B001.skin-section": "expected a `{missing}` section to go with `{present}`, found none",
     "B001.skin-count": "bindings (to line {line}): expected {expected:#matrix}, found "
     "{found:#matrix} followed by {then:quoted}",
@@ -96,9 +92,6 @@ MESSAGES = {
     "{found:#matrix} followed by {then:quoted}",
     "B002.skin-matrix": "bindings: expected invertible matrices, found matrix {matrix} with "
     "determinant {determinant:.3g}",
-    "B003.skin-matrix": "bindings: matrix {matrix} is ill-conditioned (condition number "
-    "{condition:.2g})",
-    "M010.skin-vertex": "stray vertex {vertex}, {distance:.2g} units from the others",
     "F006.skin-section": "ignored unknown section {found:quoted}",
     "F006.skin-material": "ignored unknown material property {found:quoted}",
     "F006.skin-braces": 'ignored {n} "}}" outside any section',

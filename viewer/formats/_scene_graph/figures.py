@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -26,10 +26,9 @@ from viewer.formats._scene_graph.surfaces import (
 )
 from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.figure import Figure, FigureGroup
+from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.file_record import FileRecord, VrmRecord
 from viewer.rig.motion.transform_clip import Animation
-from viewer.rig.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from viewer.formats._source import Source
@@ -149,7 +148,8 @@ def _figure(
         animations=animations_of(file.animations, readers, joints.own, columns, beside),
         record=record,
     )
-    _remember_pointers(source, figure.skeleton, file, members, joints, pieces)
+    pointer_of = _pointers(file, members, joints, pieces) if file.has_pointers else None
+    figure = read_from(source.path, figure, pointer_of)
     return _Made(figure, record, joints, pieces, joints.own.keys() | columns.keys())
 
 
@@ -263,40 +263,34 @@ def _facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...
     return (*facts, *file.facts)
 
 
-def _remember_pointers(
-    source: Source,
-    skeleton: Skeleton | None,
-    file: NodeFile,
-    members: Members,
-    joints: Joints,
-    pieces: list[Piece],
-) -> None:
-    """Register the JSON pointers of nodes, skin joints and primitives, if the file has any."""
-    if not file.has_pointers:
-        return
+def _pointers(
+    file: NodeFile, members: Members, joints: Joints, pieces: list[Piece]
+) -> Callable[[str, int], str]:
+    """Return the function that returns JSON pointers to nodes, skin joints and primitives."""
     first_vertices = np.cumsum([0, *(piece.n_vertices for piece in pieces)])
     first_triangles = np.cumsum([0, *(len(piece.triangles) for piece in pieces)])
+    primitives = [piece.primitive.pointer for piece in pieces]
+    nodes, skins = joints.nodes, {index: file.skins[index].joints for index in members.skins}
 
     def pointer_of(kind: str, index: int) -> str:
         if kind in ("joints", "bindings"):
-            return _joint(file, members, joints.nodes[index], kind)
+            return _joint(nodes[index], skins if kind == "bindings" else {})
         if kind == "triangles":
-            piece = int(np.searchsorted(first_triangles, index, "right")) - 1
-            return pieces[piece].primitive.pointer
+            return primitives[int(np.searchsorted(first_triangles, index, "right")) - 1]
         if kind in _ATTRIBUTES:
             piece = int(np.searchsorted(first_vertices, index, "right")) - 1
-            return f"{pieces[piece].primitive.pointer}/attributes/{_ATTRIBUTES[kind]}"
+            return f"{primitives[piece]}/attributes/{_ATTRIBUTES[kind]}"
         return ""
 
-    source.remember_pointers(skeleton, pointer_of)
+    return pointer_of
 
 
-def _joint(file: NodeFile, members: Members, node: int, kind: str) -> str:
-    """Return the pointer to a joint's node, or to its entry in a skin; empty if it is auxiliary."""
+def _joint(node: int, skins: Mapping[int, Ints]) -> str:
+    """Return the pointer to a joint's entry in a skin, or to its node; empty if auxiliary."""
     if node < 0:
         return ""
-    for index in members.skins if kind == "bindings" else ():
-        places = np.flatnonzero(file.skins[index].joints == node)
+    for index, listed in skins.items():
+        places = np.flatnonzero(listed == node)
         if len(places):
             return f"/skins/{index}/joints/{places[0]}"
     return f"/nodes/{node}"

@@ -32,7 +32,6 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.skin.checks import (
     check_mesh,
-    check_weights,
     checked_influences,
     checked_triangles,
     even_counts,
@@ -147,10 +146,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
         return skin
     inverse_bind = invert_bindings(source, sections)
     joints, weights = checked_influences(source, sections, len(inverse_bind))
-    skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
-    if not source.diagnostics.errors:  # after errors, warnings about weights are redundant
-        check_weights(source, skin)
-    return skin
+    return Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
 
 
 def _unbound_skin(sections: Sections) -> Skin:

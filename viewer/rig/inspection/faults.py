@@ -10,6 +10,7 @@ from dataclasses import field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -29,6 +30,7 @@ _AFFINE = 1e-6  # maximum absolute error of the last row
 # in models with half of their vertices in the face.
 _FAR = 40.0
 
+Indices = NDArray[np.int64] | Ints
 NO_INDICES: Ints = np.zeros(0, dtype=np.int32)
 Invalid = Mapping[str, Ints]
 """Data that a reader replaced because the data in the file is invalid: vertices by ``"positions"``
@@ -46,9 +48,9 @@ class Fault:
     """Kind and index of the element to look at first, as for ``Source.remember``."""
     values: Mapping[str, Any]
     """Values of the message."""
-    vertices: Ints = field(default_factory=lambda: NO_INDICES)
-    triangles: Ints = field(default_factory=lambda: NO_INDICES)
-    joints: Ints = field(default_factory=lambda: NO_INDICES)
+    vertices: Indices = field(default_factory=lambda: NO_INDICES)
+    triangles: Indices = field(default_factory=lambda: NO_INDICES)
+    joints: Indices = field(default_factory=lambda: NO_INDICES)
     """(N,): indices, worst first."""
     severity: str = ""
     """Severity, if different from that of the code."""
@@ -206,14 +208,14 @@ def stray_vertices(figure: Figure) -> Iterator[Fault]:
     yield Fault("M010.vertices", ("positions", first), values, far)
 
 
-def _labels(figure: Figure, joints: Ints) -> list[str]:
+def _labels(figure: Figure, joints: Indices) -> list[str]:
     if figure.skeleton is None:
         return [f"#{joint}" for joint in joints]
     labels = joint_labels(figure.skeleton)
     return [labels[joint] for joint in joints]
 
 
-def _distinct(values: Ints) -> Ints:
+def _distinct(values: Indices) -> Indices:
     """Return each value once, in the given order."""
     _, first = np.unique(values, return_index=True)
     return values[np.sort(first)]
