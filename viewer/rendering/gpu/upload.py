@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from viewer.errors import RenderError
 from viewer.rendering.gpu.context import check_errors, is_software
-from viewer.rendering.gpu.mipmaps import add_mipmaps
 from viewer.rig.arrays import Bytes, Floats
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
@@ -152,7 +151,7 @@ def picture_texture(
     stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
     texture = context.texture(size, 4, flipped, internal_format=stored_as)
     texture.repeat_x = texture.repeat_y = False
-    add_mipmaps(texture, flipped, is_linear)
+    texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
         texture.anisotropy = 8.0  # would double the drawing time in software
