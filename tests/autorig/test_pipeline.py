@@ -8,8 +8,6 @@ from autorig.rigged_shapes import arm, mesh_of, turn
 from faults import told
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import clip_for
@@ -257,16 +255,6 @@ def test_unknown_settings_are_refused(settings, message):
     with pytest.raises(RigError) as problem:
         TransferSettings(**settings)
     assert str(problem.value) == message
-
-
-def test_missing_scipy_is_reported(monkeypatch):
-    import sys
-
-    figure, pose = bent_arm()
-    monkeypatch.setitem(sys.modules, "scipy.spatial", None)
-    with pytest.raises(RigError) as problem:
-        transfer(figure, pose, figure.mesh)
-    assert str(problem.value) == "rigging needs scipy: pip install scipy"
 
 
 def test_rigged_figure_is_complete():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bench_skinning import synthetic
 from measure import interleaved, median_ratio, report
+from scipy.sparse import csr_matrix
 
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.pose import rest_pose
@@ -16,11 +17,6 @@ FRAMES = 32
 
 def main(rounds: int = 60) -> None:
     """Print the ratios for one frame and for a batch."""
-    try:
-        from scipy.sparse import csr_matrix
-    except ImportError:
-        print("deform: skipped, scipy is not installed (pip install scipy)\n")
-        return
     figure = synthetic()
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     assert mesh is not None and skeleton is not None and skin is not None

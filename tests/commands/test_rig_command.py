@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 import viewer
 from viewer.cli import run
 from viewer.commands import rig

@@ -101,7 +101,6 @@ def test_images_and_videos_are_checked(inputs, folder, refuse, case):
 
 
 def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
-    pytest.importorskip("scipy")
     mesh = folder.parent / "mesh.obj"
     assert run(["convert", *inputs.roof, "-o", str(mesh)]) == 0
     command = ["rig", str(mesh), "--from", inputs.roof[0], "--from", inputs.roof[1]]

@@ -11,8 +11,6 @@ import pytest
 from autorig.rigged_shapes import arm
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 import viewer
 from viewer import formats
 from viewer.autorig.pipeline import transfer

@@ -77,7 +77,6 @@ def test_synthetic_models_and_captures_have_no_findings(shared_data: Path, name:
 
 @pytest.mark.usefixtures("quick_fits")
 def test_automatically_rigged_mesh_has_no_findings(tmp_path: Path) -> None:
-    pytest.importorskip("scipy")
     body = viewer.load(bundled_body()).actors[0]
     moved = 1.3 * viewer.deform(body.figure, body.pose)[0] + [0.2, 0.0, 0.1]
     triangles = body.figure.mesh.triangles

@@ -21,7 +21,6 @@ import numpy as np
 from viewer.autorig.surface.welding import Welded, edges, weld
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
 from viewer.rig.geometry.vectors import unit
@@ -287,7 +286,9 @@ def at_vertices(
 
 
 def _nearest(points: Floats, asked: Floats) -> tuple[Any, Floats]:
-    tree = scipy_part("spatial").cKDTree(points)
+    from scipy import spatial
+
+    tree = spatial.cKDTree(points)
     distances, found = tree.query(asked, workers=1 if len(asked) < _FEW else -1)
     return found, distances
 

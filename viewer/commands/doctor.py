@@ -40,6 +40,7 @@ _PACKAGES = (
     "platformdirs",
     "orjson",
     "rich",
+    "scipy",
     "shtab",
 )
 _EXTRAS = {
@@ -47,7 +48,6 @@ _EXTRAS = {
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
     "isal": "faster PNG encoding",
-    "scipy": "viewer rig, comparing different meshes",
     "pebble": "worker processes of viewer batch",
     "dask": "viewer batch on clusters",
     "distributed": "viewer batch on clusters",

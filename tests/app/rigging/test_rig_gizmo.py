@@ -11,8 +11,6 @@ from app import rig_scene
 from app.rig_scene import TRUE
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 from viewer.app.core.view_frame import view_frame
 from viewer.app.rigging.placing import (
     aligned_template,

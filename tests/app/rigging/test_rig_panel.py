@@ -12,7 +12,6 @@ from app.rigging.rig_panel import SIZE, names, seen, stop
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
 from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment

@@ -8,7 +8,6 @@ from app.test_panel_pictures import _compare, _shown
 
 from viewer.app.layout import ShownPanels
 
-pytest.importorskip("scipy")
 pytestmark = pytest.mark.usefixtures("quick_fits")
 
 SIZE = (1000, 1100)

@@ -16,7 +16,6 @@ from app.tiny import write_rig
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
 import viewer
 from viewer.app.closing import Closing, request_quit, unsaved_edits
 from viewer.app.files.files import Files
@@ -31,18 +30,6 @@ from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skinning import deform
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
-
-
-def test_missing_scipy_shows_a_message(rigging, monkeypatch):
-    def missing(name):
-        raise ModuleNotFoundError(name)
-
-    monkeypatch.setattr("viewer.rig._scipy.import_module", missing)
-    hand = rigging()
-    hand.click("Run")
-    hand.finish_job()
-    assert hand.state.error == "rigging needs scipy: pip install scipy"
-    assert names(hand) == ["scan", "arm"]
 
 
 def test_settings_are_used_by_alignment_and_transfer(rigging, monkeypatch):

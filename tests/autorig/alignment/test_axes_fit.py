@@ -1,11 +1,8 @@
 """Fit of a scale along each axis, with the rotation if requested."""
 
 import numpy as np
-import pytest
 from autorig.rigged_shapes import tube, turn
 from numpy.testing import assert_allclose
-
-pytest.importorskip("scipy")
 
 from viewer.autorig.alignment.axes_fit import fit_axes
 from viewer.autorig.alignment.icp import Triangles

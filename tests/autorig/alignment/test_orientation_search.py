@@ -5,8 +5,6 @@ import pytest
 from autorig.rigged_shapes import tube, turn
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 from viewer.autorig.alignment.icp import Cloud
 from viewer.autorig.alignment.orientation_search import (
     axis_direction,

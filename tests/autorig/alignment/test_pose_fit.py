@@ -1,11 +1,8 @@
 """Fit of the template's joints to the pose of the target."""
 
 import numpy as np
-import pytest
 from autorig.rigged_shapes import arm, turn
 from numpy.testing import assert_allclose
-
-pytest.importorskip("scipy")
 
 from viewer.autorig.alignment.icp import Triangles
 from viewer.autorig.alignment.pose_fit import fit_pose

@@ -7,8 +7,6 @@ import pytest
 from autorig.rigged_shapes import arm, mesh_of, turn
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 from viewer.autorig.alignment import posed_alignment
 from viewer.autorig.alignment.pose_fit import Fitted
 from viewer.autorig.alignment.posed_alignment import align_posed

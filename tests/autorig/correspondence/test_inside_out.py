@@ -1,12 +1,10 @@
 """Parts with inverted winding: closed parts and most of a mesh are flipped, linings are not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from autorig.rigged_shapes import mesh_of, tube
-
-pytest.importorskip("scipy")
-
-from dataclasses import replace
 
 from viewer.autorig.correspondence import with_reversed_winding, wound_backwards
 from viewer.autorig.surface.welding import weld

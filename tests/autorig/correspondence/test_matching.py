@@ -7,8 +7,6 @@ from viewer.autorig.correspondence import MatchSettings, Template, match, sheet_
 from viewer.autorig.surface.welding import weld
 from viewer.errors import RigError
 
-pytest.importorskip("scipy")
-
 FLAT = Template(
     np.array([[-9.0, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
 )  # faces +z

@@ -4,8 +4,6 @@ import pytest
 from viewer.autorig.weights.weight_transfer import nearest_vertices
 from viewer.errors import RigError
 
-pytest.importorskip("scipy")
-
 
 def test_nearest_vertices_match_a_search_of_all_distances():
     rng = np.random.default_rng(1)

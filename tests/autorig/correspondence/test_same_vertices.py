@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 from viewer.autorig.correspondence import at_vertices, same_vertices
 from viewer.autorig.surface.welding import weld
 from viewer.rig.geometry.closest_point import Surface

@@ -10,8 +10,6 @@ from viewer.autorig.surface.laplacian import (
 from viewer.autorig.surface.welding import weld
 from viewer.rig.mesh import triangle_areas
 
-pytest.importorskip("scipy")
-
 ROUNDING = 1e-12
 
 

@@ -1,9 +1,6 @@
 import numpy as np
-import pytest
 
 from viewer.autorig.surface.welding import edges, islands, non_manifold_edges, weld
-
-pytest.importorskip("scipy")
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 

@@ -1,10 +1,7 @@
 """Transfer of pose correctives to another mesh."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-
-pytest.importorskip("scipy")
 
 from viewer.autorig.transfer import corrective_transfer
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives

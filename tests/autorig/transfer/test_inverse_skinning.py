@@ -5,8 +5,6 @@ import pytest
 from autorig.rigged_shapes import arm, turn
 from numpy.testing import assert_allclose
 
-pytest.importorskip("scipy")
-
 from viewer.autorig.transfer.inverse_skinning import invert_skinning, repair_tears
 from viewer.rig.skin import skin_from_lists
 

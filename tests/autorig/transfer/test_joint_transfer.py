@@ -1,11 +1,8 @@
 """Transfer of joints with the surrounding surface."""
 
 import numpy as np
-import pytest
 from autorig.rigged_shapes import tube
 from numpy.testing import assert_allclose, assert_array_equal
-
-pytest.importorskip("scipy")
 
 from viewer.autorig.transfer.joint_transfer import (
     boundary_weights,

@@ -1,13 +1,12 @@
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse import linalg as linear
 
 from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import inpaint
 from viewer.errors import RigError
-
-sparse = pytest.importorskip("scipy.sparse")
-linear = pytest.importorskip("scipy.sparse.linalg")
 
 
 def silent(fraction, what):

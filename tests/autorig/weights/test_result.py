@@ -1,12 +1,9 @@
 import numpy as np
-import pytest
 from faults import told
 
 from viewer.autorig.correspondence import Matches
 from viewer.autorig.weights.result import RigidIslands, match_lines, nothing_matched, rigid_lines
 from viewer.rig.geometry.closest_point import SurfacePoints
-
-pytest.importorskip("scipy")
 
 
 def matches(matched, inside_out=()):

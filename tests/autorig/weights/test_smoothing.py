@@ -1,9 +1,7 @@
 import numpy as np
-import pytest
+from scipy import sparse
 
 from viewer.autorig.weights.weight_transfer import smooth, within
-
-sparse = pytest.importorskip("scipy.sparse")
 
 STRIP = np.array([[0, 1, 2], [2, 1, 3]])  # edges 01 02 12 13 23
 

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
+from scipy import sparse
 
 from viewer.autorig.weights.weight_transfer import put_rows, scaled_rows, skin_of, weight_matrix
 from viewer.errors import RigError
 from viewer.rig.skin import skin_from_lists
-
-sparse = pytest.importorskip("scipy.sparse")
 
 BIND = np.tile(np.eye(4), (3, 1, 1))
 ALL = np.array([[0, 1, 2]])

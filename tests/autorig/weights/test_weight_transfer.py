@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from faults import told
+from scipy import sparse
 
 from viewer.autorig.correspondence import MatchSettings, Template
 from viewer.autorig.weights.weight_transfer import (
@@ -11,8 +12,6 @@ from viewer.autorig.weights.weight_transfer import (
 from viewer.errors import RigError
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import Skin, skin_from_entries, skin_from_lists
-
-sparse = pytest.importorskip("scipy.sparse")
 
 BIND = np.tile(np.eye(4), (3, 1, 1))
 

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
+from scipy import sparse
 
 from viewer.errors import RigError
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
-
-sparse = pytest.importorskip("scipy.sparse")
 
 # Distances are of order 1; this allows for rounding of a few operations and of squares near 0.
 ROUNDING = 1e-12
@@ -162,16 +161,6 @@ def test_closest_refuses_points_that_are_not_finite():
     with pytest.raises(RigError) as caught:
         surface.closest(np.array([[0.0, np.nan, 0.0]]))
     assert str(caught.value) == "points: expected finite numbers, found nan at index 0, 1"
-
-
-def test_missing_scipy_is_reported_with_the_install_command(monkeypatch):
-    def missing(name):
-        raise ModuleNotFoundError(name)
-
-    monkeypatch.setattr("viewer.rig._scipy.import_module", missing)
-    with pytest.raises(RigError) as caught:
-        Surface(np.eye(3), np.array([[0, 1, 2]]))
-    assert str(caught.value) == "rigging needs scipy: pip install scipy"
 
 
 TWO = SurfacePoints([1, 0], [[0.5, 0.25, 0.25], [0, 1, 0]], np.zeros((2, 3)), np.zeros(2))

@@ -16,7 +16,6 @@ import numpy as np
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import SurfaceSamples, sample_surface, triangle_normals
 from viewer.data_classes import dataclass
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -56,7 +55,9 @@ class Cloud:
 
     def __init__(self, samples: SurfaceSamples, dense: SurfaceSamples) -> None:
         self.samples, self._dense = samples, dense
-        self._tree: Any = scipy_part("spatial").cKDTree(dense.positions)
+        from scipy import spatial
+
+        self._tree: Any = spatial.cKDTree(dense.positions)
         self.size = _size(dense.positions)
 
     def with_samples(self, samples: SurfaceSamples) -> Cloud:

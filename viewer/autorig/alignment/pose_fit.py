@@ -35,7 +35,6 @@ from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
 from viewer.data_classes import dataclass
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import (
@@ -148,7 +147,9 @@ def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -
     near = found.usable & (np.linalg.norm(found.positions - points, axis=1) <= reach)
     facing = np.einsum("na,na->n", found.normals, aligned.normals[chosen]) >= _SAME_WAY
     asked = target.samples
-    distances, nearest = scipy_part("spatial").cKDTree(aligned.positions).query(asked.positions)
+    from scipy import spatial
+
+    distances, nearest = spatial.cKDTree(aligned.positions).query(asked.positions)
     same_way = np.einsum("na,na->n", asked.normals, aligned.normals[nearest]) >= _SAME_WAY
     towards = (distances <= reach) & same_way
     away = near & facing

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from viewer.autorig.surface.welding import Welded, edges, non_manifold_edges
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 
 # Cotangent of 0.6 degrees; triangles with smaller angles are treated as equilateral.
@@ -114,7 +113,8 @@ def _steady(cotangents: Floats) -> Floats:
 
 def _from_edges(n_vertices: int, links: Ints, weights: Floats) -> Any:
     """Return the Laplacian of weighted edges (E, 2); weights of the same edge are summed."""
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     a, b = links[:, 0], links[:, 1]
     shape = (n_vertices, n_vertices)
     matrix = sparse.csr_array(

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 
 # Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
@@ -69,7 +68,9 @@ def islands(n_vertices: int, triangles: Ints) -> Ints:
     ``triangles``: (T, 3), vertex indices. Returns (V,) int32, labels from 0, in the order of their
     first vertices.
     """
-    sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
+    from scipy import sparse
+    from scipy.sparse import csgraph as graph
+
     links = edges(triangles)
     matrix = sparse.csr_array(
         (np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])),
@@ -115,8 +116,9 @@ def _joined_nearby(positions: Floats, tolerance: float) -> Any:
     Each round merges every position with its nearest neighbour, so the size of clusters at least
     halves per round; finding all pairs in one pass would take memory quadratic in a cluster's size.
     """
-    sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
-    spatial = scipy_part("spatial")
+    from scipy import sparse, spatial
+    from scipy.sparse import csgraph as graph
+
     labels: Any = np.arange(len(positions))
     kept = labels
     while True:

@@ -8,7 +8,6 @@ import numpy as np
 
 from viewer.autorig.surface.welding import edges, weld
 from viewer.data_classes import dataclass
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.skin import Skin
@@ -85,7 +84,8 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     """
     if not inverted.guarded.any():
         return inverted.positions
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     welded = weld(inverted.positions, triangles)
     count = len(welded.positions)
     links = edges(welded.triangles)
@@ -104,7 +104,9 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     smooth = sparse.csr_array(smooth)[dof]
     places = welded.positions.ravel()
     system = sparse.csc_array(normal + _SMOOTH * smooth[:, dof])
-    solved = scipy_part("sparse.linalg").spsolve(
+    from scipy.sparse import linalg
+
+    solved = linalg.spsolve(
         # Fixed vertices are known and move to the right-hand side.
         system,
         right - _SMOOTH * (smooth[:, fixed] @ places[fixed]),
@@ -119,7 +121,8 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
 
 def _laplacian(count: int, links: Ints) -> Any:
     """Return the graph Laplacian: each vertex minus the mean of its neighbours."""
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     a, b = links[:, 0], links[:, 1]
     degree = np.maximum(np.bincount(links.ravel(), minlength=count), 1)
     rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
@@ -141,5 +144,7 @@ def _normal_equations(
     np.add.at(blocks, rows, np.swapaxes(linear, 1, 2) @ linear)
     np.add.at(right, rows, np.einsum("vab,va->vb", linear, steps))
     starts = np.arange(len(blocks) + 1)
-    matrix = scipy_part("sparse").bsr_array((blocks, starts[:-1], starts))
+    from scipy import sparse
+
+    matrix = sparse.bsr_array((blocks, starts[:-1], starts))
     return matrix, right.ravel()

@@ -33,7 +33,6 @@ from viewer.autorig.weights.result import (
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
@@ -257,7 +256,8 @@ def inpaint(
     ``method``: solver that succeeded: "direct" unless that failed. Raises ``RigError`` if no method
     solves the system, or SciPy is missing.
     """
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     wanted, given = np.nonzero(unknown)[0], np.nonzero(matched)[0]
     if len(wanted) == 0:
         return sparse.csr_array((0, weights.shape[1])), "direct"
@@ -282,7 +282,8 @@ def inpaint(
 
 def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
     """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     used = np.unique(border.indices)  # matched vertices within two edges of an unknown vertex
     right = sparse.csc_array(-border[:, used] @ weights[used])
     joints = np.nonzero(np.diff(right.indptr))[0]
@@ -307,14 +308,16 @@ def _is_true(solve: _Solve, border: Any) -> bool:
 
 
 def _shifted(matrix: Any) -> Any:
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     shift = _SHIFT * float(matrix.diagonal().mean())
     return matrix + sparse.diags_array(np.full(matrix.shape[0], shift))
 
 
 def _factorised(matrix: Any) -> _Solve | None:
     """Return a solver by sparse factorisation, or None if that fails."""
-    linear = scipy_part("sparse.linalg")
+    from scipy.sparse import linalg as linear
+
     try:
         # Symmetric and positive: no pivoting, and an ordering that preserves the symmetry.
         factors = linear.splu(
@@ -366,7 +369,8 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) 
     others are only read. Returns sparse (W, J) in rows, new weights below 1e-6 are dropped, and
     rows rescaled to their previous sum.
     """
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     links = edges(triangles)
     both = np.concatenate([links, links[:, ::-1]])
     both = both[active[both[:, 0]]]
@@ -396,7 +400,9 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
     vertices at which the paths start. ``reach``: maximum length in the unit of ``positions``.
     Returns (W,) bool, reached vertices, including the sources.
     """
-    sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
+    from scipy import sparse
+    from scipy.sparse import csgraph as graph
+
     if not sources.any():
         return sources.copy()
     links = edges(triangles)
@@ -447,7 +453,8 @@ def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) 
 
 def scaled_rows(matrix: Any, factors: Floats) -> Any:
     """Return a sparse (V, J) matrix with its rows multiplied by (V,); 0 leaves an empty row."""
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     scaled = sparse.csr_array(sparse.diags_array(factors) @ matrix)
     scaled.eliminate_zeros()
     return scaled
@@ -455,7 +462,8 @@ def scaled_rows(matrix: Any, factors: Floats) -> Any:
 
 def put_rows(rows: Any, where: Any, values: Any) -> Any:
     """Return sparse rows; the rows at the unique indices ``where`` are replaced by ``values``."""
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     kept = np.ones(rows.shape[0])
     kept[where] = 0.0
     every = np.arange(len(where))
@@ -466,7 +474,8 @@ def put_rows(rows: Any, where: Any, values: Any) -> Any:
 
 
 def _matrix(skin: Skin) -> Any:
-    sparse = scipy_part("sparse")
+    from scipy import sparse
+
     shape = (skin.n_vertices, skin.n_joints)
     matrix = sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape, copy=True)
     matrix.sum_duplicates()
@@ -485,6 +494,8 @@ def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
     """
     if len(template) == 0:
         raise RigError("expected a template with vertices, found none")
-    tree = scipy_part("spatial").cKDTree(template)
+    from scipy import spatial
+
+    tree = spatial.cKDTree(template)
     distances, vertices = tree.query(points, workers=-1)
     return np.asarray(vertices, dtype=np.int32), np.asarray(distances, dtype=np.float64)

@@ -1,13 +1,15 @@
 """Smooth curves of corrections through weighted targets, and a smooth step.
 
-``smooth_curves`` are discrete smoothing splines (Whittaker 1923). A curve c with targets t and
-weights w minimises::
+``smooth_curves`` are discrete smoothing splines (Whittaker 1923; Eilers 2003, A perfect smoother).
+A curve c with targets t and weights w minimises::
 
     sum_k w_k (c_k - t_k)^2  +  s^4 sum_k (c_(k-1) - 2 c_k + c_(k+1))^2
 
-Setting the derivative by each c_k to zero gives (W + s^4 D^T D) c = W t with the second differences
-D: a symmetric matrix with two diagonals on either side. Where the weights are 1 and the targets 0,
-a curve decays within a few multiples of s rows. Its slope never changes suddenly.
+The first sum pulls the curve to its targets, the second penalises its bends. s is a length in
+rows: where the weights are 1, a bump of the curve is s rows wide. A wave of the targets that is
+u radians per row is scaled by 1 / (1 + s^4 (2 - 2 cos u)^2), about 1 / (1 + (s u)^4), so that slow
+changes pass and fast ones do not. A weight far above s^4 fixes a row; a weight of 1 with target 0
+lets the curve decay to 0 within a few multiples of s, without a sudden change of its slope.
 """
 
 from __future__ import annotations
@@ -16,76 +18,32 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-_BLOCK = 32  # rows that are solved together, with one call for all curves
-
 
 def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
-    """Return the curves that minimise the sum above, independently of each other.
+    """Return the curves that minimise the sum above, independently of each other: (S, N, C).
 
     ``targets``: (S, N, C), targets t of S curves with C components. ``weights``: (S, N), weights w,
-    greater than 0. Returns (S, N, C).
+    greater than 0. ``span``: length s in rows.
     """
+    from scipy.linalg import solveh_banded  # loads for 0.3 s, and only planted feet need it
+
+    # The derivative of the sum by every c_k is 0: (W + s^4 D^T D) c = W t with W = diag(w) and the
+    # second differences D, whose rows are 1 -2 1. D^T D reaches two rows to either side, so the
+    # matrix is symmetric with the diagonal and two bands above it. It is positive definite, because
+    # W is: a banded Cholesky factorisation solves it in N steps.
     count = targets.shape[1]
-    n_blocks = -(-count // _BLOCK)
-    padding = n_blocks * _BLOCK - count
-    full = np.pad(weights, ((0, 0), (0, padding)), constant_values=1.0)
-    main, next_, second = _bands(full, count, span**4)
-    right = np.pad(weights[..., None] * targets, ((0, 0), (0, padding), (0, 0)))
-    # Only neighbouring blocks depend on each other: E couples the last two rows of one with the
-    # first two of the next. Forwards, each block is solved for its own sums and for the two
-    # unknowns y that follow it: x = A^-1 b - A^-1 E y. Backwards, these are known.
-    solved: list[Floats] = []
-    coupling = np.zeros((_BLOCK, 2))
-    for block in range(n_blocks):
-        rows = slice(block * _BLOCK, (block + 1) * _BLOCK)
-        matrix = _diagonal_block(main[:, rows], next_[rows], second[rows])
-        sums = right[:, rows].copy()
-        if solved:
-            # The previous block, A x + E y = b, is eliminated from E' x + B y = c.
-            changes = np.einsum("ab,sac->sbc", coupling, solved[-1])
-            matrix[:, :2, :2] -= changes[..., :2]
-            sums[:, :2] -= changes[..., 2:]
-        coupling = _coupling(next_[rows], second[rows])
-        columns = np.broadcast_to(coupling, (len(weights), _BLOCK, 2))
-        solved.append(np.linalg.solve(matrix, np.concatenate([columns, sums], axis=2)))
-    result = np.empty_like(right)
-    after = np.zeros_like(right[:, :2])
-    for block in range(n_blocks - 1, -1, -1):
-        part = solved[block][..., 2:] - solved[block][..., :2] @ after
-        result[:, block * _BLOCK : (block + 1) * _BLOCK] = part
-        after = part[:, :2]
-    return result[:, :count]
-
-
-def _bands(weights: Floats, count: int, stiffness: float) -> tuple[Floats, Floats, Floats]:
-    """Return the diagonal (S, M), and the two diagonals above it, (M,): row k and k + 1, k + 2."""
-    length = weights.shape[1]
-    rough = np.zeros((3, length))
-    inner = max(count - 2, 0)  # number of second differences: 1, -2, 1
+    bands = np.zeros((3, count))  # scipy's upper form: element (i, j) is in row 2 + i - j, column j
+    inner = max(count - 2, 0)  # number of second differences
     for offset, factor in enumerate((1.0, -2.0, 1.0)):
-        rough[0, offset : offset + inner] += stiffness * factor**2
-    for offset in (0, 1):
-        rough[1, offset : offset + inner] -= 2.0 * stiffness
-    rough[2, :inner] += stiffness
-    return weights + rough[0], rough[1], rough[2]
-
-
-def _diagonal_block(main: Floats, next_: Floats, second: Floats) -> Floats:
-    """Return a block of the symmetric matrix: (S, B, B)."""
-    rows = np.arange(_BLOCK)
-    matrix = np.zeros((len(main), _BLOCK, _BLOCK))
-    matrix[:, rows, rows] = main
-    for step, band in ((1, next_), (2, second)):
-        matrix[:, rows[:-step], rows[step:]] = band[:-step]
-        matrix[:, rows[step:], rows[:-step]] = band[:-step]
-    return matrix
-
-
-def _coupling(next_: Floats, second: Floats) -> Floats:
-    """Return the first two columns of the block to the right: (B, 2)."""
-    result = np.zeros((_BLOCK, 2))
-    result[-1] = next_[-1], second[-1]
-    result[-2, 0] = second[-2]
+        bands[2, offset : offset + inner] += span**4 * factor**2
+    for offset in (1, 2):
+        bands[1, offset : offset + inner] -= 2.0 * span**4
+    bands[0, 2:] = span**4
+    result = np.empty_like(targets)
+    for curve, weight, target in zip(result, weights, targets, strict=True):
+        matrix = bands.copy()
+        matrix[2] += weight
+        curve[:] = solveh_banded(matrix[-min(3, count) :], weight[:, None] * target)
     return result
 
 

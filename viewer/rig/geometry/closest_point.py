@@ -16,7 +16,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
 _PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
@@ -172,7 +171,8 @@ def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
     """
     corners = triangles[found.triangles]
     if not isinstance(values, np.ndarray):
-        sparse = scipy_part("sparse")
+        from scipy import sparse
+
         starts = np.arange(len(corners) + 1) * 3
         matrix = sparse.csr_array(
             (found.barycentric.ravel(), corners.ravel(), starts),
@@ -201,7 +201,9 @@ class _Level:
     def of(cls, pieces: Floats, triangles: Ints) -> _Level:
         """Return a searchable level of pieces (P, 3, 3) of triangles (P,)."""
         centers, radii = pieces.mean(axis=1), _radii(pieces)
-        tree = scipy_part("spatial").cKDTree(centers)
+        from scipy import spatial
+
+        tree = spatial.cKDTree(centers)
         return cls(tree, centers, _normals(pieces), radii, triangles, float(radii.max()))
 
 
