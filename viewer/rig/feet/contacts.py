@@ -70,6 +70,14 @@ def foot_contacts(
     ``ease``: seconds over which the hold rises and falls at the ends of a contact. ``slips``: how
     many times faster along the ground the feet may move, as ``limits.SLIPS``.
     """
+    # For every foot and every span without gaps:
+    #   1. ball and heel separately: rows in which the point is low on the foot and slow (_stands);
+    #   2. a run of rows in which either stands is a candidate, so that a step that rolls from the
+    #      heel to the ball stays one contact;
+    #   3. a candidate is dropped if it is shorter than any step, or if the foot is never the
+    #      lowest;
+    #   4. its rows get a hold of 1 at speeds up to SLOW, falling smoothly to 0 at FAST: the planner
+    #      fixes the former and lets go of the latter.
     lows = np.array([foot.lowest(up) for foot in feet])
     result = []
     for number, foot in enumerate(feet):
@@ -164,6 +172,9 @@ def ground_level(
 
     ``contacts``: contacts of every foot, at least one.
     """
+    # Contacts within LEVEL of one another are on the same floor. For each contact, count the rows
+    # of all contacts on its floor: the floor with most rows is where the person stands longest. A
+    # floor near height 0, where most files put the ground, wins with a third of that.
     every = [contact for foot in contacts for contact in foot]
     heights = np.array([contact.height for contact in every])
     rows = np.array([contact.stop - contact.start for contact in every])
@@ -174,6 +185,8 @@ def ground_level(
     best = int(counts.argmax())
     if is_usual.any():
         best = int(np.where(is_usual, np.abs(heights - clearance), np.inf).argmin())
+    # The weighted median: the height at which half of the floor's rows are passed. Unlike the mean,
+    # it ignores a contact on tiptoe or on the edge of a step.
     order = np.argsort(heights[near[best]])
     passed = np.cumsum(rows[near[best]][order])
     middle = int(np.searchsorted(passed, 0.5 * passed[-1]))
@@ -238,6 +251,10 @@ def ground_velocity(
 
     The parameters are those of ``foot_contacts``.
     """
+    # The velocity that most rows of the lowest foot share, within GROUND_SAME: every one of up to
+    # 500 rows is a candidate, the one with most neighbours wins, and the median of its neighbours
+    # is the estimate. A mean over all rows would be biased by the swings, in which the lowest foot
+    # moves the other way.
     speeds, body = _speeds(feet, spans, rate, up)
     if not len(speeds):
         return None

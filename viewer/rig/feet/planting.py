@@ -140,6 +140,9 @@ def _attempt(
     step: int,
 ) -> _Attempt:
     """Return the motion with its feet planted according to a plan; reports progress from a step."""
+    # Soles first, because levelling moves the balls and heels that are then held in place. What the
+    # attempt gained (sliding, distance from the ground) and cost (sudden knees) is measured on the
+    # result, by forward kinematics of the clip as it will be played.
     report(step, STEPS, "steps")
     level = clip if plan.is_own else levelled(clip, body, worlds, plan)
     report(step + 1, STEPS, "steps")
@@ -382,11 +385,16 @@ def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
 
 def _steadied(plan: FootPlan, rotations: Floats, holds: Floats) -> Floats:
     """Return rotations, (2, N, L, 4), smoothed over time where feet stand."""
+    # q and -q are one rotation. With signs that make neighbours nearest, the four components are
+    # ordinary curves, and rotations of a standing foot differ by so little that smoothing the
+    # components and normalising is smoothing the rotation (error of third order in the angle).
     rotations = rotations.copy()
     align_signs(rotations.swapaxes(0, 1))
     smooth, ones = np.empty_like(rotations), np.ones(holds.shape)
     for part in (0, 1):
         smooth[part] = _curves(plan, rotations[part], ones[part], _NOISE)
+    # A blend by the holds themselves would jump where a contact begins; their smooth curve rises
+    # over _LEVELS seconds. It overshoots a little, so it is clipped to a fraction.
     blend = np.stack([_curves(plan, h[..., None], ones[0], _LEVELS)[..., 0] for h in holds])
     mixed = rotations + np.clip(blend, 0.0, 1.0)[..., None] * (smooth - rotations)
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
@@ -407,6 +415,10 @@ def _tilts(normals: Floats, up: Floats) -> Floats:
 
 def _faded_tilts(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
     """Return corrections, (2, N, L, 3), that fade out where soles are not flat."""
+    # A row's weight is compared with s^4 of the smooth curve, s = _LEVELS seconds in rows: 168 at
+    # 60 rows per second. 1 lets the tilt fade to its target 0; 10^6 of a fully held row enforces it
+    # to a few ten-thousandths; the exponent in between lets the weight grow evenly over the orders
+    # of magnitude, so that the curve tightens gradually as a foot lands.
     weights = 1.0 + holds * 10.0 ** (_FLAT * holds)
     parts = zip(targets, weights, strict=True)
     return np.stack([_curves(plan, target, weight, _LEVELS) for target, weight in parts])
@@ -479,7 +491,13 @@ def _foot_shifts(
     heights of the soles. ``straight``: (N, L), length of each leg from hip to ankle, as a fraction
     of its maximum length. Returns ``shifts``: list of (N, 3); ``sway``: (N, 3).
     """
+    # Feet and body depend on each other: a foot in the air moves with the body, and the body
+    # follows the feet on the ground. Two rounds settle this. 1. Feet relative to a body that is
+    # moved by one constant, the usual rise. 2. The body: the mean of its planted feet, and the
+    # quick part that they share, of which a second pass finds what the first one left. 3. Feet
+    # relative to it.
     every = [_wanted(plan, foot, points[foot], heights[:, foot]) for foot in range(len(points))]
+    # A bent leg can lengthen, so its foot needs no help of the body; a straight one cannot.
     bent = falling((straight - _STRAIGHT[0]) / (_STRAIGHT[1] - _STRAIGHT[0]))
     rises = np.concatenate(
         [each.rise[(each.holds >= 1.0) & (bent[:, foot] < 0.5)] for foot, each in enumerate(every)]
@@ -503,6 +521,9 @@ def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: F
     is_flat, holds = np.zeros(len(heights), dtype=np.bool_), np.zeros(len(heights))
     low = path.lowest(plan.up)
     for contact, rows, ground in plan.stances(foot):
+        # With hold h, the foot is to move by (1 - h) times the step of the source's foot: not at
+        # all while it stands, like the source when it leaves. The correction is what is missing,
+        # and its mean is 0, so that no direction of the slide is preferred.
         loose = np.zeros_like(contact.hold) if plan.is_own else 1.0 - contact.hold
         wanted = loose[:, None] * plan.steps((path.toe, path.heel), contact)
         steps = np.cumsum(plan.steps(points, contact) - wanted, axis=0)
@@ -531,6 +552,10 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0
 
     ``n_lifts`` is the number of passes that lift sinking feet.
     """
+    # Everything is relative to the body, base: then 0 is the target of a foot in the air, which is
+    # what smooth curves with weight 1 decay to. Each foot has two curves, because rows can be held
+    # at a height without a horizontal target: rows [0, count) of the arrays are horizontal, with 3
+    # components, rows [count, 2 count) vertical, with 1 (the others stay 0).
     up, count = plan.up, len(every)
     usual = base @ up
     flat = base - usual[:, None] * up
@@ -543,6 +568,14 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0
     if not plan.is_own:
         targets = _calmed(plan, targets, weights)
     found = _smoothed(plan, targets, _strength(weights))
+    # A curve misses its targets by about s^4 over the weight, 1e-5 of its bend for a held foot. A
+    # standing foot must be exact, so its rows are set to the targets.
+    #
+    # A swinging foot may now sink into the ground. A curve cannot have a lower limit, but targets
+    # can be raised: each pass adds what is missing to the target of every sinking row, with a
+    # weight of a quarter of the stiffness s^4. The neighbours rise with it, so after a few passes
+    # (the method of multipliers with a fixed penalty: Nocedal & Wright 2006, ch. 17) the foot
+    # passes just above the ground, without a kink where it would have touched.
     result, lifted = [], 1.0 + _LIFTED * (_EASE * plan.rate) ** 4
     for foot, wanted in enumerate(every):
         row = count + foot
@@ -569,6 +602,9 @@ def _calmed(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
     Where the whole body of a recording jumps for a frame, a foot that stays in place makes the knee
     jump instead.
     """
+    # A jump is what a curve of 0.03 s does not follow. Below 0.2 % of the body (3 mm) it is noise
+    # that the foot may hide, above 0.4 % it is passed on, in between partly. Heights pass on at
+    # most 0.07 % (1 mm): a foot above the ground is seen more easily than one that slips.
     smooth = _smoothed(plan, targets, holds + 1e-6, _JUMP)
     away = np.linalg.norm(targets - smooth, axis=2, keepdims=True) / plan.size
     jumps = 1.0 - falling((away - _JUMPS[0]) / (_JUMPS[1] - _JUMPS[0]))
@@ -580,6 +616,9 @@ def _calmed(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
 
 def _strength(holds: Floats) -> Floats:
     """Return the weights of rows: from 1 for free rows to the weight of an exactly held foot."""
+    # Relative to s^4 = 6561 (0.15 s at 60 rows per second): a hold of 0.25 weighs 1.25, which the
+    # curve ignores; 0.5 weighs 500, which bends it; 0.75 weighs 7.5e5 and 1 weighs 1e9, which fix
+    # it.
     return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 
@@ -598,6 +637,9 @@ def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) 
     ``weights`` are the weights of the feet, (N, L); ``usual`` is the translation without planted
     feet, (N, 3).
     """
+    # In each row, the weighted mean of the shifts of the feet on the ground. The usual translation
+    # takes part with a small weight: it decides in flight and hardly counts beside a planted foot,
+    # without a division by 0 or a case in between.
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)
     for foot, shift in enumerate(shifts):
         for contact, rows, _ in plan.stances(foot):
@@ -605,6 +647,9 @@ def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) 
             sums[rows] += weight * shift[rows]
             total[rows] += weight
     mean = sums / total
+    # The mean jumps when a foot lands or leaves. A moving average of 0.3 s makes a ramp of the
+    # jump, a second one rounds the corners of the ramp: the body moves without sudden velocity.
+    # Each is a difference of cumulated sums, with the ends of a span continued by their values.
     half = max(1, round(_SWAY * plan.rate))
     for start, stop in plan.spans:
         for _ in range(2):
@@ -620,6 +665,9 @@ def _shake(plan: FootPlan, shifts: list[Floats]) -> Floats:
     Noise of the source's root moves body and feet alike. If the feet stay in place and the body
     does not follow them, this noise moves the knees. Noise of one leg must not move the others.
     """
+    # Quick: what a smooth curve of 0.1 s does not follow. The weight of a foot is the fourth power
+    # of its smoothed hold, so that a foot counts only well inside a contact, where its shift is
+    # exact.
     own = np.stack(shifts)
     ones = np.ones(own.shape[:2])
     quick = own - _smoothed(plan, own, ones, _SHAKE)
@@ -628,7 +676,10 @@ def _shake(plan: FootPlan, shifts: list[Floats]) -> Floats:
     total = holds.sum(axis=0)
     mean = np.einsum("lnc,lna->na", holds, quick) / np.maximum(total, 1.0)
     squares = np.einsum("lnc,lna->nc", holds, quick**2) / np.maximum(total, 1.0)
-    # 1 if all feet have the same translation, less if they differ.
+    # The weighted mean m of the shifts x_l and the mean of their squares: |m|^2 = E|x|^2 exactly if
+    # all are equal, and |m|^2 is about E|x|^2 / L if L feet move independently. The ratio is 1 if
+    # all feet have the same translation, less if they differ; its square suppresses chance
+    # agreement.
     agreement = (mean**2).sum(axis=1, keepdims=True) / np.maximum(squares, 1e-30)
     return np.minimum(agreement, 1.0) ** 2 * mean
 

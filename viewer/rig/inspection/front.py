@@ -109,6 +109,9 @@ def _vote(actor: Actor, up: Floats) -> Floats:
         "ends": _from_ends(names, places, up),
         "travel": _from_travel(_path(actor), box_size(bounding_box(places)), up),
     }
+    # Every kind is a vector of length 0 to 1, whose sum is a weighted vote: kinds that agree add
+    # up, kinds that disagree cancel, and a kind without evidence does not vote. At least a quarter
+    # of what those with evidence could say together must be left.
     total = sum(weight for kind, weight in _WEIGHTS.items() if found[kind].any())
     vote = sum((_WEIGHTS[kind] * way for kind, way in found.items()), np.zeros(3))
     return _unit(vote, max(0.25 * total, _SURE))
@@ -165,6 +168,7 @@ def _from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     ``places``: (J, 3), their positions. ``up``: (3,), unit vector. Returns (3,), mean of the unit
     vectors of all pairs.
     """
+    # With y up and left along +x, left x up is x cross y = z, the front; the same in any axes.
     found: dict[str, dict[str, list[Floats]]] = {}
     for (side, word), place in zip(sided_words(names), places, strict=True):
         if side:
@@ -216,6 +220,9 @@ def _from_travel(places: Floats, size: float, up: Floats) -> Floats:
     ``places``: (F, 3), positions of the figure, in time order. ``up``: (3,), unit vector. Returns
     (3,), total displacement divided by path length; shorter if the path is shorter than the figure.
     """
+    # A straight walk has a displacement as long as its path: length 1. Walking in a circle, or to
+    # and fro, returns to the start: near 0. A path shorter than the figure is no travel but
+    # balancing.
     steps = _horizontal(np.diff(places, axis=0), up)
     path = float(np.linalg.norm(steps, axis=1).sum())
     return steps.sum(axis=0) / max(path, size) if size > 0.0 else np.zeros(3)
@@ -227,6 +234,10 @@ def _from_soles(positions: Floats, up: Floats) -> Floats:
     ``positions``: (V, 3), rest vertices. ``up``: (3,), the unit vector of an axis. Returns (3,), 0
     unless the mesh has exactly one mirror plane and stands on feet on both sides of the plane.
     """
+    # People are symmetric, so the front lies in the mirror plane; which of its two directions it is
+    # show the feet: the middle of the soles (the lowest 1.5 % of the height) is in front of the
+    # middle of the ankles (5 to 9 %). Both sides of the plane need a sole: a vase has one in the
+    # middle.
     height = positions @ up
     low, tall = float(height.min()), float(np.ptp(height))
     planes = [

@@ -100,6 +100,12 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     ``parents``: (J,), parents of the target's joints. Returns (J, 3, 3), rotations in the common
     axes; the identity for unmatched joints.
     """
+    # B of the module retarget: W_t = W_s R_s^-1 B R_t. If the target's rest pose, rotated by B at
+    # each joint, is the source's rest pose, then the target shows the source's pose in every frame.
+    # A bone gives two of the three degrees of freedom of B, its direction; the rest, the twist
+    # about the bone, comes from a rotation that both bodies have: of the whole body (stands) or of
+    # the nearest matched ancestor (reference). Joints are visited from the root down, so that the
+    # reference is known.
     stands = _standing(source, target, matches)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
     above = _matched_above(matches, parents)
@@ -133,8 +139,13 @@ def _at_joint(
     """Return one joint's rotation; ``reference`` is the nearest matched ancestor's rotation."""
     part = matches.names[joint].removeprefix("left_").removeprefix("right_")
     mine, theirs = (_directions(bone) for bone in bones)
+    # The end of a chain has no direction of its own: a head or a foot without toes moves with the
+    # joint above it.
     if not children:
         return reference
+    # Spines and feet of two characters bend differently by nature. If B aligned them, a stooped
+    # character would be straightened, and soles would tilt, so they keep their bend relative to the
+    # body. Beyond 25 degrees it is no nature but another rest pose, as of a body with hanging feet.
     if part.startswith(_TRUNK):
         near = np.einsum("ab,kb,ka->k", stands, mine, theirs)
         if part == "pelvis" or (near > _NATURAL).all():
@@ -144,12 +155,16 @@ def _at_joint(
         if knuckles is not None:
             return knuckles
     if len(children) > 1:
-        # Least squares over all directions (Kabsch); the reference determines the remaining
-        # freedom.
+        # The rotation B that minimises sum_k |theirs_k - B mine_k|^2 maximises the trace of B^T M
+        # with M = sum_k theirs_k mine_k^T, and is the rotation nearest to M (Kabsch 1976; Horn
+        # 1987). M has rank 1 if all directions are parallel, and then leaves the twist open: a
+        # millionth of the reference decides it and changes nothing else.
         sums = np.einsum("ka,kb->ab", theirs, mine) + _SHORT * reference
         return nearest_rotations(sums)[0]
     # Fingers start from the hand's rotation, limbs from the body's, so that twist does not
-    # accumulate.
+    # accumulate. B = A S: S brings the target's bone near, A is the smallest rotation from there to
+    # the source's bone. A rotates about an axis perpendicular to both, so it adds no twist to that
+    # of S.
     start = reference if part.startswith(_FINGERS) else stands
     return shortest_arc(start @ mine[0], theirs[0]) @ start
 
