@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError, RigError
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import scene_box
 
 BESIDE = MotionSettings(drives=False)
@@ -34,7 +34,7 @@ def bvh(tmp_path):
 
 def places(actor, time=0.1):
     """Return the joint positions at some time, keyed by the names in the file."""
-    pose_actor(actor, time)
+    pose_actors([actor], time)
     found = viewer.joint_matrices(actor.figure, actor.pose)[:, :3, 3]
     return [found[actor.figure.skeleton.names.index(name)] for name in PERSON_JOINTS]
 
@@ -197,7 +197,7 @@ def test_figures_driven_by_an_upside_down_world_are_upright(bvh, named):
     settings = MotionSettings(up="-y", model=bundled_body() if named else None)
     scene = load(path, *([] if named else [bundled_body()]), motion=settings)
     (actor,) = scene.actors
-    pose_actor(actor, 0.0)
+    pose_actors([actor], 0.0)
     joints = viewer.joint_matrices(actor.figure, actor.pose)[:, :3, 3]
     joints = joints @ actor.placement[:3, :3].T
     names = actor.figure.skeleton.names

@@ -15,7 +15,7 @@ import viewer
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, begin, capturing, load, read_files
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.skinning import joint_matrices
@@ -66,7 +66,7 @@ def amass(tmp_path_factory):
 
 def directions(actor, time, names=None):
     """Return the directions of some limbs in the scene."""
-    pose_actor(actor, time)
+    pose_actors([actor], time)
     skeleton = actor.figure.require_skeleton()
     matrices = actor.placement @ viewer.joint_matrices(actor.figure, actor.pose)
     joints = skeleton.humanoid.joints if names is None else {
@@ -99,7 +99,7 @@ def test_root_translation_of_a_capture_is_scaled_by_the_ratio_of_leg_lengths(cap
     for actor in actors:
         places = []
         for frame in (0, 3):
-            pose_actor(actor, frame / 30)
+            pose_actors([actor], frame / 30)
             places.append(viewer.joint_matrices(actor.figure, actor.pose)[0, :3, 3])
         moves.append(places[1] - places[0])
     assert_allclose(moves[0][1], 0.3, rtol=0, atol=0.1)
@@ -228,7 +228,7 @@ def test_fingers_of_smplh_drive_those_of_a_character(is_named, tmp_path):
     paths = [tmp_path / "a.npz"] if is_named else [tmp_path / "a.npz", hero]
     (actor,) = load(*paths, motion=settings).actors
     names = [name.split(":")[1] for name in actor.figure.skeleton.names]
-    pose_actor(actor, 0.0)
+    pose_actors([actor], 0.0)
     places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
 
     def bone(start, end):

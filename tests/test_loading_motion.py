@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, bundled_body, load
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 
 BVH = """HIERARCHY
 ROOT pelvis
@@ -94,7 +94,7 @@ def test_people_appear_and_disappear(recording, smpl):
     assert first.figure is second.figure
     for frame in range(4):
         for actor in scene.actors:
-            pose_actor(actor, frame / 30.0)
+            pose_actors([actor], frame / 30.0)
         assert first.is_present and second.is_present == (frame in (1, 2))
         assert_allclose(first.pose.dofs[3 * 4], 0.2 * frame, atol=1e-12)
 
@@ -182,7 +182,7 @@ def test_bvh_drives_a_body_or_is_shown_as_a_skeleton(tmp_path):
     driven = load(path, bundled_body())
     assert len(driven.actors) == 1 and driven.actors[0].figure.mesh is not None
     actor = driven.actors[0]
-    pose_actor(actor, 0.1)
+    pose_actors([actor], 0.1)
     names = actor.figure.skeleton.names
     knee = actor.pose.dofs[3 * names.index("left_knee")]
     # The body's legs are not quite straight at rest: a bend of 45 degrees, to half a degree.

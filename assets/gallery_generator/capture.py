@@ -16,7 +16,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
@@ -77,7 +77,7 @@ def _joints(body: Figure, person: Person) -> Floats:
     actor = Actor(body, clip=body_clip(motion, body)[0])
     found = []
     for frame in range(len(walk.poses)):
-        pose_actor(actor, frame / 30.0)
+        pose_actors([actor], frame / 30.0)
         pose = actor.require_pose()
         world = placement_matrix(pose) @ world_matrices(body.require_skeleton(), pose)
         found.append(world[:, :3, 3])

@@ -13,7 +13,7 @@ from viewer.rendering.offscreen import render
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.captures.cameras import CameraView
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Scene
 
 __all__ = ["write_images"]

@@ -17,7 +17,7 @@ from viewer.loading import bundled_body, load
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
@@ -123,7 +123,7 @@ def test_clip_of_the_template_is_transferred(transferred):
     clip = Clip("wave", channels, 0.0, 1.0)
     one, other = Actor(figure, clip=clip), Actor(rigged.figure, clip=clip_for(rigged, clip))
     for actor in (one, other):
-        pose_actor(actor, 0.6)
+        pose_actors([actor], 0.6)
     expected = 30.0 * deform(figure, one.pose)[0]
     assert_allclose(deform(rigged.figure, other.pose)[0], expected, atol=1e-4)
 

@@ -20,7 +20,7 @@ from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.geometry.rotation import matrix_to_quaternion, rotation_vector_to_matrix
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Motion, Scene, scene_box
@@ -71,17 +71,17 @@ def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Ca
     """Return functions that play a frame, with and without skinning and drawing."""
     scene, options = Scene([actor]), DisplayOptions()
     assert actor.clip is not None
-    pose_actor(actor, 0.0)
+    pose_actors([actor], 0.0)
     camera, box, clock = default_camera(scene, SIZE), scene_box(scene), Clock(actor.clip)
     target, renderer = offscreen.target(SIZE, options.samples), offscreen.renderer
 
     def frame() -> None:
-        pose_actor(actor, clock.next())
+        pose_actors([actor], clock.next())
         renderer.draw(scene, camera, options, target, box)
         offscreen.context.finish()
 
     def prepare() -> None:
-        pose_actor(actor, clock.next())
+        pose_actors([actor], clock.next())
         assert actor.pose is not None
         renderer.posed_mesh(actor).upload(actor.pose, options.skinning)
 

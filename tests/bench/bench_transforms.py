@@ -8,8 +8,7 @@ import numpy as np
 from measure import interleaved, report
 
 from viewer.rig.geometry.quaternion import slerp
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rig.transform_keys.sampling import sample_transforms
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
 
 N_JOINTS, N_KEYS, N_CALLS = 70, 100, 10
 GOAL = 0.1  # milliseconds for all channels at one time

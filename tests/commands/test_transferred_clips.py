@@ -13,7 +13,7 @@ from viewer.formats import write
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.motion.clip_edit import clip_from_frames
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
@@ -52,8 +52,8 @@ def test_template_path_is_scaled_with_the_figure(folder, tmp_path, capsys):
     fox = viewer.load().actors[0]
     fox.clip = viewer.load(folder / "walk.anim", out).actors[0].clip
     for time in (0.0, 0.5, 1.0):
-        pose_actor(actor, time)
-        pose_actor(fox, time)
+        pose_actors([actor], time)
+        pose_actors([fox], time)
         found = viewer.deform(actor.figure, actor.pose)[0]
         # The rest pose of the new figure has the axes of the template.
         wanted = 100.0 * viewer.deform(fox.figure, fox.pose)[0]

@@ -10,7 +10,6 @@ from formats.gltf.files import File, skinned
 
 import viewer
 from viewer.cli import run
-from viewer.rig.motion.evaluation import frame_rate
 
 IRREGULAR = "the keys are at irregular times, so the motion is sampled at 30 frames per second"
 
@@ -33,7 +32,7 @@ def test_frames_are_the_keys(tmp_path: Path, suffix: str, capsys: pytest.Capture
     assert run(["convert", str(source), "-o", str(path), "--frames", "0:"]) == 0
     assert "13 frames (0 to 12) at 120 fps" in capsys.readouterr().out
     (actor,) = viewer.load(path).actors
-    assert frame_rate(actor.clip) == pytest.approx(120.0, rel=1e-6)
+    assert actor.clip.frame_rate == pytest.approx(120.0, rel=1e-6)
     assert actor.clip.end - actor.clip.start == pytest.approx(0.1, abs=1e-6)
 
 

@@ -11,7 +11,7 @@ from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import ParameterMotion
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import deform
 
@@ -57,7 +57,7 @@ def test_people_with_parameters_are_shown_with_the_model(tmp_path, build):
     body, points = build(model)
     assert (body.figure is model, points.figure.points is not None) == (True, True)
     for frame in range(4):
-        pose_actor(body, frame / 30.0)
+        pose_actors([body], frame / 30.0)
         wanted = 0.01 * forward(IDENTITY[frame], PARAMETERS[frame], EXPRESSION[frame])[0]
         assert_allclose(deform(model, body.pose)[0], wanted + PLACES[frame], atol=1e-9)
 

@@ -18,7 +18,7 @@ from viewer.rig.captures.keypoint_layouts import keypoint_layout
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
@@ -73,7 +73,7 @@ def _people() -> Scene:
             points[0, [4, 17], 3] = 0.0
         clip = PointClip("walk", Timing(30.0, [0]), points)
         actor = Actor(Figure("body25", points=layout), clip=clip, person=number)
-        pose_actor(actor, 0.0)
+        pose_actors([actor], 0.0)
         actor.placement[:3, 3] = 0.8 * number, 0.0, -0.2 * number
         actors.append(actor)
     actors[1].color = 0.5, 0.35, 0.02
@@ -99,7 +99,7 @@ def _waving(time: float) -> Scene:
         for dof, (size, turns) in curves.items()
     )
     actor = Actor(arm(4), clip=Clip("wave", channels, 0.0, 2.0))
-    pose_actor(actor, time)
+    pose_actors([actor], time)
     return Scene([actor], time=time)
 
 

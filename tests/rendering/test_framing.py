@@ -21,7 +21,7 @@ from viewer.rendering.framing import (
 from viewer.rendering.recorder import Follow, Recording
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene, scene_points
 
@@ -44,7 +44,7 @@ def is_seen(camera: Camera, points: np.ndarray) -> bool:
 def all_points(seconds) -> np.ndarray:
     actor, clouds = moving_arm(), []
     for time in seconds:
-        pose_actor(actor, float(time))
+        pose_actors([actor], float(time))
         clouds.append(scene_points(Scene([actor])))
     return np.concatenate(clouds)
 
@@ -148,7 +148,7 @@ def captured(person: int | None = None) -> Actor:
     points = np.array([[[1.0, 2.0, 3.0, 1.0], [3.0, 2.0, 1.0, 1.0]]])
     clip = PointClip("points", Timing(10.0, np.zeros(1, dtype=np.int32)), points)
     actor = Actor(Figure("keypoints", points=LAYOUT), clip=clip, person=person)
-    pose_actor(actor, 0.0)
+    pose_actors([actor], 0.0)
     return actor
 
 

@@ -15,7 +15,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Follow, Progress, Recording, record
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor, Scene, scene_box
 
 SIZE = 64, 48
@@ -82,7 +82,7 @@ def one_by_one(offscreen, recording, cameras=None) -> list[np.ndarray]:
     pictures = []
     actor = moving_arm()
     for index, seconds in enumerate(recording.times):
-        pose_actor(actor, float(seconds))
+        pose_actors([actor], float(seconds))
         camera = recording.camera if cameras is None else cameras[index]
         scene = Scene([actor])
         picture = offscreen.render(scene, SIZE, camera, recording.options, recording.box)

@@ -218,7 +218,7 @@ def apply_time(scene: Scene, frames: Frames) -> list[str | Diagnostic]:
     """
     if not frames.is_one:
         return []
-    from viewer.rig.motion.evaluation import pose_actor
+    from viewer.rig.motion.evaluation import pose_actors
 
     option = "--time" if frames.frame is None else frames.option
     if frames.frame is not None and frames.time is not None:
@@ -239,6 +239,5 @@ def apply_time(scene: Scene, frames: Frames) -> list[str | Diagnostic]:
             f"--time {frames.time:g}: the motion has keys from {numbering.start:.6g} to "
             f"{numbering.end:.6g} seconds, so its {held} pose is held"
         )
-    for actor in scene.actors:
-        pose_actor(actor, time, frames.interpolates)
+    pose_actors(scene.actors, time, frames.interpolates)
     return notes

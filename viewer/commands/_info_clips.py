@@ -14,9 +14,8 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.transform_clip import TransformClip, is_regular
 from viewer.rig.scene import Actor, Motion
-from viewer.rig.transform_keys.rate import is_regular, key_rate
 
 _SHOWN_GAPS = 6
 _MILLISECOND = 0.001
@@ -49,7 +48,7 @@ def _describe_transforms(clip: TransformClip) -> dict[str, Any]:
     ends = [time for channel in clip.channels for time in channel.times[[0, -1]].tolist()]
     return {
         "kind": "transforms",
-        "frame_rate": key_rate(clip),
+        "frame_rate": clip.frame_rate,
         "regular": is_regular(clip),
         "channels": len(clip.channels),
         "paths": _counts(channel.path for channel in clip.channels),

@@ -27,7 +27,7 @@ from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.mesh import without_seams
-from viewer.rig.motion.single_frame import pose_frames
+from viewer.rig.motion.evaluation import still_frames
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -252,7 +252,7 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> _CourseSkeleton:
     above = skeleton.parents[order]
     rows, is_plain = _plain_rows(skeleton, pose)
     offsets = skeleton.rest_translations + moved
-    frames = pose_frames(Figure("", skeleton=skeleton), pose)[1]
+    frames = still_frames(Figure("", skeleton=skeleton), pose)
     rotations = quaternion_to_matrix(frames.rotations[0])
     is_scaled = bool((np.abs(pose.scales - 1.0) > _SAME).any())
     if is_scaled:

@@ -34,7 +34,6 @@ from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (
     JointMotion,
-    frame_rate,
     frames_between,
     frames_of,
     time_span,
@@ -321,7 +320,7 @@ def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:
     Times are seconds on the clip's own clock.
     """
     options = subject.options
-    rate = options.frame_rate or frame_rate(clip)
+    rate = options.frame_rate or clip.frame_rate
     rate *= max(1, math.ceil(options.rate / rate))
     count = min(math.floor((clip.end - clip.start) * rate + _ON_STEP) + 1, _MOST)
     return clip.start + np.arange(count) / rate
@@ -331,7 +330,7 @@ def frame_numbers(subject: Subject, times: Floats) -> Ints:
     """Return the frames of the timeline at times of a keyed clip: (F,) int32."""
     actor = subject.actor
     assert actor.clip is not None  # checked by the callers
-    rate = subject.options.frame_rate or frame_rate(actor.clip)
+    rate = subject.options.frame_rate or actor.clip.frame_rate
     counting = subject.counting or Counting(rate, actor.clip.start + actor.offset)
     return counting.numbers(times + actor.offset)
 
@@ -375,4 +374,4 @@ def counting_of(scene: Scene, keyed_rate: float) -> Counting:
     clip = longest.clip
     assert isinstance(clip, SampledClip | PointClip)  # only sampled motions were collected
     timing = clip.timing
-    return Counting(frame_rate(clip), timing.start + longest.offset, timing.first_frame)
+    return Counting(clip.frame_rate, timing.start + longest.offset, timing.first_frame)

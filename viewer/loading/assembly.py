@@ -257,11 +257,10 @@ def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     if wanted or any(actor.figure.animations for actor in draft.actors):
         _animate(draft, wanted)
     if any(actor.clip is not None for actor in draft.actors):
-        from viewer.rig.motion.evaluation import pose_actor, time_span
+        from viewer.rig.motion.evaluation import pose_actors, time_span
 
         start = time_span(draft.actors)[0]
-        for actor in draft.actors:
-            pose_actor(actor, start)
+        pose_actors(draft.actors, start)
 
 
 def _has_bare_motion(draft: SceneDraft) -> bool:
@@ -359,13 +358,13 @@ def _switch_on_springs(draft: SceneDraft, up: str) -> None:
     skeletons = [(actor, actor.figure.skeleton) for actor in draft.actors]
     if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
         return
-    from viewer.rig.motion.evaluation import pose_actor, time_span
+    from viewer.rig.motion.evaluation import pose_actors, time_span
     from viewer.rig.motion.spring_motion import springs_for
 
     start = time_span(draft.actors)[0]
     for actor in draft.actors:
         actor.springs = springs_for(actor, up)
-        pose_actor(actor, start)
+        pose_actors([actor], start)
 
 
 def _note_unused_options(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> None:

@@ -23,7 +23,7 @@ from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, parameter_clip
-from viewer.rig.motion.evaluation import frame_rate, pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.sampled_clip import SampledClip, joined, with_rate
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
@@ -151,7 +151,7 @@ class Builder:
         for actor in new:
             if self.swings:
                 actor.springs = springs_for(actor, self.up)
-            pose_actor(actor, 0.0)
+            pose_actors([actor], 0.0)
         return new, self._fresh(notes)
 
     def _fresh(self, notes: Iterable[Diagnostic]) -> list[Diagnostic]:
@@ -235,7 +235,7 @@ class Builder:
         notes: list[Diagnostic] = []
         for actor, drive, clip, said in motions:
             # The user may have changed the frame rate of a motion that is already shown.
-            rate = clip.timing.frame_rate if actor.clip is None else frame_rate(actor.clip)
+            rate = (clip if actor.clip is None else actor.clip).frame_rate
             actor.drive = drive
             self._replace_clip(actor, with_rate(clip, rate))
             self.plants_feet = self._is_behind = False
@@ -346,8 +346,7 @@ class Builder:
             actor.figure, actor.color, actor.drive = target, None, drive
             actor.pose = figure_pose(target)
         notes = [replace(note, path=self.path) for note in notes] + self._finished()
-        for actor, _, _ in clips:
-            pose_actor(actor, 0.0)
+        pose_actors((actor for actor, _, _ in clips), 0.0)
         return self._fresh([*notes, *self._shape_notes()])
 
     def refusal(self, problem: RigError) -> RigError:

@@ -23,7 +23,7 @@ from viewer.rig.feet.ground import resting_height
 from viewer.rig.feet.legs import legs_of
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.evaluation import frames_of, pose_actor, world_frames
+from viewer.rig.motion.evaluation import frames_of, pose_actors, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.upright import own_up
 from viewer.rig.retargeting.drive import Drive
@@ -61,8 +61,7 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
             again = partial(_cleaned_again, scene, actor, wanted)
             actor.drive = replace(actor.drive, finish=again)
     time = _start(scene.actors) if scene.time is None else scene.time
-    for actor in scene.actors:
-        pose_actor(actor, time)
+    pose_actors(scene.actors, time)
     if scene.in_space is not None:
         scene.in_space = partial(_cleaned_in, scene.in_space, wanted)
     return notes

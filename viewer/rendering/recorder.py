@@ -36,8 +36,8 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.follow import followed_point
-from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Scene, scene_box
 
 _WAITING = 2  # number of frames that may wait for a worker, limited to save memory

@@ -156,7 +156,8 @@ def local_transforms(
 
 def joint_offsets(skeleton: Skeleton, dofs: Floats, translations: Floats) -> Floats:
     """Return the joints' offsets from their rest translations, DOFs included: (..., J, 3)."""
-    offsets = translations.copy()
+    shape = np.broadcast_shapes(translations.shape[:-2], dofs.shape[:-1])
+    offsets = np.broadcast_to(translations, (*shape, *translations.shape[-2:])).copy()
     moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
     if len(moves):
         # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.

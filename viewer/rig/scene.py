@@ -55,7 +55,7 @@ class Actor:
     pose: Pose | None = None
     """This actor's own pose; None if the figure has no skeleton."""
     clip: Motion | None = None
-    """Its motion, which ``viewer.rig.motion.evaluation.pose_actor`` evaluates."""
+    """Its motion, which ``viewer.rig.motion.evaluation.pose_actors`` evaluates."""
     placement: Floats = field(default_factory=lambda: np.eye(4))
     """(4, 4). Figure space to scene space."""
     visible: bool = True

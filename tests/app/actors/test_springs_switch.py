@@ -8,7 +8,7 @@ import viewer
 from viewer.app.actors.actors_panel import no_springs
 from viewer.app.files.motion_export import save_motion
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 
 
 def test_check_box_switches_springs_and_undo_restores_them(drive, tmp_path):
@@ -50,7 +50,7 @@ def test_exported_motions_do_not_contain_the_pose_of_springs(drive, tmp_path):
     assert hand.says("viewer convert can write the simulated ones")
     (plain,), (found,) = load(path).actors, load(out).actors
     for actor in (plain, found):
-        pose_actor(actor, 0.5)
+        pose_actors([actor], 0.5)
     hair = plain.figure.require_skeleton().springs.joints
     matrices = [viewer.joint_matrices(actor.figure, actor.pose)[hair] for actor in (plain, found)]
     # The file is in single precision.

@@ -20,7 +20,7 @@ from viewer.app.layout import ShownPanels
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.framing import frame_motion
 from viewer.rendering.recorder import Recording
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import scene_points
 
 streaming = test_timeline.streaming  # the fixture of the timeline tests
@@ -184,7 +184,7 @@ def test_whole_motion_is_framed_as_in_a_recording(drive, rig):
     assert is_fitted(hand, points)
     actor = scene.actors[0].copy()
     for time in times:
-        pose_actor(actor, float(time))
+        pose_actors([actor], float(time))
         assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
     hand.key("space")
     camera = hand.state.camera.copy()
@@ -242,7 +242,7 @@ def test_views_fit_the_edited_motion(drive, rig, tmp_path, edit):
     assert reach_at_most < wide < reach_at_most + 3.0
     actor = hand.state.actor.copy()
     for time in np.linspace(0.0, 2.0, 21) + actor.offset:
-        pose_actor(actor, float(time))
+        pose_actors([actor], float(time))
         assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
 
 

@@ -20,7 +20,7 @@ from viewer.app.weights.weights_panel import pin_vertex, unpin
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT
 from viewer.rendering.recorder import copied
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor
 
 
@@ -67,7 +67,7 @@ def test_numbered_meshes_are_the_posed_meshes(walk, tmp_path, capsys):
     assert "3 files, w_001.obj to w_003.obj" in capsys.readouterr().out
     actor = viewer.load(*walk).actors[0]
     for frame in (1, 2, 3):
-        pose_actor(actor, 1.0 + frame / 4)
+        pose_actors([actor], 1.0 + frame / 4)
         wanted, _ = viewer.deform(actor.figure, actor.pose)
         lines = (tmp_path / f"w_{frame:03}.obj").read_text().splitlines()
         found = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
@@ -108,8 +108,8 @@ def test_captures_round_trip_through_amass(recording, tmp_path):
     for actor in source.actors:
         back = viewer.load(tmp_path / f"m-{actor.person}.npz", recording[2]).actors[0]
         for frame in (0, 1, 3, 4):
-            pose_actor(actor, frame / 30.0)
-            pose_actor(back, frame / 30.0)
+            pose_actors([actor], frame / 30.0)
+            pose_actors([back], frame / 30.0)
             first, _ = viewer.deform(actor.figure, actor.pose)
             second, _ = viewer.deform(back.figure, back.pose)
             assert_allclose(second, first, atol=1e-9)

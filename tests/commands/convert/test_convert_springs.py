@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 
 
 def places(actor, time):
-    pose_actor(actor, time)
+    pose_actors([actor], time)
     names = actor.figure.require_skeleton().names
     matrices = viewer.joint_matrices(actor.figure, actor.pose)
     return matrices[[names.index(name) for name in HAIR], :3, 3]

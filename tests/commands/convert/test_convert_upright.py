@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.skinning import Skinning, deform
 
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)
@@ -41,7 +41,7 @@ def wanted(recording, up="z"):
     folder, path = recording
     settings = MotionSettings(model=path, up=up)
     (actor,) = viewer.load(folder, motion=settings).actors
-    pose_actor(actor, 1 / 30)
+    pose_actors([actor], 1 / 30)
     return deform(actor.figure, actor.pose, Skinning(correctives=False))[0]
 
 
@@ -89,5 +89,5 @@ def test_other_formats_record_the_up_axis(recording, tmp_path):
 def heights_in_capture(recording):
     folder, path = recording
     (actor,) = viewer.load(folder, motion=MotionSettings(model=path, up="y")).actors
-    pose_actor(actor, 1 / 30)
+    pose_actors([actor], 1 / 30)
     return deform(actor.figure, actor.pose)[0][:, 1]

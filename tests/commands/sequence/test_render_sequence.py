@@ -15,7 +15,7 @@ import viewer
 from viewer.cli import run
 from viewer.commands._sequence import Turntable, parse_turntable
 from viewer.errors import OutputError
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 
 pytestmark = pytest.mark.slow
 av = pytest.importorskip("av")
@@ -28,7 +28,7 @@ def single(files, seconds, camera, box, size=(64, 48), **options) -> np.ndarray:
 
     scene = viewer.load(*files)
     for actor in scene.actors:
-        pose_actor(actor, seconds)
+        pose_actors([actor], seconds)
     with Offscreen() as offscreen:
         shown = viewer.DisplayOptions(**options)
         return offscreen.render(scene, size, camera, shown, box).astype(int)
@@ -76,7 +76,7 @@ def test_sequence_equals_single_frames(draw, walk, tmp_path):
     scene = viewer.load(*walk)
     clouds = []
     for frame in range(31):
-        pose_actor(scene.actors[0], frame / 30)
+        pose_actors([scene.actors[0]], frame / 30)
         clouds.append(viewer.deform(scene.actors[0].figure, scene.actors[0].pose)[0])
     cloud = np.concatenate(clouds)
     box = np.array([cloud.min(axis=0), cloud.max(axis=0)])

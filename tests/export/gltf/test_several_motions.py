@@ -14,7 +14,7 @@ from two_parts import two_parts
 import viewer
 from viewer.errors import RigError
 from viewer.export import ExportOptions, Part, Selection, export
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.sampled_animation import upright_animation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
@@ -121,7 +121,7 @@ def test_figures_are_read_back_as_actors_with_their_motions(tmp_path):
     for time, rows in ((0.0, (0, 0)), (0.25, (2.5, 0)), (0.35, (3.5, 1)), (0.55, (4, 2))):
         points = []
         for actor in moved:
-            pose_actor(actor, time)
+            pose_actors([actor], time)
             points.append(deform(actor.figure, actor.pose)[0])
         places = zip(scene.actors, rows, (1.0, 0.5), strict=False)
         wanted = np.concatenate([expected(actor, row, step) for actor, row, step in places])

@@ -16,7 +16,7 @@ from viewer.cli import run
 from viewer.diagnostics import Diagnostic
 from viewer.export import ExportOptions
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.single_frame import single_frame
 from viewer.rig.scene import Actor
 
@@ -25,7 +25,7 @@ TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)
 
 
 def joints(actor: Actor, time: float) -> dict[str, np.ndarray]:
-    pose_actor(actor, time)
+    pose_actors([actor], time)
     matrices = viewer.joint_matrices(actor.figure, actor.pose)
     humanoid = actor.figure.require_skeleton().humanoid
     return {bone: matrices[joint, :3, 3] for bone, joint in humanoid.joints.items()}
@@ -103,7 +103,7 @@ def test_expressions_are_written_and_other_figures_refused(
     assert run(["convert", str(path), "--shape", "happy=0.5", "-o", str(out)]) == 0
     assert "17 human bones, 1 expression, 46 frames" in capsys.readouterr().out
     (found,) = load(out, path).actors
-    pose_actor(found, 0.5)
+    pose_actors([found], 0.5)
     names = found.figure.blend_shapes.names
     assert_allclose(found.pose.shape_weights[names.index("happy")], 0.5, rtol=0, atol=1e-6)
     assert run(["convert", "-o", str(tmp_path / "fox.vrma")]) == 2

@@ -16,7 +16,7 @@ from viewer.cli import run
 from viewer.formats.fbx.contents import target_weights
 from viewer.rig.captures.carried_view import view_in
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, file_method
 

@@ -21,7 +21,7 @@ from viewer.rendering.framing import framed_poses
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Recording
 from viewer.rig.captures.carried_view import view_in
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 
 HALF = math.sqrt(0.5)
 SIZE = 640, 480
@@ -65,7 +65,7 @@ def test_camera_moves_with_its_joint(tmp_path: Path) -> None:
     (view,) = scene.views
     assert_allclose(center(view_in(view, scene)), [3, 3, 0], atol=1e-12)
     scene.time = 1.0
-    pose_actor(scene.actors[0], 1.0)
+    pose_actors([scene.actors[0]], 1.0)
     # (3, 2, 0) from the joint, rotated by 90 degrees about z.
     there = view_in(view, scene)
     assert_allclose(center(there), [-2, 4, 0], atol=1e-12)
@@ -79,7 +79,7 @@ def test_view_through_a_camera_follows_its_joint(tmp_path: Path) -> None:
     scene = viewer.load(saved(carried(), tmp_path))
     (view,) = scene.views
     camera = camera_from_view(view, SIZE, "y", seen=view_in(view, scene))
-    pose_actor(scene.actors[0], 1.0)
+    pose_actors([scene.actors[0]], 1.0)
     follow_view(camera, SIZE, scene, BOX)
     assert camera.fixed is view
     assert_allclose(np.linalg.inv(camera.view_matrix())[:3, 3], [-2, 4, 0], atol=1e-12)
@@ -108,7 +108,7 @@ def test_camera_is_written_below_its_joint(tmp_path: Path, options: tuple[str, .
     assert above["name"] in ("tip", "helper") and eye not in root["scenes"][0]["nodes"]
     assert root["cameras"][0]["perspective"]["yfov"] == pytest.approx(0.8, abs=1e-12)
     scene = viewer.load(path)
-    pose_actor(scene.actors[0], 1.0)
+    pose_actors([scene.actors[0]], 1.0)
     assert_allclose(center(view_in(scene.views[0], scene)), [-2, 4, 0], atol=1e-6)
 
 
@@ -169,7 +169,7 @@ def assert_path(path: Path, atol: float = 1e-12) -> None:
     scene = viewer.load(path)
     for seconds, place in PATH.items():
         scene.time = seconds
-        pose_actor(scene.actors[0], seconds)
+        pose_actors([scene.actors[0]], seconds)
         assert_allclose(center(view_in(scene.views[0], scene)), place, atol=atol)
 
 
@@ -193,7 +193,7 @@ def test_camera_keeps_its_own_animation_below_a_still_joint(tmp_path: Path) -> N
     eye["channels"] = [{"sampler": 0, "target": {"node": 4, "path": "translation"}}]
     scene = viewer.load(saved(file, tmp_path))
     scene.time = 1.0
-    pose_actor(scene.actors[0], 1.0)
+    pose_actors([scene.actors[0]], 1.0)
     assert_allclose(center(view_in(scene.views[0], scene)), [4, 1, 5], atol=1e-12)
 
 

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Scene
 
 UPRIGHT = np.array([np.pi, 0.0, 0.0])
@@ -106,7 +106,7 @@ def drawn(scene: Scene, person: int, frame: int) -> Any:
     """Return a person's vertices in a video frame, in the space of the file; None if absent."""
     actor = next(actor for actor in scene.actors if actor.person == person)
     timing = actor.clip.timing
-    pose_actor(actor, timing.time(frame - timing.first_frame))
+    pose_actors([actor], timing.time(frame - timing.first_frame))
     if not actor.is_present:
         return None
     return viewer.deform(actor.figure, actor.pose)[0]

@@ -15,7 +15,7 @@ import viewer
 from viewer.errors import FormatError
 from viewer.loading import MotionSettings
 from viewer.loading.body_models import is_body
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.skinning import joint_matrices
 
 
@@ -52,7 +52,7 @@ def test_motion_opened_alone_is_shown_as_a_skeleton(tmp_path: Path) -> None:
     skeleton = actor.figure.require_skeleton()
     assert skeleton.names == ("m0", "m1", "m2", "m3", "m5", "m4")
     assert actor.clip is not None and (actor.clip.start, actor.clip.end) == (0.0, 1.0)
-    pose_actor(actor, 1.0)
+    pose_actors([actor], 1.0)
     arm = joint_matrices(actor.figure, actor.require_pose())[skeleton.names.index("m4"), :3, 3]
     # The limb of 0.4 is along x, the chain of 0, 0.5, 0 is vertical, and the 0.2 along x points
     # backwards.
@@ -66,7 +66,7 @@ def test_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> Non
     figure = actor.figure
     assert figure.blend_shapes is not None
     for time, weight in ((0.25, 0.5), (1.0, 1.0)):
-        pose_actor(actor, time)
+        pose_actors([actor], time)
         pose = actor.require_pose()
         column = figure.blend_shapes.names.index("happy")
         # Weights above 1 are clamped; the keys are sampled at 30 frames per second.
@@ -96,7 +96,7 @@ def test_captured_body_drives_a_character(tmp_path: Path) -> None:
     for time in (0.0, 2 / 30):
         ways = []
         for actor, pair in ((driven, ("c3", "c4")), (body, ("left_shoulder", "left_elbow"))):
-            pose_actor(actor, time)
+            pose_actors([actor], time)
             names = actor.figure.require_skeleton().names
             places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
             way = places[names.index(pair[1])] - places[names.index(pair[0])]

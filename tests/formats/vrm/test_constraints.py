@@ -15,7 +15,7 @@ from viewer.errors import FormatError
 from viewer.formats.gltf import read
 from viewer.loading import load
 from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.skinning import deform
 
 NAME = "VRMC_node_constraint"
@@ -104,7 +104,7 @@ def test_exported_poses_include_the_effect_of_constraints(tmp_path: Path) -> Non
     assert run(["convert", str(path), "-o", str(again)]) == 0
     for name in (path, again):
         (actor,) = load(name).actors
-        pose_actor(actor, 1.0)
+        pose_actors([actor], 1.0)
         corners = deform(actor.figure, actor.require_pose())[0]
         # The parent rotates to 180 degrees, and the joint by its 90 degrees relative to the rest
         # pose.

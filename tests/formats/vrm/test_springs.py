@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.loading import MotionSettings, load
-from viewer.rig.motion.evaluation import pose_actor
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.spring_motion import release_springs, with_baked_springs
 from viewer.rig.scene import Actor
 from viewer.rig.springs.springs import Springs
@@ -45,7 +44,7 @@ def opened(file: File, folder: Path) -> viewer.Scene:
 
 def hair(actor: Actor, time: float) -> np.ndarray:
     """Return the positions of the hair's joints at some time."""
-    pose_actor(actor, time)
+    pose_actors([actor], time)
     names = actor.figure.require_skeleton().names
     matrices = viewer.joint_matrices(actor.figure, actor.pose)
     return matrices[[names.index(name) for name in HAIR], :3, 3]

@@ -14,7 +14,7 @@ from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.carried_view import view_in
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
@@ -60,7 +60,7 @@ def scene_with(path) -> Scene:
 def test_points_are_drawn_over_their_markers_in_the_video(path, offscreen, frame):
     scene = scene_with(path)
     scene.time = frame / RATE
-    pose_actor(scene.actors[0], scene.time)
+    pose_actors([scene.actors[0]], scene.time)
     camera = camera_from_view(scene.views[0], SIZE, "y", seen=view_in(scene.views[0], scene))
     options = DisplayOptions(grid=False, image_brightness=1.0, quality="draft", samples=1)
     drawn = offscreen.render(scene, SIZE, camera, options, BOX)[..., :3].astype(int)

@@ -14,7 +14,7 @@ from viewer.rig.motion.animation_choice import (
     counterpart,
     play_animation,
 )
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, figure_pose
 
@@ -64,10 +64,10 @@ def test_values_not_animated_by_the_next_animation_are_reset_to_the_file():
     actor = Actor(figure)
     play_animation(actor, 0)
     actor.pose.figure_translation[:] = 1.0, 2.0, 3.0
-    pose_actor(actor, 2.0)
+    pose_actors([actor], 2.0)
     assert actor.pose.shape_weights[0] == 1.0 and actor.pose.scales[1, 1] == 2.5
     play_animation(actor, 1)
-    pose_actor(actor, 0.0)
+    pose_actors([actor], 0.0)
     assert_array_equal(actor.pose.scales, figure.skeleton.rest_scales)
     assert_array_equal(actor.pose.translations, np.zeros((3, 3)))
     assert_array_equal(actor.pose.dofs, figure_pose(figure).dofs)

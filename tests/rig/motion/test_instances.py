@@ -12,8 +12,8 @@ from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import pose_actor
-from viewer.rig.motion.instances import local_rotations, palettes, placements, pose_actors, worlds
+from viewer.rig.motion.evaluation import pose_actors
+from viewer.rig.motion.instances import local_rotations, palettes, placements, worlds
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import Pose, joint_rotations, placement_matrix, rest_pose
@@ -93,7 +93,7 @@ def both_ways(make, time: float, interpolate: bool = False) -> list[Actor]:
     together, alone = make(), make()
     pose_actors(together, time, interpolate)
     for first, second in zip(together, alone, strict=True):
-        pose_actor(second, time, interpolate)
+        pose_actors([second], time, interpolate)
         same(first, second)
     return together
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.rig.motion.body_motion import ParameterMotion, parameter_clip
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
@@ -30,7 +30,7 @@ def test_frames_have_the_vertices_of_the_published_equations_in_metres(figure):
     clip = parameter_clip(motion, figure)
     actor = Actor(figure, clip=clip)
     for row in range(3):
-        pose_actor(actor, 0.1 * row)
+        pose_actors([actor], 0.1 * row)
         wanted = forward(identity[row], parameters[row], expression[row])[0]
         # The vertices include correctives, so the pose must have exactly the rotations of the
         # joints.

@@ -6,7 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rig.animated import about, bow, channel, clip_of, leg, wave
 
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import pose_actors
+from viewer.rig.motion.transform_clip import sample_transforms
 from viewer.rig.scene import Actor
 from viewer.rig.transform_keys.edit import (
     add_transform_key,
@@ -21,7 +22,6 @@ from viewer.rig.transform_keys.edit import (
     with_interpolation,
 )
 from viewer.rig.transform_keys.rows import row_values, rows_of
-from viewer.rig.transform_keys.sampling import sample_transforms
 
 SKELETON = leg().require_skeleton()
 GAP = 1e-3
@@ -94,7 +94,7 @@ def test_added_key_keeps_the_shape_of_every_curve(clip):
         if row.channel >= 0 and row.component == 0:
             clip = add_transform_key(clip, rows_of(clip, SKELETON)[index], 0.77)
     after = sample_transforms(clip, times)
-    for name in ("rotations", "translations", "scales", "weights"):
+    for name in ("rotations", "translations", "scales", "shape_weights"):
         found, wanted = getattr(after, name), getattr(before, name)
         if name == "rotations":
             found, wanted = quaternion_to_matrix(found), quaternion_to_matrix(wanted)
@@ -142,7 +142,7 @@ def test_slopes_of_cubic_keys_are_per_second():
 def test_keyed_pose_is_reproduced_at_its_time(only_changed):
     figure, clip = leg(), wave()
     actor = Actor(figure, clip=clip)
-    pose_actor(actor, 1.25)
+    pose_actors([actor], 1.25)
     actor.pose.dofs[7] = 0.4  # the foot, which has no channel
     actor.pose.dofs[0] += 0.2
     actor.pose.translations[1, 0] += 0.5
@@ -153,7 +153,7 @@ def test_keyed_pose_is_reproduced_at_its_time(only_changed):
     # The channels for the translation of the knee and the rotation of the foot are new.
     assert counts == ([3, 3, 2, 2, 3, 1, 1] if only_changed else [4, 3, 3, 3, 3, 1, 1])
     again = Actor(figure, clip=keyed)
-    pose_actor(again, 1.25)
+    pose_actors([again], 1.25)
     for name in ("dofs", "translations", "scales", "shape_weights"):
         assert_allclose(getattr(again.pose, name), getattr(wanted, name), atol=EXACT)
 
@@ -181,7 +181,7 @@ def test_edits_keep_the_interpolation_of_every_channel():
         edited = add_transform_key(edited, rows_of(edited, SKELETON)[row], 0.8)
         edited = delete_transform_keys(edited, SKELETON, [(row, 1)])
     actor = Actor(figure, clip=edited)
-    pose_actor(actor, 0.9)
+    pose_actors([actor], 0.9)
     edited = key_transform_pose(edited, figure, actor.pose, 0.9, False)
     assert [one.interpolation for one in edited.channels[: len(modes)]] == modes
     assert [one.tangents is not None for one in edited.channels[: len(modes)]] == [

@@ -13,12 +13,11 @@ from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.evaluation import (
     frames_between,
     frames_of,
-    pose_actor,
+    pose_actors,
     pose_of,
     scene_rate,
     world_frames,
 )
-from viewer.rig.motion.instances import pose_actors
 from viewer.rig.motion.motion_paths import motion_path, path_times
 from viewer.rig.motion.onion import onion
 from viewer.rig.motion.sampled_animation import baked, frame_range, sample_animation
@@ -51,7 +50,7 @@ def plain_local(figure: Figure, clip, time: float) -> np.ndarray:
 @pytest.mark.parametrize("time", TIMES)
 def test_pose_has_the_transforms_of_the_keys(time):
     actor = Actor(leg(), clip=wave(), offset=-0.25)
-    pose_actor(actor, time - 0.25)
+    pose_actors([actor], time - 0.25)
     skeleton = actor.figure.require_skeleton()
     assert_allclose(
         local_matrices(skeleton, actor.pose), plain_local(actor.figure, wave(), time), atol=EXACT
@@ -67,7 +66,7 @@ def test_euler_angles_in_gimbal_lock_reproduce_the_exact_rotation():
     clip = clip_of(channel(1, "rotation", [0.0, 1.0, 2.0], lock))
     actor = Actor(leg(), clip=clip)
     for time in (0.0, 1.0, 2.0, 1e-9):
-        pose_actor(actor, time)
+        pose_actors([actor], time)
         found = joint_rotations(actor.figure.skeleton, actor.pose)[1]
         wanted = quaternion_to_matrix(plain_value(clip.channels[0], time))
         assert_allclose(found, wanted, atol=EXACT)
@@ -79,7 +78,7 @@ def test_joints_without_channels_keep_their_pose():
     actor.pose.translations[2] = 1.0, 2.0, 3.0
     actor.pose.scales[2], actor.pose.shape_weights[1] = 4.0, 0.5
     before = actor.pose.copy()
-    pose_actor(actor, 0.5)
+    pose_actors([actor], 0.5)
     for name in ("translations", "scales", "shape_weights"):
         assert_array_equal(getattr(actor.pose, name), getattr(before, name))
     assert_array_equal(actor.pose.dofs[6:], before.dofs[6:])
@@ -102,7 +101,7 @@ def test_translation_dofs_receive_the_offset_within_their_limits():
         channel(2, "translation", [0.0], [[3.0, 1, 0]]),
     )
     actor = Actor(Figure("slides", skeleton=slides), clip=clip)
-    pose_actor(actor, 1.0)
+    pose_actors([actor], 1.0)
     assert_array_equal(actor.pose.dofs, [1.0, 0.0, 3.0])
     assert_array_equal(actor.pose.translations, [[0.0, 0, 0], [5, 5, 0], [0, 0, 0]])
     places = local_matrices(slides, actor.pose)[:, :3, 3]
@@ -116,7 +115,7 @@ def test_frames_equal_the_poses_and_store_repeated_rows_once():
     worlds = world_frames(figure, frames)
     for row, time in enumerate(TIMES):
         actor = Actor(figure, clip=clip)
-        pose_actor(actor, time)
+        pose_actors([actor], time)
         again = pose_of(figure, frames, row)
         assert_allclose(worlds[row], world_matrices(figure.skeleton, actor.pose), atol=EXACT)
         assert_allclose(worlds[row], world_matrices(figure.skeleton, again), atol=EXACT)
@@ -145,7 +144,7 @@ def test_actors_of_one_clip_are_posed_together():
         alone = [actor.copy() for actor in together]
         pose_actors(together, 1.9)
         for actor, other in zip(together, alone, strict=True):
-            pose_actor(other, 1.9)
+            pose_actors([other], 1.9)
             for name in ("dofs", "translations", "rotations", "scales", "shape_weights"):
                 assert_allclose(getattr(actor.pose, name), getattr(other.pose, name), atol=EXACT)
 
@@ -173,7 +172,7 @@ def test_baked_frames_have_the_same_poses():
         atol=EXACT,
     )
     actor = Actor(figure, clip=sampled)
-    pose_actor(actor, 1.5)
+    pose_actors([actor], 1.5)
     assert_allclose(
         local_matrices(figure.skeleton, actor.pose), plain_local(figure, clip, 1.5), atol=EXACT
     )
@@ -181,7 +180,7 @@ def test_baked_frames_have_the_same_poses():
 
 def test_single_frames_keep_scales_of_joints():
     actor = Actor(leg(), clip=wave())
-    pose_actor(actor, 1.2)
+    pose_actors([actor], 1.2)
     frame = single_frame(actor)
     assert frame.figure is actor.figure
     found = world_frames(frame.figure, frame.frames)[0]

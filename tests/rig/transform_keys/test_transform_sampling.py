@@ -9,9 +9,7 @@ from rig.animated import HALF, about, channel, clip_of, plain_value
 
 from viewer.errors import RigError
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.transform_keys.rate import is_regular, key_rate
-from viewer.rig.transform_keys.sampling import sample_transforms
+from viewer.rig.motion.transform_clip import TransformClip, is_regular, key_rate, sample_transforms
 
 EXACT = 1e-14  # a few rounding errors of numbers near 1
 
@@ -80,7 +78,7 @@ def test_each_channel_keeps_its_end_values_outside_its_range():
     assert_array_equal(found.translations[:, 0], [[7.0, 8, 9]] * 4)
     assert_array_equal(found.translations[:, 1, 0], [0.0, 0.0, 2.0, 4.0])
     assert_array_equal(found.scales[:, 0, 0], [1.0, 0.0, -3.0, -3.0])
-    assert found.rotations.shape == (4, 0, 4) and found.weights.shape == (4, 0)
+    assert found.rotations.shape == (4, 0, 4) and found.shape_weights.shape == (4, 0)
 
 
 def random_clip(rng, interpolation: str | None = None) -> TransformClip:
@@ -114,7 +112,7 @@ def test_all_channels_agree_with_the_formulas_of_gltf(seed):
     for one in clip.channels:
         wanted = np.stack([plain_value(one, time) for time in times])
         if one.path == "weights":
-            values = found.weights[:, [found.weighted.tolist().index(s) for s in one.shapes]]
+            values = found.shape_weights[:, [found.weighted.tolist().index(s) for s in one.shapes]]
         else:
             joints, values = by_path[one.path]
             values = values[:, joints.tolist().index(one.joint)]
@@ -131,7 +129,7 @@ def test_all_channels_agree_with_the_formulas_of_gltf(seed):
 
 def test_clip_without_channels_has_no_samples():
     found = sample_transforms(TransformClip("empty", (), 0.0, 1.0), [0.0, 1.0])
-    assert found.rotations.shape == (2, 0, 4) and found.weights.shape == (2, 0)
+    assert found.rotations.shape == (2, 0, 4) and found.shape_weights.shape == (2, 0)
 
 
 def test_zero_quaternion_is_not_a_rotation():

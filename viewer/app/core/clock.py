@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 from viewer.data_classes import dataclass
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import scene_rate, time_span
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors, scene_rate, time_span
 from viewer.rig.motion.timing import DEFAULT_RATE, frame_at
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose

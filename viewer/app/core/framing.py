@@ -15,7 +15,7 @@ from viewer.rendering.recorder import copied
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose

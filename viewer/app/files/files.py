@@ -36,9 +36,8 @@ from viewer.phrases import printable
 from viewer.progress import Cancelled, receiving
 from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rig.captures.capture import CapturePart
-from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
+from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.pose import pose_key
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor, Scene
@@ -316,8 +315,9 @@ def keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
     """Set the frame rate of new people to that of the people in the scene."""
     for first in known:
         for actor in new:
-            if isinstance(actor.clip, SampledClip | PointClip):
-                actor.clip = with_rate(actor.clip, frame_rate(first.clip))
+            if actor.clip is not None and actor.clip.timing is not None:
+                rate = DEFAULT_RATE if first.clip is None else first.clip.frame_rate
+                actor.clip = with_rate(actor.clip, rate)
 
 
 def ask_for_files(state: AppState) -> None:

@@ -13,7 +13,6 @@ from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.progress import Receiver, receiving
-from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
@@ -79,7 +78,7 @@ def change_drive(
             state.say_status("Retargeting discarded: the motion was changed meanwhile")
             return
         for (actor, drive), clip in zip(work, changed, strict=True):
-            rate = frame_rate(actor.clip) if actor.clip is not None else clip.timing.frame_rate
+            rate = (clip if actor.clip is None else actor.clip).frame_rate
             actor.clip, actor.drive = with_rate(clip, rate), drive
             state.clock.pose(actor, again=True)
         tell()

@@ -12,7 +12,7 @@ from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
 from viewer.formats import Source, read
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.motion.single_frame import pose_frames
+from viewer.rig.motion.evaluation import still_frames
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
@@ -59,8 +59,8 @@ class PoseLosses:
         """
         self._looked += 1
         figure = self._figure
-        one, first = pose_frames(figure, pose)
-        least = negligible(one, first, np.zeros(1, dtype=np.intp))
+        first = still_frames(figure, pose)
+        least = negligible(figure, first, np.zeros(1, dtype=np.intp))
         if joints is not None and pose is not None:
             wanted = joint_matrices(figure, pose)[:, :3, 3]
             self._joints = _farther(self._joints, joints - wanted, least, frame)

@@ -35,8 +35,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.motion.animation_choice import still_pose
-from viewer.rig.motion.evaluation import Frames, frames_of
-from viewer.rig.motion.single_frame import pose_frames
+from viewer.rig.motion.evaluation import Frames, frames_of, still_frames
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
@@ -139,7 +138,7 @@ def figure_losses(
     kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
     place = path, file, added.built.tree, added.built.meshes
     if added.clips is None:
-        figure, frames = pose_frames(added.figure, added.pose)
+        figure, frames = added.figure, still_frames(added.figure, added.pose)
         rows = np.zeros(1, dtype=np.intp)
         shape, influences = body.shape, body.influences
         notes += gltf_losses(
@@ -284,7 +283,7 @@ def _sampled(
     written: Written, figure: Figure, pose: Pose, clips: Sequence[TransformClip], most: int
 ) -> _Samples:
     """Return the rest pose, and each animation at its keys and at times between them."""
-    frames, owners, seconds = [pose_frames(figure, pose)[1]], [-1], [0.0]
+    frames, owners, seconds = [still_frames(figure, pose)], [-1], [0.0]
     moved: list[tuple[int, Keys]] = []
     file = written.file
     animations = [file.root["animations"][index] for index in written.animations]

@@ -15,9 +15,13 @@ from viewer.export.gltf.reading import Placed
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.motion.evaluation import Frames
-from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
+from viewer.rig.motion.transform_clip import (
+    Interpolation,
+    TransformChannel,
+    TransformClip,
+    sample_transforms,
+)
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transform_keys.sampling import sample_transforms
 
 _Targets: TypeAlias = NDArray[np.integer]
 """Indices of blend shapes."""
@@ -178,7 +182,7 @@ def _merged(channels: list[TransformChannel], rows: _Targets, weights: Floats) -
         times = np.union1d(times, times[0] + np.arange(count + 1) / _RATE)
     found = sample_transforms(TransformClip("", tuple(channels), 0.0, 0.0), times)
     values = np.tile(weights, (len(times), 1))
-    values[:, found.weighted] = found.weights
+    values[:, found.weighted] = found.shape_weights
     mode: Interpolation = "step" if modes == {"step"} else "linear"
     shapes = rows.astype(np.int32)
     return TransformChannel(-1, "weights", times, values[:, rows], mode, shapes=shapes)

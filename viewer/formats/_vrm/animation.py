@@ -28,8 +28,7 @@ from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing, frame_at, frame_times
-from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.transform_keys.rate import is_regular, key_rate
+from viewer.rig.motion.transform_clip import TransformClip, is_regular
 
 EXTENSION = "VRMC_vrm_animation"
 _MOST_FRAMES = 1_000_000
@@ -56,7 +55,7 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     figure, clip = _moving(file, read, _with_ancestors(file, humanoid.values()), humanoid)
     if not clip.channels:
         raise source.fault("F002.vrma-animation")
-    rate = key_rate(clip)
+    rate = clip.frame_rate
     if not is_regular(clip):
         source.warn("F007.vrma-rate", "/animations/0", rate=rate)
     count = frame_at(clip.end - clip.start, rate) + 1

@@ -9,12 +9,12 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraPath, CameraView, extrinsics, view_at
+from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.transform_clip import Animation, TransformClip
-from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
-from viewer.rig.transform_keys.sampling import apply_transforms, sample_transforms
 
 
 def carrier_of(view: CameraView, actors: Sequence[Actor]) -> Actor | None:
@@ -63,8 +63,8 @@ def moving_alone(scene: Scene) -> list[str]:
 
 def _moved(path: CameraPath, actor: Actor, time: float) -> Floats:
     """Return the matrix of a camera's nodes at one time of the scene's clock: (4, 4)."""
-    pose, animation = rest_pose(path.nodes), played_with(path, actor.clip)
+    nodes, animation = Actor(Figure("", skeleton=path.nodes)), played_with(path, actor.clip)
     if animation is not None:
-        samples = sample_transforms(animation.clip(), np.array([time - actor.offset]))
-        apply_transforms(samples, 0, path.nodes, pose)
-    return np.asarray(world_matrices(path.nodes, pose)[-1])
+        nodes.clip, nodes.offset = animation.clip(), actor.offset
+        pose_actors([nodes], time)
+    return np.asarray(world_matrices(path.nodes, nodes.require_pose())[-1])

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.motion.samples import Samples
 from viewer.rig.motion.timing import Timing
+
+if TYPE_CHECKING:
+    from viewer.rig.skeleton import Skeleton
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,21 +62,29 @@ class PointClip:
         """Seconds of the last frame."""
         return self.timing.end
 
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second."""
+        return self.timing.frame_rate
 
-def sample_points(clip: PointClip, time: float, interpolate: bool = False) -> Floats | None:
-    """Return the points at one time, None if they are absent.
+    @property
+    def n_rows(self) -> int:
+        """Number of frames with data, N."""
+        return len(self.points)
 
-    A point is interpolated linearly between two frames in which it is visible. Otherwise it keeps
-    the position and confidence of the earlier frame until the next frame.
+    def sample(
+        self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
+    ) -> Samples:
+        """Return the points at times (T,), in seconds; ``interpolate``: also across gaps.
 
-    Returns (K, 4) or None, x, y, z, confidence.
-    """
-    before, after, fraction = (
-        part[0] for part in clip.timing.locate(np.array([time]), interpolate)
-    )
-    if before < 0:
-        return None
-    start, end = clip.points[before], clip.points[after]
-    mixed = start + fraction * (end - start)
-    both = (start[:, 3] > 0.0) & (end[:, 3] > 0.0)
-    return np.where(both[:, None], mixed, start)
+        A point is interpolated linearly between two frames in which it is visible. Otherwise it
+        keeps the position and confidence of the earlier frame until the next frame.
+        """
+        before, after, fraction = self.timing.locate(times, interpolate)
+        present = before >= 0
+        if not self.n_rows:
+            return Samples(present, points=np.zeros((len(present), *self.points.shape[1:])))
+        start, end = self.points[np.maximum(before, 0)], self.points[np.maximum(after, 0)]
+        mixed = start + fraction[:, None, None] * (end - start)
+        both = (start[..., 3] > 0.0) & (end[..., 3] > 0.0)
+        return Samples(present, points=np.where(both[..., None], mixed, start))

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.points import PointClip, PointLayout, sample_points
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.sampled_animation import frame_range
 from viewer.rig.motion.upright import own_up
 from viewer.rig.scene import Actor, Scene
@@ -58,14 +58,15 @@ def sample_upright_points(
     rate = own if rate is None else rate
     first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
-    sampled = [sample_points(motion, float(time), interpolate) for time in times]
-    nothing = np.zeros((len(layout.names), 4))
-    rows = np.stack([nothing if row is None else row for row in sampled])
+    found = motion.sample(None, times, interpolate)
+    assert found.points is not None  # it is a motion of points
+    rows = np.where(found.present[:, None, None], found.points, 0.0)
     up, hangs = own_up(scene, actor)
     places, confidences = rows[..., :3], rows[..., 3]
     if hangs:
         places = places * np.array([1.0, -1.0, -1.0])
     places = np.where(confidences[..., None] > 0.0, places, np.nan)
-    present = np.array([row is not None for row in sampled], dtype=np.bool_)
     start = first + (motion.timing.first_frame if rate == own else 0)
-    return SampledPoints(actor.name, layout, rate, start, times, present, places, confidences), up
+    return SampledPoints(
+        actor.name, layout, rate, start, times, found.present, places, confidences
+    ), up

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 
 Captured = SampledClip | PointClip
@@ -104,16 +104,21 @@ def resampled(clip: Captured, rate: float) -> Captured:
     again = replace(timing, frame_rate=rate, rows=rows, first_frame=0)
     if isinstance(clip, PointClip):
         return replace(clip, timing=again, points=points_between(clip, times[present]))
-    found = sample_rows(clip, times[present])
+    found = clip.sample(None, times[present])
+
+    def values(name: str) -> Floats | None:
+        own: Floats | None = getattr(clip, name)
+        return own if own is None or is_shared(clip, name) else getattr(found, name)
+
     return SampledClip(
         clip.name,
         again,
         found.rotations,
-        found.translations,
-        found.figure_translations,
-        found.figure_scales,
-        clip.shape_weights if is_shared(clip, "shape_weights") else found.shape_weights,
-        clip.scales if is_shared(clip, "scales") else found.scales,
+        values("translations"),
+        values("figure_translations"),
+        values("figure_scales"),
+        values("shape_weights"),
+        values("scales"),
     )
 
 

@@ -12,7 +12,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frames import Captured, is_shared, points_between, runs_of
-from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
+from viewer.rig.motion.sampled_clip import SampledClip
 
 Span = tuple[int, int]
 
@@ -66,7 +66,7 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
 
 def _extended(clip: SampledClip, times: Floats) -> SampledClip:
     """Return a clip with additional rows for times inside its gaps."""
-    found = sample_rows(clip, times, interpolate=True)
+    found = clip.sample(None, times, interpolate=True)
 
     def longer(name: str) -> Floats | None:
         own = getattr(clip, name)

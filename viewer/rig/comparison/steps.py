@@ -12,7 +12,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import frame_rate, pose_actor
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
@@ -56,7 +56,7 @@ class Steps:
             # Each motion is timed from its own start, as captures may start at any frame.
             for actor in (first, second):
                 time = float(self.times[number]) + actor.require_clip().start + actor.offset
-                pose_actor(actor, time)
+                pose_actors([actor], time)
             return f"frame {self.first_frame + number}"
         for actor, own in zip((first, second), self.own, strict=True):
             actor.pose = None if own is None else own.copy()
@@ -104,7 +104,7 @@ def _still_steps(first: Actor, second: Actor, n_poses: int) -> Steps:
 
 def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Steps:
     clips = first.require_clip(), second.require_clip()
-    rates = frame_rate(clips[0]), frame_rate(clips[1])
+    rates = clips[0].frame_rate, clips[1].frame_rate
     lasts = clips[0].end - clips[0].start, clips[1].end - clips[1].start
     mismatches = []
     if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.feet.soles import extent, soles_of
-from viewer.rig.motion.evaluation import JointMotion, frame_rate, frames_of, world_frames
+from viewer.rig.motion.evaluation import JointMotion, frames_of, world_frames
 from viewer.rig.motion.timing import frame_times
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -95,7 +95,7 @@ def resting_height(actor: Actor, up: str) -> RestingHeight | None:
     figure, motion = actor.figure, actor.clip
     if figure.skeleton is None or not isinstance(motion, JointMotion):
         return None
-    rate = frame_rate(motion)
+    rate = motion.frame_rate
     times = frame_times(motion.start, motion.end, rate)[:_MOST_FRAMES]
     frames = frames_of(figure, motion, times, actor.pose)
     soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.captures.points import PointClip, sample_points
+from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
@@ -150,8 +150,9 @@ def _path(actor: Actor) -> Floats:
         return np.zeros((0, 3))
     times = np.linspace(clip.start, clip.end, _N_TIMES)
     if isinstance(clip, PointClip):
-        found = [sample_points(clip, time) for time in times.tolist()]
-        seen = [points[points[:, 3] > 0.0, :3] for points in found if points is not None]
+        found = clip.sample(None, times)
+        assert found.points is not None  # it is a motion of points
+        seen = [points[points[:, 3] > 0.0, :3] for points in found.points[found.present]]
         places = np.array([points.mean(axis=0) for points in seen if len(points)])
     else:
         from viewer.rig.motion.evaluation import frames_between, frames_of, world_frames

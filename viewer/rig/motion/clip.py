@@ -21,6 +21,8 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.memo import Memo
+from viewer.rig.motion.samples import Samples
+from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, joint_label
 
@@ -98,6 +100,26 @@ class Clip:
         object.__setattr__(self, "end", float(self.end))
         if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
             raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
+
+    @property
+    def timing(self) -> None:
+        """None: curves have no frames."""
+
+    @property
+    def points(self) -> None:
+        """None: joints move."""
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second by which curves are counted."""
+        return DEFAULT_RATE
+
+    def sample(
+        self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
+    ) -> Samples:
+        """Return the DOFs with a channel at times (T,), in seconds; see ``evaluate``."""
+        targets, values = evaluate_all(self, times)
+        return Samples(np.ones(len(values), dtype=np.bool_), targets, values)
 
 
 def evaluate(channel: Channel, times: Floats) -> Floats:

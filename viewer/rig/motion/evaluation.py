@@ -1,8 +1,12 @@
-"""Evaluation of motions: posing of a single actor, and many frames of one actor as arrays."""
+"""Evaluation of motions: poses of actors at one time, and of one figure at many times as arrays.
+
+Motions are sampled for both: ``Samples`` replace values of each actor's pose, or of one pose in all
+frames.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -12,23 +16,21 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.captures.points import PointClip, sample_points
 from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import joint_worlds
-from viewer.rig.motion.clip import Clip, evaluate_all, sample
-from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.samples import Samples, joint_samples
 from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.pose import Pose, dof_rotations, joint_rotations, local_matrices
-from viewer.rig.posing.pose_vector import set_joint_rotations
-from viewer.rig.scene import Actor, Motion, figure_pose
+from viewer.rig.pose import Pose, dof_rotations, joint_offsets, joint_rotations
+from viewer.rig.posing.pose_vector import rotate_joints
+from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import joint_shifts, moved_rest_translations, rest_joints
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
-from viewer.rig.transform_keys.rate import key_rate
-from viewer.rig.transform_keys.sampling import apply_transforms, sample_transforms
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 
 JointMotion: TypeAlias = Clip | TransformClip | SampledClip
 """A motion that poses a skeleton rather than captured points."""
@@ -76,16 +78,6 @@ def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
     )
 
 
-def frame_rate(motion: Motion | None) -> float:
-    """Return a motion's frames per second.
-
-    Keyed transforms have the rate of their keys, DOF curves have ``DEFAULT_RATE``.
-    """
-    if isinstance(motion, TransformClip):
-        return key_rate(motion)
-    return motion.timing.frame_rate if isinstance(motion, SampledClip | PointClip) else DEFAULT_RATE
-
-
 def scene_rate(actors: Iterable[Actor]) -> float:
     """Return the frames per second of a scene's timeline.
 
@@ -93,58 +85,112 @@ def scene_rate(actors: Iterable[Actor]) -> float:
     transforms.
     """
     clips = [actor.clip for actor in actors if actor.clip is not None]
-    for kinds in ((SampledClip, PointClip), (TransformClip,)):
-        own = [clip for clip in clips if isinstance(clip, kinds)]
-        if own:
-            return frame_rate(max(own, key=lambda clip: clip.end - clip.start))
-    return DEFAULT_RATE
+    captured = [clip for clip in clips if clip.timing is not None]
+    keyed = [clip for clip in clips if isinstance(clip, TransformClip)]
+    longest = max(captured or keyed, key=lambda clip: clip.end - clip.start, default=None)
+    return DEFAULT_RATE if longest is None else longest.frame_rate
 
 
-def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
-    """Pose an actor by its clip at one time of the scene's clock, in place.
+def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
+    """Pose actors by their clips at one time of the scene's clock, in place.
 
-    ``actor``: actor whose ``pose``, ``points`` and ``is_present`` are modified, unless it has no
-    clip. ``time``: seconds; the actor's own ``offset`` is subtracted. ``interpolate``: interpolate
-    across gaps of captures instead of marking the actor as absent.
+    Sets ``pose``, ``points`` and ``is_present``. Actors with the same figure and clip, each at its
+    own offset, are posed together; those without a clip are unchanged. ``interpolate`` crosses gaps
+    of captures instead of marking actors as absent.
     """
-    clip, skeleton, own = actor.clip, actor.figure.skeleton, time - actor.offset
-    if isinstance(clip, PointClip):
-        actor.points = sample_points(clip, own, interpolate)
-        actor.is_present = actor.points is not None
-    elif isinstance(clip, SampledClip) and skeleton is not None and actor.pose is not None:
-        rows = sample_rows(clip, np.array([own]), interpolate)
-        actor.is_present = bool(rows.present[0])
-        if actor.is_present:
-            _apply(rows, 0, skeleton, actor.pose)
-    elif isinstance(clip, Clip) and skeleton is not None and actor.pose is not None:
-        sample(clip, skeleton, own, out=actor.pose)
-    elif isinstance(clip, TransformClip) and skeleton is not None and actor.pose is not None:
-        apply_transforms(sample_transforms(clip, np.array([own])), 0, skeleton, actor.pose)
-    if actor.springs is not None and actor.is_present:
-        actor.springs.swing(actor, own)
+    groups: dict[tuple[int, int], list[Actor]] = {}
+    for actor in actors:
+        groups.setdefault((id(actor.figure), id(actor.clip)), []).append(actor)
+    for group in groups.values():
+        clip, figure = group[0].clip, group[0].figure
+        if clip is None or (figure.skeleton is None and clip.points is None):
+            continue
+        times = np.array([time - actor.offset for actor in group])
+        found = clip.sample(figure.skeleton, times, interpolate)
+        rows, poses = list[int](), list[Pose]()
+        for row, (actor, is_present) in enumerate(zip(group, found.present.tolist(), strict=True)):
+            actor.is_present = is_present
+            if found.points is not None:
+                actor.points = found.points[row] if is_present else None
+            elif is_present and actor.pose is not None:
+                rows.append(row)
+                poses.append(actor.pose)
+        if figure.skeleton is not None and poses:
+            set_poses(found, np.array(rows), figure.skeleton, poses)
+        for actor in group:
+            if actor.springs is not None and actor.is_present:
+                actor.springs.swing(actor, time - actor.offset)
 
 
-def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
-    joints: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
-    moves = skeleton.dof_kinds < FIRST_ROTATION
-    pose.dofs[moves] = np.clip(0.0, *skeleton.dof_limits[moves].T)
-    set_joint_rotations(skeleton, pose, joints, quaternion_to_matrix(rows.rotations[row]))
-    place_pose(pose, rows, row)
+def set_poses(
+    found: Samples, rows: NDArray[np.intp], skeleton: Skeleton, poses: Sequence[Pose]
+) -> None:
+    """Set some rows of samples in as many poses, in place.
+
+    Rotations become DOFs of ball joints, and quaternions elsewhere, see ``rotate_joints``.
+    Translations become DOFs unless the motion sets these, and otherwise offsets of the poses.
+    """
+    dofs = np.stack([pose.dofs for pose in poses])
+    parts = list[tuple[str, Ints | slice, Floats]]()
+    if len(found.targets):
+        dofs[:, found.targets] = found.dofs[rows]
+    if len(found.rotated):
+        turns = quaternion_to_matrix(found.rotations[rows])
+        quaternions = rotate_joints(skeleton, dofs, found.rotated, turns)
+        parts.append(("rotations", _span(found.rotated), quaternions))
+    elif len(found.targets):
+        dofs = clamp_dofs(skeleton, dofs)
+    if len(found.translated):
+        offsets = _translate_joints(found, rows, skeleton, dofs)
+        parts.append(("translations", _span(found.translated), offsets))
+    if len(found.scaled):
+        parts.append(("scales", _span(found.scaled), found.scales[rows]))
+    if len(found.weighted):
+        n_known = min(len(pose.shape_weights) for pose in poses)
+        known = np.flatnonzero(found.weighted < n_known)
+        weights = found.shape_weights[rows[:, None], known]
+        parts.append(("shape_weights", _span(found.weighted[known]), weights))
+    parts.append(("dofs", slice(None), dofs))
+    for name, columns, values in parts:
+        for pose, row in zip(poses, values, strict=True):
+            getattr(pose, name)[columns] = row
+    for row, pose in zip(rows.tolist(), poses, strict=True):
+        if found.figure_translations is not None:
+            pose.figure_translation[:] = found.figure_translations[row]
+        if found.figure_scales is not None:
+            pose.figure_scale = float(found.figure_scales[row])
 
 
-def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
-    """Apply a clip's data at one time, except joint rotations, to a pose in place."""
-    if rows.translations is not None:
-        pose.translations[:] = rows.translations[row]
-    if rows.scales is not None:
-        pose.scales[:] = rows.scales[row]
-    if rows.figure_translations is not None:
-        pose.figure_translation[:] = rows.figure_translations[row]
-    if rows.figure_scales is not None:
-        pose.figure_scale = float(rows.figure_scales[row])
-    if rows.shape_weights is not None:
-        count = min(len(pose.shape_weights), rows.shape_weights.shape[1])
-        pose.shape_weights[:count] = rows.shape_weights[row, :count]
+def _span(columns: Ints) -> Ints | slice:
+    """Return consecutive indices as a slice, which is faster."""
+    first, count = int(columns[0]) if len(columns) else 0, len(columns)
+    is_row = np.array_equal(columns, np.arange(first, first + count))
+    return slice(first, first + count) if is_row else columns
+
+
+def _translate_joints(
+    found: Samples, rows: NDArray[np.intp], skeleton: Skeleton, dofs: Floats
+) -> Floats:
+    """Set translation DOFs within their limits, in place; return what they leave: (T, N, 3)."""
+    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
+    if not len(moves):
+        return found.translations[rows]
+    moves = moves[np.isin(skeleton.dof_joints[moves], found.translated)]
+    is_free = ~np.isin(moves, found.targets)
+    free = moves[is_free]
+    if not len(free) and not dofs[:, moves].any():
+        return found.translations[rows]
+    left = np.zeros((len(rows), skeleton.n_joints, 3))
+    left[:, found.translated] = found.translations[rows]
+    owners, axes = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
+    # Of several DOFs along one axis, the first receives the offset.
+    _, first = np.unique(owners * FIRST_ROTATION + axes, return_index=True)
+    values = np.zeros((len(rows), len(moves)))
+    values[:, first] = left[:, owners[first], axes[first]]
+    dofs[:, free] = np.clip(values[:, is_free], *skeleton.dof_limits[free].T)
+    by_joint = np.moveaxis(left, 0, -1)
+    np.subtract.at(by_joint, (owners, axes), dofs[:, moves].T)
+    return left[:, found.translated]
 
 
 def frames_of(
@@ -156,40 +202,81 @@ def frames_of(
 ) -> Frames:
     """Return a figure's poses at many times.
 
-    ``times``: (F,), seconds on the motion's own clock. ``base``: provides shape and placement if
-    the motion has none; the values in the file if omitted. Raises ``RigError`` if the figure has no
-    skeleton, or the joint counts differ.
+    ``times``: (F,), seconds on the motion's own clock. ``base``: provides what the motion does not
+    set; the pose of the file if omitted. ``interpolate``: interpolate across gaps. Raises
+    ``RigError`` if the figure has no skeleton, or the joint counts differ.
     """
-    skeleton = figure.skeleton
-    if skeleton is None:
+    if figure.skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to animate")
-    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    pose = figure_pose(figure) if base is None else base
-    if isinstance(motion, Clip):
-        return _constrained(figure, _keyed_frames(skeleton, motion, times, pose))
-    if isinstance(motion, TransformClip):
-        return _constrained(figure, _transform_frames(skeleton, motion, times, pose))
-    if motion.n_joints != skeleton.n_joints:
+    if isinstance(motion, SampledClip) and motion.n_joints != figure.skeleton.n_joints:
         raise RigError(
             f"clip {motion.name} has {motion.n_joints} joints, but figure {figure.name} has "
-            f"{skeleton.n_joints}"
+            f"{figure.skeleton.n_joints}"
         )
-    rows, count = sample_rows(motion, times, interpolate), len(times)
-    still = np.zeros((count, skeleton.n_joints, 3))
-    place = np.tile(pose.figure_translation, (count, 1))
-    weights = pose.shape_weights[None] if rows.shape_weights is None else rows.shape_weights
-    scales = np.full(count, pose.figure_scale)
-    found = Frames(
+    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    pose = figure_pose(figure) if base is None else base
+    return _frames(figure, motion.sample(figure.skeleton, times, interpolate), times, pose)
+
+
+def still_frames(
+    figure: Figure, pose: Pose | None, is_present: bool = True, time: float = 0.0
+) -> Frames:
+    """Return one pose as frames; ``pose`` is None for a figure without a skeleton."""
+    found, times = Samples(np.array([is_present])), np.array([time])
+    if pose is not None and figure.skeleton is not None:
+        return _frames(figure, found, times, pose)
+    none, weights = np.zeros((1, 0, 3)), np.zeros((1, figure.n_shapes))
+    place, scale = np.zeros(3), 1.0
+    if pose is not None:
+        weights[0, : len(pose.shape_weights)] = pose.shape_weights
+        place, scale = pose.figure_translation.copy(), pose.figure_scale
+    turns = np.zeros((1, 0, 4))
+    return Frames(times, found.present, turns, none, none, weights, place[None], np.array([scale]))
+
+
+def _frames(figure: Figure, found: Samples, times: Floats, pose: Pose) -> Frames:
+    """Return a pose at many times, with the values of samples in place of its own."""
+    skeleton, count = figure.require_skeleton(), len(times)
+    dofs, turns = pose.dofs[None], matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
+    is_whole = len(found.rotated) == len(found.translated) == skeleton.n_joints
+    if len(found.targets) and not is_whole:
+        dofs = np.tile(pose.dofs, (count, 1))
+        dofs[:, found.targets] = found.dofs
+        dofs = clamp_dofs(skeleton, dofs)
+        beneath = pose.rotations / np.linalg.norm(pose.rotations, axis=-1, keepdims=True)
+        turns = multiply(beneath, matrix_to_quaternion(dof_rotations(skeleton, dofs)))
+    offsets = joint_offsets(skeleton, dofs, pose.translations[None])
+    own, last = pose.shape_weights, int(found.weighted.max(initial=-1))
+    # Missing weights are treated as 0.
+    weights = np.zeros((1, max(len(own), last + 1, figure.n_shapes)))
+    weights[0, : len(own)] = own
+    places, sizes = found.figure_translations, found.figure_scales
+    frames = Frames(
         times,
-        rows.present,
-        rows.rotations,
-        still if rows.translations is None else rows.translations,
-        _shared(pose.scales[None].copy() if rows.scales is None else rows.scales),
-        _shared(weights),
-        place if rows.figure_translations is None else rows.figure_translations,
-        scales if rows.figure_scales is None else rows.figure_scales,
+        found.present,
+        _repeated(_set(turns, found.rotated, found.rotations, count), count),
+        _repeated(_set(offsets, found.translated, found.translations, count), count),
+        _shared(_set(pose.scales[None].copy(), found.scaled, found.scales, count)),
+        _shared(_set(weights, found.weighted, found.shape_weights, count)),
+        np.tile(pose.figure_translation, (count, 1)) if places is None else places,
+        np.full(count, pose.figure_scale) if sizes is None else sizes,
     )
-    return _constrained(figure, found)
+    return _constrained(figure, frames)
+
+
+def _set(rows: Floats, columns: Ints, values: Floats, count: int) -> Floats:
+    """Return rows with other values in some columns; values of all columns are not copied."""
+    if not len(columns):
+        return rows
+    if np.array_equal(columns, np.arange(rows.shape[1])):
+        return values
+    rows = _repeated(rows, count)
+    rows[:, columns] = values
+    return rows
+
+
+def _repeated(rows: Floats, count: int) -> Floats:
+    return rows if len(rows) == count else np.repeat(rows, count, axis=0)
 
 
 def _constrained(figure: Figure, frames: Frames) -> Frames:
@@ -210,69 +297,21 @@ def _shared(rows: Floats) -> Floats:
     return rows[:1] if len(rows) > 1 and (rows == rows[0]).all() else rows
 
 
-def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> Frames:
-    count = len(times)
-    targets, values = evaluate_all(clip, times)
-    dofs = np.tile(pose.dofs, (count, 1))
-    dofs[:, targets] = values
-    dofs = np.clip(dofs, *skeleton.dof_limits.T)
-    beneath = pose.rotations / np.linalg.norm(pose.rotations, axis=-1, keepdims=True)
-    rotations = multiply(beneath, matrix_to_quaternion(dof_rotations(skeleton, dofs)))
-    translations = np.tile(pose.translations, (count, 1, 1))
-    for dof in np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION):
-        translations[:, skeleton.dof_joints[dof], skeleton.dof_kinds[dof]] += dofs[:, dof]
-    return Frames(
-        times,
-        np.ones(count, dtype=np.bool_),
-        rotations,
-        translations,
-        pose.scales[None].copy(),
-        pose.shape_weights[None].copy(),
-        np.tile(pose.figure_translation, (count, 1)),
-        np.full(count, pose.figure_scale),
-    )
-
-
-def _transform_frames(skeleton: Skeleton, clip: TransformClip, times: Floats, pose: Pose) -> Frames:
-    count, found = len(times), sample_transforms(clip, times)
-    rotations = np.tile(matrix_to_quaternion(joint_rotations(skeleton, pose)), (count, 1, 1))
-    rotations[:, found.rotated] = found.rotations
-    still = local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations
-    translations = np.tile(still, (count, 1, 1))
-    moved = skeleton.rest_translations[found.translated]
-    translations[:, found.translated] = found.translations - moved
-    scales, weights = pose.scales[None].copy(), pose.shape_weights[None].copy()
-    if len(found.scaled):
-        scales = np.tile(scales, (count, 1, 1))
-        scales[:, found.scaled] = found.scales
-    if len(found.weighted):
-        weights = np.tile(weights, (count, 1))
-        weights[:, found.weighted] = found.weights
-    return Frames(
-        times,
-        np.ones(count, dtype=np.bool_),
-        rotations,
-        translations,
-        _shared(scales),
-        _shared(weights),
-        np.tile(pose.figure_translation, (count, 1)),
-        np.full(count, pose.figure_scale),
-    )
-
-
 def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
     """Return one frame as a separate pose."""
-    pose = figure_pose(figure)
-    row = SampledRows(
-        frames.present,
-        frames.rotations,
-        frames.translations,
-        frames.figure_translations,
-        frames.figure_scales,
-        np.broadcast_to(frames.shape_weights, (frames.n_frames, frames.shape_weights.shape[1])),
-        np.broadcast_to(frames.scales, frames.translations.shape),
+    pose, part = figure_pose(figure), frames_between(frames, slice(frame, frame + 1))
+    skeleton = figure.require_skeleton()
+    found = joint_samples(
+        skeleton,
+        part.present,
+        part.rotations,
+        part.translations,
+        part.figure_translations,
+        part.figure_scales,
+        part.shape_weights,
+        part.scales,
     )
-    _apply(row, frame, figure.require_skeleton(), pose)
+    set_poses(found, np.zeros(1, dtype=np.intp), skeleton, [pose])
     return pose
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor, Scene
 
 FAINTEST = 0.22

@@ -13,13 +13,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import (
-    Frames,
-    JointMotion,
-    frame_rate,
-    frames_of,
-    rest_translations_of,
-)
+from viewer.rig.motion.evaluation import Frames, JointMotion, frames_of, rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing, frame_at, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
@@ -69,7 +63,7 @@ def sample_animation(
     motion, figure = actor.clip, actor.figure
     if not isinstance(motion, JointMotion) or figure.skeleton is None:
         raise RigError(f"{actor.name} has no motion of joints")
-    own = frame_rate(motion)
+    own = motion.frame_rate
     rate = own if rate is None else rate
     first, stop = frame_range(motion, rate, frames)
     times = frame_times(motion.start, motion.end, rate)[first:stop]
@@ -164,7 +158,7 @@ def baked(
     does not animate; the figure's own pose if omitted. Raises ``RigError`` if the figure has no
     skeleton.
     """
-    rate = frame_rate(clip) if rate is None else rate
+    rate = clip.frame_rate if rate is None else rate
     times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(figure, clip, times, base)
     return SampledClip(

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.quaternion import slerp
+from viewer.rig.motion.samples import Samples, joint_samples
 from viewer.rig.motion.timing import Timing
+
+if TYPE_CHECKING:
+    from viewer.rig.skeleton import Skeleton
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -77,52 +82,43 @@ class SampledClip:
         """Seconds of the last frame."""
         return self.timing.end
 
+    @property
+    def points(self) -> None:
+        """None: joints move."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SampledRows:
-    """Samples of a clip at T times; rows where ``present`` is False are undefined."""
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second."""
+        return self.timing.frame_rate
 
-    present: Bools
-    rotations: Floats
-    translations: Floats | None
-    figure_translations: Floats | None
-    figure_scales: Floats | None
-    shape_weights: Floats | None
-    scales: Floats | None
+    def sample(
+        self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
+    ) -> Samples:
+        """Return all joints at times (T,), in seconds; ``interpolate``: also across gaps.
 
-
-def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
-    """Interpolate a clip at given times: rotations along the shorter arc, other values linearly.
-
-    Exactly at a frame, the stored values are returned unchanged.
-
-    ``times``: (T,), seconds. ``interpolate``: interpolate across gaps instead of reporting absence.
-    """
-    before, after, fraction = clip.timing.locate(times, interpolate)
-    present = before >= 0
-    before, after = np.maximum(before, 0), np.maximum(after, 0)
-    between = np.flatnonzero(fraction > 0.0)
-    if clip.n_rows == 0:
-        rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), clip.n_joints, 1))
-        return SampledRows(present, rest, None, None, None, None, None)
-    rotations = _taken(clip.rotations, before)
-    if len(between):
-        rotations = rotations.copy()
-        ends = clip.rotations[after[between]]
-        rotations[between] = slerp(rotations[between], ends, fraction[between, None])
-
-    def line(rows: Floats | None) -> Floats | None:
-        return None if rows is None else _line(rows, before, after, fraction)
-
-    return SampledRows(
-        present,
-        rotations,
-        line(clip.translations),
-        line(clip.figure_translations),
-        line(clip.figure_scales),
-        line(clip.shape_weights),
-        line(clip.scales),
-    )
+        Rotations are interpolated along the shorter arc, other values linearly. Exactly at a frame,
+        the stored values are returned unchanged.
+        """
+        before, after, fraction = self.timing.locate(times, interpolate)
+        present = before >= 0
+        before, after = np.maximum(before, 0), np.maximum(after, 0)
+        if self.n_rows == 0:
+            rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), self.n_joints, 1))
+            return joint_samples(skeleton, present, rest)
+        rotations, between = _taken(self.rotations, before), np.flatnonzero(fraction > 0.0)
+        if len(between):
+            rotations = rotations.copy()
+            ends = self.rotations[after[between]]
+            rotations[between] = slerp(rotations[between], ends, fraction[between, None])
+        every = (
+            self.translations,
+            self.figure_translations,
+            self.figure_scales,
+            self.shape_weights,
+            self.scales,
+        )
+        lines = (None if rows is None else _line(rows, before, after, fraction) for rows in every)
+        return joint_samples(skeleton, present, rotations, *lines)
 
 
 def _taken(rows: Floats, places: Ints) -> Floats:

@@ -7,17 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.constraints.evaluation import constrained
-from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.clip_edit import clip_from_pose
-from viewer.rig.motion.evaluation import Frames
+from viewer.rig.motion.evaluation import still_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import DEFAULT_RATE, Timing
 from viewer.rig.motion.upright import own_up, upright_actor
-from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import Actor, Scene
 
 
@@ -34,8 +30,7 @@ def single_frame(
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no joints to pose")
-    figure, frames = pose_frames(figure, pose, actor.is_present, time)
-    skeleton = figure.require_skeleton()
+    frames, skeleton = still_frames(figure, pose, actor.is_present, time), figure.skeleton
     if is_course_rig(skeleton) and not isinstance(actor.clip, SampledClip):
         motion: Clip | SampledClip = clip_from_pose(skeleton, pose, actor.name, time, time)
     else:
@@ -73,28 +68,3 @@ def upright_single_frame(
         return single_frame(actor, rate, number, time), f"-{up}" if hangs else up
     standing = replace(upright_actor(scene, actor), figure=actor.figure)
     return single_frame(standing, rate, number, time), up
-
-
-def pose_frames(
-    figure: Figure, pose: Pose | None, is_present: bool = True, time: float = 0.0
-) -> tuple[Figure, Frames]:
-    """Return one pose as frames, and the figure that they animate.
-
-    ``figure``: figure with or without a skeleton. ``pose``: pose of the figure; None for a figure
-    without a skeleton. ``time``: time of the frame in seconds.
-    """
-    skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
-    place, scale = np.zeros((1, 3)), np.ones(1)
-    rotated, moved, scales = np.zeros((1, 0, 4)), np.zeros((1, 0, 3)), np.zeros((1, 0, 3))
-    if pose is not None:
-        # Missing weights are treated as 0.
-        weights[0, : len(pose.shape_weights)] = pose.shape_weights
-        place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
-    if pose is not None and skeleton is not None:
-        scales = pose.scales[None].copy()
-        places = local_matrices(skeleton, pose)[:, :3, 3]
-        moved = (places - skeleton.rest_translations)[None]
-        turns = matrix_to_quaternion(joint_rotations(skeleton, pose))
-        rotated = constrained(skeleton, turns, places, pose.scales)[None]
-    present, times = np.array([is_present]), np.array([time])
-    return figure, Frames(times, present, rotated, moved, scales, weights, place, scale)

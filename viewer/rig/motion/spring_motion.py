@@ -14,13 +14,7 @@ from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.motion.animation_choice import still_pose
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import (
-    JointMotion,
-    frame_rate,
-    frames_of,
-    rest_translations_of,
-    world_frames,
-)
+from viewer.rig.motion.evaluation import JointMotion, frames_of, rest_translations_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
@@ -130,7 +124,7 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     if not isinstance(clip, JointMotion) or skeleton.springs is None:
         raise RigError(f"{actor.name} has no motion of spring joints")
     if rate is None:
-        rate = STEPS_PER_SECOND if isinstance(clip, Clip) else frame_rate(clip)
+        rate = STEPS_PER_SECOND if isinstance(clip, Clip) else clip.frame_rate
     times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(actor.figure, clip, times, actor.pose)
     rotations = frames.rotations.copy()

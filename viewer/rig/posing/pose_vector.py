@@ -15,8 +15,11 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.memo import Memo
+from viewer.rig.pose import Pose, dof_rotations, joint_rotations
 from viewer.rig.skeleton import Skeleton, clamp_dofs
+
+_ball_rows: Memo[Skeleton, Ints] = Memo()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,14 +46,19 @@ def rotation_rows(skeleton: Skeleton) -> Ints:
     """Return the DOF rows of ball joints, about x, y, z in this order.
 
     Returns (J, 3) int32, rows; all three are -1 for a joint that does not have exactly these
-    rotations.
+    rotations. Read-only.
     """
+    return _ball_rows.get(skeleton, None, lambda: _rows_of_balls(skeleton))
+
+
+def _rows_of_balls(skeleton: Skeleton) -> Ints:
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
     rotations = np.flatnonzero(skeleton.dof_kinds >= 3)
     counts = np.bincount(skeleton.dof_joints[rotations], minlength=skeleton.n_joints)
     rows[skeleton.dof_joints[rotations], skeleton.dof_kinds[rotations] - 3] = rotations
     is_ball = (counts == 3) & (rows >= 0).all(axis=1) & (np.diff(rows, axis=1) > 0).all(axis=1)
     rows[~is_ball] = -1
+    rows.flags.writeable = False
     return rows
 
 
@@ -66,23 +74,39 @@ def set_joint_rotations(
     rotation of each of these joints relative to its parent. ``clamp``: whether DOFs are clamped to
     their limits.
     """
+    dofs = pose.dofs[None].copy()
+    pose.rotations[joints] = rotate_joints(skeleton, dofs, joints, rotations[None], clamp)[0]
+    pose.dofs[:] = dofs[0]
+
+
+def rotate_joints(
+    skeleton: Skeleton, dofs: Floats, joints: Ints, rotations: Floats, clamp: bool = True
+) -> Floats:
+    """Set the DOFs (T, D) of joints of many poses, in place; return their quaternions (T, N, 4).
+
+    As for ``set_joint_rotations``, with ``rotations`` (T, N, 3, 3).
+    """
     joints = np.asarray(joints)
     rows = rotation_rows(skeleton)[joints]
     is_ball = rows[:, 0] >= 0
-    base = quaternion_to_matrix(skeleton.rest_rotations[joints])
-    pose.rotations[joints] = skeleton.rest_rotations[joints]
-    within = np.swapaxes(base, -1, -2) @ rotations
-    pose.dofs[rows[is_ball]] = matrix_to_euler(within[is_ball])
+    # A slice copies nothing.
+    balls = slice(None) if is_ball.all() else np.flatnonzero(is_ball)
+    rest = skeleton.rest_rotations[joints]
+    quaternions = np.broadcast_to(rest, (len(dofs), *rest.shape))
+    within = np.swapaxes(quaternion_to_matrix(rest[balls]), -1, -2) @ rotations[:, balls]
+    dofs[:, rows[balls]] = matrix_to_euler(within)
     others = joints[~is_ball]
-    pose.dofs[np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)] = 0.0
+    if len(others):
+        dofs[:, np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)] = 0.0
     if clamp:
-        pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
+        np.clip(dofs, *skeleton.dof_limits.T, out=dofs)
     if len(others):
         # If limits keep the DOFs away from 0, the quaternion compensates for them.
-        pose.rotations[others] = 0.0, 0.0, 0.0, 1.0
-        held = joint_rotations(skeleton, pose)[others]
-        left = rotations[~is_ball] @ np.swapaxes(held, -1, -2)
-        pose.rotations[others] = matrix_to_quaternion(left)
+        held = dof_rotations(skeleton, dofs)[:, others]
+        left = rotations[:, ~is_ball] @ np.swapaxes(held, -1, -2)
+        quaternions = quaternions.copy()
+        quaternions[:, ~is_ball] = matrix_to_quaternion(left)
+    return quaternions
 
 
 def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:

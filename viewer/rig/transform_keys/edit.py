@@ -24,12 +24,12 @@ from viewer.rig.motion.transform_clip import (
     TransformChannel,
     TransformClip,
     TransformPath,
+    sample_transforms,
 )
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.transform_keys.rows import TransformRow, angles_of, from_angles, rows_of
-from viewer.rig.transform_keys.sampling import sample_transforms
 
 _Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""
@@ -294,7 +294,7 @@ def value_at(channel: TransformChannel, time: float) -> Floats:
     alone = TransformClip("", (channel,), 0.0, 0.0)
     found = sample_transforms(alone, np.array([time]))
     if channel.path == "weights":
-        return found.weights[0]
+        return found.shape_weights[0]
     return {
         "rotation": found.rotations,
         "translation": found.translations,

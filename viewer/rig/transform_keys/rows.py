@@ -20,9 +20,14 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
 )
 from viewer.rig.memo import Memo
-from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, TransformPath
+from viewer.rig.motion.samples import Samples
+from viewer.rig.motion.transform_clip import (
+    TransformChannel,
+    TransformClip,
+    TransformPath,
+    sample_transforms,
+)
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transform_keys.sampling import TransformSamples, sample_transforms
 
 _rows: Memo[TransformClip, tuple[TransformRow, ...]] = Memo(kept=1)
 _parts: Memo[TransformClip, TransformClip] = Memo(kept=2)
@@ -112,10 +117,10 @@ def row_values(
     return result
 
 
-def _sampled(found: TransformSamples, skeleton: Skeleton, row: TransformRow) -> Floats:
+def _sampled(found: Samples, skeleton: Skeleton, row: TransformRow) -> Floats:
     """Return one curve from the samples of its channel: (T,)."""
     if row.path == "weights":
-        return found.weights[:, int(np.argmax(found.weighted == row.shape))]
+        return found.shape_weights[:, int(np.argmax(found.weighted == row.shape))]
     targets, values = {
         "rotation": (found.rotated, found.rotations),
         "translation": (found.translated, found.translations),
