@@ -8,7 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 import viewer
-from viewer.app.core.jobs import CountedJob
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.app.files.files import Files, open_files
 from viewer.app.headless import HeadlessApp
@@ -250,7 +250,7 @@ class Driver:
     def finish_job(self):
         """Run frames until the job is done and its result is shown; wait for threads in between."""
         while (job := self.state.job) is not None:
-            if isinstance(job, CountedJob):
+            if isinstance(job, ThreadJob):
                 job.wait()
             self.step()
         self.step(3)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 from app.captured import dots, people
 from imgui_bundle import imgui
 
 from viewer.app.core import reasons
+from viewer.app.core.jobs import Job
 from viewer.app.layout import ShownPanels
 from viewer.app.window import awaits_tooltip
 from viewer.rig.scene import Scene
@@ -147,10 +147,7 @@ def test_texture_can_be_toggled_if_present(drive):
 
 
 def test_recording_waits_for_other_work(hand, tooltips):
-    hand.state.job = SimpleNamespace(
-        title="Writing walk.bvh", progress=(0, 0), is_cancelled=False, output="", is_done=False,
-        error="", lines=[], step=lambda: None, cancel=lambda: None,
-    )  # fmt: skip
+    hand.state.job = Job("Writing walk.bvh")
     hand.click("menu File")
     rest(hand, "Record pictures or video…")
     assert tooltips[-1] == "wait for: Writing walk.bvh"

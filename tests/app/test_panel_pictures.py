@@ -22,6 +22,7 @@ from viewer.app.layout import Layout, ShownPanels
 from viewer.app.linting.lint_panel import Linting, check_rig
 from viewer.app.posing.posing import Posing
 from viewer.app.weights.weights_panel import pin_vertex
+from viewer.progress import report
 
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
@@ -75,7 +76,8 @@ def _unsaved(hand):
 def _unfinished(hand):
     def steps():
         while True:
-            yield 3, 12
+            report(3, 12)
+            yield
 
     hand.state.job = FrameJob("Recording walk.mp4", steps(), "recording")
     hand.key("q", "ctrl")

@@ -14,6 +14,7 @@ from viewer.autorig.rigged import clip_for
 from viewer.autorig.settings import METHODS, TransferSettings
 from viewer.errors import RigError
 from viewer.loading import bundled_body, load
+from viewer.progress import Cancelled, receiving
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.motion.clip import Channel, Clip
@@ -194,19 +195,18 @@ def test_progress_increases_to_1_and_may_cancel():
     figure, pose = bent_arm()
     steps = []
     target = moved(figure, pose)
-    transfer(
-        figure, pose, target, QUICK, report=lambda fraction, what: steps.append((fraction, what))
-    )
+    with receiving(lambda done, total, unit, what: steps.append((done / total, what))):
+        transfer(figure, pose, target, QUICK)
     fractions = [fraction for fraction, _ in steps]
     assert fractions == sorted(fractions) and fractions[0] == 0.0 and steps[-1] == (1.0, "done")
 
-    def stop(fraction, what):
-        if what == "joints":
-            raise KeyboardInterrupt
+    def stop(done, total, unit, what):
+        if what == "placing the joints":
+            raise Cancelled
 
     still = TransferSettings(alignment=AlignmentSettings(matrix=np.eye(4)), fits=False)
-    with pytest.raises(KeyboardInterrupt):
-        transfer(figure, pose, figure.mesh, still, report=stop)
+    with pytest.raises(Cancelled), receiving(stop):
+        transfer(figure, pose, figure.mesh, still)
 
 
 def test_joint_outside_the_target_is_reported():

@@ -17,6 +17,7 @@ from measure import interleaved, report
 import viewer
 from viewer.lint import lint_scene
 from viewer.loading import bundled_body
+from viewer.progress import receiving
 from viewer.rig.scene import Scene
 
 GOAL = 4.0
@@ -77,10 +78,11 @@ def steps_of(scene: Scene) -> list[tuple[str, float]]:
     """Return the start time of each step of a check, and the end of the last one, in seconds."""
     steps: list[tuple[str, float]] = []
 
-    def note(_done: int, _total: int, what: str) -> None:
+    def note(_done: int, _total: int, _unit: str, what: str) -> None:
         steps.append((what, time.perf_counter()))
 
-    lint_scene(scene, progress=note)
+    with receiving(note):
+        lint_scene(scene)
     return [*steps, ("", time.perf_counter())]
 
 

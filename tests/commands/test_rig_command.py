@@ -45,7 +45,7 @@ def seen(monkeypatch):
     """The arguments of the transfer, which ends the command instead of computing weights."""
     found = {}
 
-    def instead(figure, pose, target, settings, report, name):
+    def instead(figure, pose, target, settings, name):
         found.update(figure=figure, pose=pose, target=target, settings=settings, name=name)
         raise KeyboardInterrupt
 

@@ -14,6 +14,7 @@ from lint.sound import column, keypoints, scene_of, standing
 import viewer.lint
 from viewer.diagnostics import Diagnostic
 from viewer.lint import CHECKS, CODES, SEVERITIES, Finding, lint_scene, points_of
+from viewer.progress import Cancelled, receiving
 from viewer.rig.scene import Actor, Scene
 
 
@@ -36,21 +37,19 @@ def test_titles_are_unique() -> None:
 
 def test_progress_counts_every_check() -> None:
     steps: list[tuple[int, int, str]] = []
-    lint_scene(scene_of(column()), progress=lambda *step: steps.append(step))
+    with receiving(lambda done, total, unit, what: steps.append((done, total, what))):
+        lint_scene(scene_of(column()))
     assert [step[:2] for step in steps] == [(k, len(CHECKS)) for k in range(len(CHECKS))]
     assert steps[0][2] == "column: weights"
 
 
 def test_progress_may_cancel() -> None:
-    class StopError(Exception):
-        pass
-
-    def stop(done: int, total: int, what: str) -> None:
+    def stop(done: int, total: int, unit: str, what: str) -> None:
         if done == 2:
-            raise StopError
+            raise Cancelled
 
-    with pytest.raises(StopError):
-        lint_scene(scene_of(column()), progress=stop)
+    with pytest.raises(Cancelled), receiving(stop):
+        lint_scene(scene_of(column()))
 
 
 def test_figure_shared_by_actors_is_checked_once() -> None:

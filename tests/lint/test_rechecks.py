@@ -18,6 +18,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.lint import Finding, finding_text, lint_files, recheck
 from viewer.lint._files import located_in, of_diagnostic
 from viewer.loading import bundled_files
+from viewer.progress import Cancelled, receiving
 from viewer.rig.scene import Scene
 
 ZERO_NORMAL = skin_text.GOOD.replace("0 0 1\n  0 1 0", "0 0 0\n  0 1 0", 1)
@@ -139,18 +140,15 @@ def test_findings_about_captured_people_refer_to_the_folder(shared_data: Path) -
 
 
 def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
-    class StopError(viewer.ViewerError):
-        pass
-
     folder = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     scene = viewer.load(folder)
 
-    def stop(done: int, total: int, what: str) -> None:
+    def stop(done: int, total: int, unit: str, what: str) -> None:
         if what == "reading frames":
-            raise StopError
+            raise Cancelled
 
-    with pytest.raises(StopError):
-        recheck(scene, [folder], progress=stop)
+    with pytest.raises(Cancelled), receiving(stop):
+        recheck(scene, [folder])
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import threading
 
 import numpy as np
@@ -11,10 +10,11 @@ from rendering.drawn_figures import arm
 from rendering.moving import moving_arm
 
 from viewer.errors import OutputError, ViewerError
+from viewer.progress import receiving
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.recorder import Follow, Progress, Recording, record
+from viewer.rendering.recorder import Follow, Recording, record
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor, Scene, scene_box
 
@@ -72,7 +72,7 @@ def recording_of(scene, **changes) -> Recording:
     return Recording(scene, TIMES, camera, SIZE, **{**values, **changes})
 
 
-def run(offscreen, recording, sink) -> list[Progress]:
+def run(offscreen, recording, sink) -> list[int]:
     with offscreen.context:
         return list(record(recording, offscreen.renderer, sink))
 
@@ -182,11 +182,11 @@ def test_camera_does_not_move_while_its_actor_is_absent(offscreen, scene):
 
 
 def test_progress_counts_every_frame(offscreen, scene):
-    steps = run(offscreen, recording_of(scene), Kept())
-    assert [step.done for step in steps[: len(TIMES)]] == [1, 2, 3, 4, 5, 6]
-    assert {step.total for step in steps} == {6} and steps[-1].done == 6
-    assert Progress(0, 6, 1.0).left == 0.0 and Progress(2, 6, 1.0).left == 2.0
-    assert all(a.seconds <= b.seconds for a, b in itertools.pairwise(steps))
+    said = []
+    with receiving(lambda *step: said.append(step)):
+        steps = run(offscreen, recording_of(scene), Kept())
+    assert steps[: len(TIMES)] == [1, 2, 3, 4, 5, 6] and steps[-1] == 6
+    assert said == [(done, 6, "frames", "") for done in range(1, 7)]
 
 
 def test_sampled_frames_are_rendered_before_the_first_frame(offscreen, scene):
@@ -284,8 +284,7 @@ def test_few_frames_are_queued_for_a_slow_sink(offscreen, scene):
     recording.times = np.linspace(0.0, 1.0, 12)
     drawn = 0
     with offscreen.context:
-        for progress in record(recording, offscreen.renderer, sink):
-            drawn = progress.done
+        for drawn in record(recording, offscreen.renderer, sink):
             if drawn == 3:  # one is being written and two are queued; the next must wait
                 threading.Timer(0.2, gate.set).start()
             assert drawn - len(sink.frames) <= 4

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable
-from contextvars import copy_context
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from viewer.app.core.jobs import ThreadJob
 from viewer.phrases import printable
-from viewer.progress import Cancelled, receiving
+from viewer.progress import Cancelled
 
 if TYPE_CHECKING:
     from viewer.app.shell import Shell
@@ -21,44 +19,19 @@ _BAR_WIDTH = 26.0  # width of the progress bar, in font sizes
 Found = TypeVar("Found")
 
 
-class Opening(Generic[Found]):
-    """Thread that opens files, reports its progress, and can be cancelled.
-
-    ``progress``: completed steps, their total (0 if unknown) and their unit. ``act``: opens the
-    files and returns the result; errors are raised by ``result``.
-    """
+class Opening(ThreadJob, Generic[Found]):
+    """Thread that opens files; ``act`` returns the result, and ``result`` raises its errors."""
 
     def __init__(self, title: str, act: Callable[[], Found]) -> None:
-        self.title = title
-        self.progress = (0, 0, "")
-        self._act, self._is_cancelled = act, False
         self._found: list[Found] = []
         self._problem: BaseException | None = None
-        self._started = time.monotonic()
-        # The thread records diagnostics where its caller does.
-        self._thread = threading.Thread(target=copy_context().run, args=(self._run,), daemon=True)
-        self._thread.start()
+        super().__init__(
+            title, lambda: self._found.append(act()), names_steps=False, is_daemon=True
+        )
 
-    def _run(self) -> None:
-        try:
-            with receiving(self._receive):
-                self._found.append(self._act())
-        except BaseException as problem:  # raised again by ``result``, in the caller's thread
-            self._problem = problem
-
-    def _receive(self, done: int, total: int, unit: str, _: str) -> None:
-        if self._is_cancelled:
-            raise Cancelled
-        self.progress = (done, total, unit)
-
-    def wait(self, seconds: float) -> bool:
-        """Wait for the files for at most some seconds; return whether opening them has ended."""
-        self._thread.join(seconds)
-        return not self._thread.is_alive()
-
-    def cancel(self) -> None:
-        """Stop at the next report of progress."""
-        self._is_cancelled = True
+    def fail(self, problem: BaseException) -> None:
+        """Keep an error for the caller's thread."""
+        self._problem = problem
 
     def result(self) -> Found:
         """Wait for the end; return the result, or raise the error."""
@@ -66,12 +39,9 @@ class Opening(Generic[Found]):
             pass
         if self._problem is not None:
             raise self._problem
+        if not self._found:
+            raise Cancelled
         return self._found[0]
-
-    @property
-    def seconds(self) -> float:
-        """Seconds since the start."""
-        return time.monotonic() - self._started
 
 
 def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:

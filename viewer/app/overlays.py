@@ -102,35 +102,23 @@ def _hint(state: AppState) -> tuple[str, tuple[float, float]]:
 
 def _progress(state: AppState) -> _Progress | None:
     """Return the progress of the current job, if there is one."""
-    files, job = state.of(Files), state.job
-    loader, stream = files.loader, files.stream
+    loader, stream, job = state.of(Files).loader, state.of(Files).stream, state.job
+    label = "Cancel"
     if loader is not None and not loader.is_done and loader.seconds >= _SHOW_PROGRESS_AFTER:
-        title = f"Opening {printable(loader.paths[-1].name, 60)}"
-        done, total, unit = loader.progress
-        if total:
-            text = f"{done:,} of {total:,} {unit}"
-            return _Progress(title, done / total, text, "Cancel opening")
-        return _Progress(title, -loader.seconds, f"{loader.seconds:.0f} s", "Cancel opening")
-    if stream is not None:
-        read, total = stream.progress
-        names = ", ".join(builder.capture.name for builder in stream.builders)
-        if stream.finishing >= 0.0:
-            title, text = f"Retargeting {printable(names, 60)}", f"{100 * stream.finishing:.0f} %"
-            return _Progress(title, stream.finishing, text, "Cancel", is_aside=True)
-        text = f"{read:,} of {total:,} frames"
-        title = f"Reading {printable(names, 60)}"
-        return _Progress(title, read / max(total, 1), text, "Cancel reading", is_aside=True)
-    if job is not None:
-        done, total = job.progress
-        if job.is_cancelled:
-            return _Progress(f"Cancelling: {job.title}", -imgui.get_time(), "", "")
-        label = "Cancel"
-        if total:
-            # Jobs without countable steps report percentages.
-            text = f"{done} %" if total == 100 else f"{done:,} of {total:,}"
-            return _Progress(job.title, done / total, text, label)
-        return _Progress(job.title, -imgui.get_time(), "", label)
-    return None
+        job, label = loader, "Cancel opening"
+    elif stream is not None:
+        job, label = stream, "Cancel reading" if stream.progress[2] else "Cancel"
+    if job is None:
+        return None
+    if job.is_cancelled:
+        return _Progress(f"Cancelling: {job.title}", -imgui.get_time(), "", "")
+    done, total, unit = job.progress
+    is_aside = job is stream
+    if not total:
+        return _Progress(job.title, -job.seconds, f"{job.seconds:.0f} s", label, is_aside)
+    # Work without countable steps reports percentages.
+    text = f"{done} %" if (total, unit) == (100, "") else f"{done:,} of {total:,} {unit}".rstrip()
+    return _Progress(job.title, done / total, text, label, is_aside)
 
 
 def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> Rect | None:

@@ -22,7 +22,7 @@ from viewer.autorig.checks import (
 from viewer.autorig.correspondence import Template, with_reversed_winding
 from viewer.autorig.rigged import Rigged, with_fields
 from viewer.autorig.seed import nearest
-from viewer.autorig.settings import Report, TransferSettings
+from viewer.autorig.settings import TransferSettings
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
 from viewer.autorig.transfer.inverse_skinning import invert_skinning, repair_tears
 from viewer.autorig.transfer.joint_transfer import boundary_weights, surface_shifts, transfer_joints
@@ -31,6 +31,7 @@ from viewer.autorig.weights.result import WeightTransfer
 from viewer.autorig.weights.weight_transfer import transferred_weights
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
@@ -49,7 +50,6 @@ def transfer(
     pose: Pose,
     target: Mesh,
     settings: TransferSettings | None = None,
-    report: Report | None = None,
     name: str = "rigged",
 ) -> Rigged:
     """Rig a mesh with the rig of another figure.
@@ -60,7 +60,6 @@ def transfer(
     template, or SciPy is missing.
     """
     how = settings or TransferSettings()
-    tell = report or _silent
     if not template.is_attached:
         raise RigError(
             f"{template.name}: expected a template with mesh, skeleton and skin, found "
@@ -73,40 +72,39 @@ def transfer(
     plain = pose.copy()
     plain.shape_weights = np.zeros(0)
     if how.method == "nearest":
-        rigged = nearest(figure, plain, target, tell, name)
+        rigged = nearest(figure, plain, target, name)
     else:
-        rigged = robust(figure, plain, target, how, tell, name)
-    tell(1.0, "done")
+        rigged = robust(figure, plain, target, how, name)
+    report_fraction(1.0, "done")
     return with_fields(rigged)
 
 
-def robust(
-    template: Figure, pose: Pose, target: Mesh, how: TransferSettings, report: Report, name: str
-) -> Rigged:
+def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
     """Transfer a rig; see ``transfer``, which checks the arguments.
 
     ``pose``: pose without shape weights. ``how``: all settings except the method.
     """
-    met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
+    with part_of_work(span=(0.0, 0.4)):
+        met = align_posed(template, pose, target, how.alignment, how.fits)
     alignment, pose, posed = met.alignment, met.pose, met.positions
     original, template = template.skeleton, met.figure
     aligned = alignment.similarity.apply(posed)
-    weights = transferred_weights(
-        Template(aligned, template.require_mesh().triangles),
-        template.require_skin(),
-        target.positions,
-        target.triangles,
-        how.weights,
-        _within(report, 0.4, 0.8),
-    )
-    report(0.8, "joints")
+    with part_of_work(span=(0.4, 0.8)):
+        weights = transferred_weights(
+            Template(aligned, template.require_mesh().triangles),
+            template.require_skin(),
+            target.positions,
+            target.triangles,
+            how.weights,
+        )
+    report_fraction(0.8, "placing the joints")
     rest, transferred, lines = _transferred_skeleton(
         template, original, pose, alignment, aligned, target, how
     )
-    report(0.85, "rest pose")
+    report_fraction(0.85, "inverse skinning")
     scale = alignment.similarity.scale * pose.figure_scale
     figure, guarded = _at_rest(template, rest, weights, target, scale, how, name)
-    report(0.95, "checks")
+    report_fraction(0.95, "checking the result")
     joints = joint_matrices(figure, rest.pose)[:, :3, 3]
     out = newly_outside(template, pose, posed, target, joints, transferred)
     residual = residual_of(figure, rest.pose, np.eye(4), target)
@@ -134,10 +132,6 @@ def robust(
         path_scale=rest.root_scale / pose.figure_scale,
         lines=tuple(lines),
     )
-
-
-def _within(report: Report, low: float, high: float) -> Report:
-    return lambda fraction, what: report(low + (high - low) * fraction, what)
 
 
 def _transferred_skeleton(
@@ -257,10 +251,6 @@ def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> l
         key = "R013.correctives-too-large" if how.correctives else "R013.correctives"
         lines.append(Diagnostic(key))
     return lines
-
-
-def _silent(fraction: float, what: str) -> None:
-    """Ignore progress."""
 
 
 def _parts(figure: Figure) -> str:

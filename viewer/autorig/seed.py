@@ -8,11 +8,11 @@ import numpy as np
 
 from viewer.autorig.checks import check_lines, newly_outside, residual_of
 from viewer.autorig.rigged import Rigged
-from viewer.autorig.settings import Report
 from viewer.autorig.transfer.inverse_skinning import invert_skinning
 from viewer.autorig.weights.weight_transfer import nearest_weights
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.progress import report_fraction
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
@@ -25,7 +25,7 @@ from viewer.rig.skinning import deform
 _FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
 
 
-def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: str) -> Rigged:
+def nearest(template: Figure, pose: Pose, target: Mesh, name: str) -> Rigged:
     """Apply the steps of Tex-An Mesh: the target is changed; the template's joints are not.
 
     As in the original, pose correctives are neither removed nor added back. Only nearly singular
@@ -35,12 +35,12 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     """
     _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]
-    report(0.1, "boxes")
+    report_fraction(0.1, "boxes")
     box = align_boxes(target.positions, posed)
     aligned = apply_transform(box, target.positions)
-    report(0.2, "nearest vertices")
+    report_fraction(0.2, "nearest vertices")
     weights = nearest_weights(posed, skin, aligned)
-    report(0.6, "rest pose")
+    report_fraction(0.6, "inverse skinning")
     bound = weights.skin(skin.inverse_bind)
     palette = skinning_matrices(world_matrices(skeleton, pose), skin.inverse_bind)
     unaligned = np.asarray(np.linalg.inv(placement_matrix(pose)), dtype=np.float64)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import field
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
-
-Report = Callable[[float, str], None]
-"""Called with the completed fraction and the current step; may raise to cancel."""
 
 METHODS = {
     "robust": "closest surface points if they agree, other weights inpainted (Abdrashitov et al. "

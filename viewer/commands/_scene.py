@@ -252,15 +252,12 @@ def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
 
 def finish(builder: Builder, scene: Scene) -> None:
     """Read a capture to its end, with a progress bar in a terminal, and print warnings."""
-    from viewer.commands._progress import Progress
-
     notes: list[Diagnostic] = []
-    with Progress(f"reading {builder.capture.name}", builder.capture.n_frames) as progress:
+    with shown_progress(f"reading {builder.capture.name}"):
         while not builder.is_done:
             new, said = builder.read_some()
             scene.actors += new
             notes += said
-            progress.show(builder.n_read)
             report(builder.n_read, builder.capture.n_frames, "frames")
     scene.diagnostics = (*scene.diagnostics, *notes)  # the window shows them too
     print_warnings(notes)

@@ -22,7 +22,7 @@ from viewer.commands._frames import parse_range
 from viewer.commands._input_files import input_files
 from viewer.commands._pose import add_skinning_arguments
 from viewer.commands._printing import table_lines
-from viewer.commands._progress import Progress
+from viewer.commands._progress import shown_progress
 from viewer.commands._scene import PICTURES, print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.data_classes import dataclass
@@ -213,14 +213,9 @@ def _compared(
     found: list[tuple[Actor, Difference]] = []
     for first, second in pairing.pairs:
         # Comparing poses the reference, which must start in the same pose for each input.
-        with Progress(f"comparing {Path(name).name}", 1) as progress:
-
-            def report(done: int, count: int, progress: Progress = progress) -> None:
-                progress.total = count
-                progress.show(done)
-
-            posed = first.copy()
-            difference = compare(posed, second, skinning, n_poses, frames, report)
+        posed = first.copy()
+        with shown_progress(f"comparing {Path(name).name}"):
+            difference = compare(posed, second, skinning, n_poses, frames)
         if is_choice and first.figure.name != second.figure.name:
             note = Diagnostic("D002.partner", values={"name": second.name})
             difference = replace(difference, notes=(note, *difference.notes))

@@ -9,7 +9,7 @@ from typing import Literal
 from viewer.commands._frames import rate
 from viewer.commands._pose import PoseOptions
 from viewer.commands._printing import print_line, table_lines
-from viewer.commands._progress import Progress
+from viewer.commands._progress import shown_progress
 from viewer.commands._scene import add_capture_arguments, add_file_arguments, scene_options
 from viewer.commands._settings import add_settings, number, settings_of
 from viewer.commands._usage import require_files
@@ -68,13 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
     options = settings_of(LintOptions, arguments)
     asked = scene_options(arguments)
     files = asked.paths
-    with Progress("checking", 1) as progress:
-
-        def show(done: int, total: int, what: str) -> None:
-            progress.title, progress.total = what, total
-            progress.show(done)
-
-        scene, findings = lint_files(files, options, asked.motion, asked.size_limit, show)
+    with shown_progress("checking"):
+        scene, findings = lint_files(files, options, asked.motion, asked.size_limit)
     findings = [finding for finding in findings if finding.code not in ignored]
     findings = worst_first(findings)
     described = describe(findings, scene)

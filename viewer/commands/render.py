@@ -453,7 +453,7 @@ def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
     Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
     Raises OutputError if a file already exists, or cannot be written.
     """
-    from viewer.commands._progress import Progress
+    from viewer.commands._progress import shown_progress
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import (
         find_follow,
@@ -499,10 +499,9 @@ def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
         steps = record(recording, offscreen.renderer, sink)
         # The drawing is closed while the context still exists, even after an error.
         try:
-            with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
-                for progress in steps:
-                    line.show(progress.done)
-                    if progress.done < progress.total:
+            with shown_progress(title), contextlib.closing(steps):
+                for done in steps:
+                    if done < recording.n_frames:
                         poll()  # after the last frame, the file may be complete at any moment
         except BaseException:  # also Ctrl-C
             kept = getattr(sink, "n_written", 0)

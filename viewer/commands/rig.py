@@ -31,7 +31,7 @@ from viewer.autorig.settings import TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
 from viewer.commands._frames import Frames, add_frame_arguments, frames_of
 from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
-from viewer.commands._progress import Progress
+from viewer.commands._progress import shown_progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, settings_of
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
@@ -47,6 +47,7 @@ from viewer.models import named_files, resolve
 from viewer.models.bundled import BUNDLED
 from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import printable
+from viewer.progress import part_of_work
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip, is_course_rig
@@ -184,14 +185,13 @@ def run(arguments: argparse.Namespace) -> int:
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]
     check_targets(files, inputs, arguments.force)
     title = f"rigging {printable(target.name, 40)}"
-    with Progress(title, 100) as progress:
+    with shown_progress(title), part_of_work(title):
         rigged = transfer(
             template.figure,
             template.require_pose(),
             target.require_mesh(),
             settings,
-            lambda fraction, what: progress.show(round(100.0 * fraction)),
-            name=target.name,
+            target.name,
         )
     stream = sys.stdout if output is None else summary_stream(output)
     _print_report(rigged, stream)

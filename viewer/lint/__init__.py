@@ -8,7 +8,7 @@ from viewer.lint._files import Recheck, lint_files, recheck
 from viewer.lint._finding import MAX_ROTATION, Finding, LintOptions
 from viewer.lint._places import Places, places_of, points_of
 from viewer.lint._report import describe, finding_text, summary, worst_first
-from viewer.lint._running import CHECKS, Check, Progress, lint_scene
+from viewer.lint._running import CHECKS, Check, lint_scene
 from viewer.lint._subject import Subject
 
 __all__ = [
@@ -21,7 +21,6 @@ __all__ = [
     "Finding",
     "LintOptions",
     "Places",
-    "Progress",
     "Recheck",
     "Subject",
     "describe",

@@ -24,9 +24,10 @@ from viewer.diagnostics.wording import PLACES
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding, LintOptions
-from viewer.lint._running import Progress, lint_scene
+from viewer.lint._running import lint_scene
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.phrases import listed, printable
+from viewer.progress import report
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure, Origin
 from viewer.rig.motion.transform_clip import Animation
@@ -49,7 +50,6 @@ def lint_files(
     options: LintOptions | None = None,
     settings: MotionSettings | None = None,
     max_size: int | None = None,
-    progress: Progress | None = None,
 ) -> tuple[Scene, list[Finding]]:
     """Open files together and run all checks; files that cannot be opened become findings too.
 
@@ -57,14 +57,13 @@ def lint_files(
     file is checked if possible.
 
     ``paths``: as for ``viewer.loading.load``. ``max_size``: larger files, in bytes, are not read.
-    ``progress``: as for ``lint_scene``; also called while files are read. Returns ``scene``:
-    contents of all files that could be opened; findings refer to its actors; ``findings``: messages
-    of readers, then results of checks, each with its file if known.
+    Returns ``scene``: contents of all files that could be opened; findings refer to its actors;
+    ``findings``: messages of readers, then results of checks, each with its file if known.
     """
     size = MAX_SIZE if max_size is None else max_size
-    opened = open_files(paths, settings, size, progress)
+    opened = open_files(paths, settings, size)
     invalid = [_invalid(actor, opened) for actor in opened.scene.actors]
-    findings = lint_scene(opened.scene, options, progress, invalid)
+    findings = lint_scene(opened.scene, options, invalid)
     return opened.scene, with_files(opened, opened.scene, findings)
 
 
@@ -86,7 +85,6 @@ def open_files(
     paths: Sequence[str | Path],
     settings: MotionSettings | None = None,
     max_size: int = MAX_SIZE,
-    progress: Progress | None = None,
 ) -> Opened:
     """Read files and assemble those that match; never fails because of their contents.
 
@@ -97,14 +95,13 @@ def open_files(
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
     queue = list(reversed(known.values()))
     for number, path in enumerate(queue):  # the list grows during iteration: a .rig refers to files
-        if progress is not None:
-            progress(number, len(queue), f"reading {printable(path, 60)}")
+        report(number, len(queue), what=f"reading {printable(path, 60)}")
         named = _read(opened, path, settings or MotionSettings(), max_size)
         for other in named:
             if _resolved(other) not in known:
                 known[_resolved(other)] = other
                 queue.append(other)
-    _assemble(opened, settings, progress)
+    _assemble(opened, settings)
     return opened
 
 
@@ -193,7 +190,7 @@ def _readable(animations: Iterable[Animation], refusals: list[Finding]) -> Itera
             yield animation
 
 
-def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
+def _assemble(opened: Opened, settings: MotionSettings | None) -> None:
     """Build a scene; parts that do not match are removed, reported, and checked separately."""
     contents = opened.contents
     alone: list[Figure] = []
@@ -208,7 +205,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         except ViewerError as refused:
             problem = refused
         else:
-            problem = _read_on(opened.scene, builders, progress)
+            problem = _read_on(opened.scene, builders)
         if problem is None:
             break
         culprit = _culprit(problem, contents)
@@ -225,14 +222,11 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
     opened.scene.actors += [Actor(figure) for figure in alone]
 
 
-def _read_on(
-    scene: Scene, builders: Sequence[Builder], progress: Progress | None
-) -> ViewerError | None:
+def _read_on(scene: Scene, builders: Sequence[Builder]) -> ViewerError | None:
     """Read captures completely; return the error that stopped one of them."""
     for builder in builders:
         while not builder.is_done:
-            if progress is not None:  # an exception raised by it is not a file error
-                progress(builder.n_read, builder.capture.n_frames, "reading frames")
+            report(builder.n_read, builder.capture.n_frames, what="reading frames")
             try:
                 new, notes = builder.read_some()
             except ViewerError as problem:
@@ -394,7 +388,6 @@ def recheck(
     options: LintOptions | None = None,
     settings: MotionSettings | None = None,
     since: float | None = None,
-    progress: Progress | None = None,
 ) -> Recheck:
     """Check an open scene, and report messages of the readers of its files.
 
@@ -402,14 +395,13 @@ def recheck(
 
     ``paths``: the files that the scene was opened from; if omitted, those of its figures.
     ``settings``: with which its motions were interpreted. ``since``: time at which it was opened,
-    seconds since the epoch; files changed later are reported. ``progress``: as for ``lint_scene``;
-    reading files is included.
+    seconds since the epoch; files changed later are reported.
     """
     paths = paths or list(
         dict.fromkeys(one.path for actor in scene.actors for one in actor.figure.origins)
     )
-    opened = open_files(paths, settings, progress=progress)
-    findings = lint_scene(scene, options, progress)
+    opened = open_files(paths, settings)
+    findings = lint_scene(scene, options)
     notes = []
     gone = [path for path in paths if not _is_there(path)]
     if gone:

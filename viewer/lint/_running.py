@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 
@@ -12,13 +12,11 @@ from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.lint._finding import Finding, LintOptions
 from viewer.lint._subject import Subject, counting_of
+from viewer.progress import report
 from viewer.rig.arrays import Ints
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.scene import Actor, Scene
-
-Progress = Callable[[int, int, str], None]
-"""Called with the number of completed steps, the total, and the next step; may raise to cancel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +49,13 @@ CHECKS = {
 def lint_scene(
     scene: Scene,
     options: LintOptions | None = None,
-    progress: Progress | None = None,
     invalid: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
     """Run all checks on an open scene.
 
-    ``scene``: scene to check; not modified. ``progress``: called before every step with the number
-    of completed steps, the total, and the next step; may raise to cancel. ``invalid``: data of each
-    actor that must not be checked; see ``Subject``. Returns findings by actor, in the order of
-    ``CHECKS``, then findings about its figure's other animations; each has its actor and locations.
+    ``scene``: scene to check; not modified. ``invalid``: data of each actor that must not be
+    checked; see ``Subject``. Returns findings by actor, in the order of ``CHECKS``, then findings
+    about its figure's other animations; each has its actor and locations.
     """
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
@@ -74,8 +70,7 @@ def lint_scene(
     steps = [(subject, name) for subject, names in _checked(subjects, others) for name in names]
     findings: list[Finding] = []
     for number, (subject, name) in enumerate(steps):
-        if progress is not None:
-            progress(number, len(steps), f"{subject.actor.name}: {CHECKS[name].title}")
+        report(number, len(steps), what=f"{subject.actor.name}: {CHECKS[name].title}")
         # Products of huge numbers overflow; vertices that far away are reported as strays.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             findings += import_module(f"viewer.lint.{name}").check(subject)

@@ -8,7 +8,7 @@ same CPU cores (``tests/bench/bench_video.py``).
 The window and the command line both use it::
 
     steps = record(Recording(scene, times, camera, size, options), renderer, sink)
-    for progress in steps:       # one step per frame: draw a progress bar, handle input
+    for _ in steps:              # one step per frame, which reports its progress: handle input
         if cancelled:
             steps.close()        # stops the workers and removes partial output
 """
@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -29,6 +28,7 @@ import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.progress import report
 from viewer.rendering.camera import Camera, follow_view
 from viewer.rendering.gpu.target import Target, picture_rows, straight
 from viewer.rendering.gpu.upload import checked
@@ -147,25 +147,8 @@ class Sink(Protocol):
         """Remove unfinished output; does nothing after a successful ``close``."""
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Progress of a recording."""
-
-    done: int
-    """Number of frames that have been drawn and passed to the sink."""
-    total: int
-    """Number of all frames."""
-    seconds: float
-    """Time since the first step."""
-
-    @property
-    def left(self) -> float:
-        """Estimated remaining time, seconds; 0 before the first frame."""
-        return self.seconds * (self.total - self.done) / self.done if self.done else 0.0
-
-
-def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Progress]:
-    """Draw all frames and pass them to a sink, one step per frame.
+def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[int]:
+    """Draw all frames and pass them to a sink, one step per frame; yield the number drawn so far.
 
     The renderer's context must be current in every step and when the generator is closed. Other
     framebuffers may be bound between steps. Closing or discarding the generator before its end
@@ -175,7 +158,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
     uploaded again. Raises ``ViewerError`` if the driver cannot draw an image of this size. Raises
     ``OutputError`` if the sink cannot write.
     """
-    started, total = time.perf_counter(), recording.n_frames
+    total = recording.n_frames
     samples = np.unique(np.rint(np.linspace(0, total - 1, sink.n_samples)).astype(int)).tolist()
     queue = _Queue(max(sink.workers, 1))
     is_opaque = recording.options.background != "transparent"
@@ -190,23 +173,22 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
     def write(frame: int, data: bytes) -> None:
         sink.write(frame, pixels_of(data))
 
-    def progress(done: int) -> Progress:
-        return Progress(done, total, time.perf_counter() - started)
-
     drawer: _Drawer | None = None
     try:
         drawer = _Drawer(recording, renderer)
         for data in drawer.draw(samples):
             # Sample frames are inspected one at a time, in order.
             queue.begin(partial(look, data)).result()
-            yield progress(0)
+            report(0, total, "frames")
+            yield 0
         for frame, data in enumerate(drawer.draw(range(total))):
             queue.add(partial(write, frame, data))
-            yield progress(frame + 1)
+            report(frame + 1, total, "frames")
+            yield frame + 1
         queue.finish()
         closing = queue.begin(sink.close)
         while wait([closing], _PATIENCE).not_done:
-            yield progress(total)
+            yield total
         closing.result()
     except BaseException:  # this includes Ctrl-C and the closing of the generator
         queue.stop()

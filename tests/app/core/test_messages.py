@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from app.driver import make_state
 from imgui_bundle import imgui
 
 import viewer
+from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Message, MessageLog, message_line
 from viewer.app.overlays import hint_rect, n_newest
 from viewer.diagnostics import Diagnostic
@@ -165,10 +165,9 @@ def test_more_than_eight_messages_are_counted(drive, rig, texts):
 
 
 def _job():
-    return SimpleNamespace(
-        title="Writing walk.bvh and 3 more", progress=(3, 9), is_cancelled=False, is_done=False,
-        output="export", error="", lines=[], step=lambda: None, cancel=lambda: None,
-    )  # fmt: skip
+    job = Job("Writing walk.bvh and 3 more", "export")
+    job.progress = (3, 9, "frames")
+    return job
 
 
 def _overlap(a, b):

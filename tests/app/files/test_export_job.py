@@ -39,7 +39,7 @@ def test_export_reports_its_progress_and_keeps_the_pose_of_its_start(hand, pause
     save_export(hand.state, tmp_path / "after.obj")
     assert reached.wait(30.0)
     hand.step(2)
-    assert (hand.state.job.title, hand.state.job.progress) == ("Writing after.obj", (1, 4))
+    assert (hand.state.job.title, hand.state.job.progress) == ("Writing after.obj", (1, 4, "lines"))
     assert "Cancel" in hand.state.item_rects
     hand.state.actor.pose.dofs[:] += 0.3
     may_go_on.set()

@@ -11,6 +11,7 @@ from rig.animated import animated_leg, bow, channel, clip_of
 
 from viewer.app.linting.lint_panel import Linting, check_rig, start_check
 from viewer.lint import lint_scene
+from viewer.progress import report
 from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.scene import Actor
 
@@ -96,7 +97,7 @@ def test_posing_during_a_check_does_not_affect_it(drive, monkeypatch):
     check_rig(hand.state)
     assert is_held.wait(30)
     hand.step(2)
-    assert hand.state.job is not None and hand.state.job.progress == (3, 8)
+    assert hand.state.job is not None and hand.state.job.progress == (3, 8, "")
     hand.state.actor.pose.dofs[4] = 3.5
     hand.step()
     started.set()
@@ -111,11 +112,11 @@ def hold_checks(monkeypatch):
 
     go, seen, is_held = threading.Event(), [], threading.Event()
 
-    def held(scene, options, report):
-        report(3, 8, "column: mesh")
+    def held(scene, options):
+        report(3, 8, what="column: mesh")
         is_held.set()
         go.wait(30)
-        report(4, 8, "column: symmetry")
+        report(4, 8, what="column: symmetry")
         seen.append(scene)
         return lint_scene(scene, options)
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from viewer.app.core.clock import MODES
-from viewer.app.files.files import Files, Stream
+from viewer.app.files.files import Files, Stream, stream_captures
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
@@ -176,7 +176,8 @@ def streaming(drive_body):
         from viewer.rig.scene import Scene
 
         scene = Scene(list(builder.actors))
-        hand.app.frame._show(scene, (), [builder])
+        hand.state.show_scene(scene, ())
+        stream_captures(hand.state, [builder])
         hand.step(2)
         return builder
 

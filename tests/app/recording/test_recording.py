@@ -220,8 +220,8 @@ def test_cancelling_leaves_no_files(moving, tmp_path):
     (tmp_path / "out").mkdir()
     start(moving, tmp_path / "out" / "v.mp4", rate=500.0, size="own", own_size=(64, 64))
     moving.step(5)
-    done, total = moving.state.job.progress
-    assert 0 < done < total == 501
+    done, total, unit = moving.state.job.progress
+    assert 0 < done < total == 501 and unit == "frames"
     assert "Cancel" in moving.state.item_rects
     moving.key("escape")
     moving.step(3)

@@ -25,6 +25,7 @@ from viewer.app.rigging.work import align_template, start_adding, start_reading
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.export import export
 from viewer.formats.rigged import save
+from viewer.progress import report_fraction
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skinning import deform
@@ -35,11 +36,11 @@ pytestmark = pytest.mark.usefixtures("quick_fits")
 def test_settings_are_used_by_alignment_and_transfer(rigging, monkeypatch):
     asked = {}
 
-    def placed(template, own, target, settings, fits, tell):
+    def placed(template, own, target, settings, fits):
         asked.update(alignment=settings, fits=fits)
-        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False)
 
-    def instead(figure, pose, target, settings, report, name):
+    def instead(figure, pose, target, settings, name):
         asked.update(settings=settings, name=name)
         raise viewer.ViewerError("stopped here")
 
@@ -87,22 +88,22 @@ def test_advanced_settings_are_collapsed_and_changed_ones_counted(rigging, texts
 def test_progress_shows_step_and_fraction(rigging, texts, monkeypatch):
     gate = threading.Event()
 
-    def placed(template, own, target, settings, fits, tell):
-        tell(0.4, "pose")
+    def placed(template, own, target, settings, fits):
+        report_fraction(0.4, "fitting pose and proportions")
         gate.wait(60)
-        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False)
 
     monkeypatch.setattr("viewer.app.rigging.work.align_template", placed)
     said, draw = [], imgui.progress_bar
     monkeypatch.setattr(imgui, "progress_bar", lambda *given: said.append(given[2]) or draw(*given))
     hand = rigging(placed=False)
     hand.click("Align")
-    while hand.state.job.progress != (40, 100):
+    while hand.state.job.progress != (40, 100, ""):
         time.sleep(0.01)
     texts.clear()
     hand.step(2)
     gate.set()
-    assert "Fitting pose and proportions" in texts and said[-1] == "40 %"
+    assert "Aligning: fitting pose and proportions" in texts and said[-1] == "40 %"
     hand.finish_job()
 
 

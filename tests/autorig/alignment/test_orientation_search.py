@@ -15,6 +15,7 @@ from viewer.autorig.alignment.orientation_search import (
 )
 from viewer.autorig.surface.samples import sample_surface
 from viewer.errors import RigError
+from viewer.progress import receiving
 
 
 def cloud(positions, triangles):
@@ -89,7 +90,8 @@ def test_search_finds_a_rotated_scaled_and_moved_mesh():
     rotation = turn([0.2, 1, 0.1], 2.2)
     other = cloud(7.0 * positions @ rotation.T + [3.0, 4.0, 5.0], triangles)
     fractions = []
-    found = search(cloud(positions, triangles), other, axis_rotations("y"), None, fractions.append)
+    with receiving(lambda done, total, unit, what: fractions.append(done / total)):
+        found = search(cloud(positions, triangles), other, axis_rotations("y"), None)
     assert_allclose(found.similarity.rotation, rotation, atol=0.02)
     assert found.similarity.scale == pytest.approx(7.0, rel=0.02)
     assert fractions == sorted(fractions) and fractions[-1] == 1.0

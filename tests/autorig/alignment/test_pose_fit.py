@@ -8,6 +8,7 @@ from viewer.autorig.alignment.icp import Triangles
 from viewer.autorig.alignment.pose_fit import fit_pose
 from viewer.autorig.alignment.proportions import limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
+from viewer.progress import receiving
 from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.pose import joint_rotations, rest_pose
 from viewer.rig.skinning import deform
@@ -21,7 +22,8 @@ def fitted(target_figure, target_pose, figure, scales=True):
     side = Triangles(target, figure.mesh.triangles, 1500)
     pose = rest_pose(figure.skeleton)
     fractions = []
-    found = fit_pose(figure, pose, START, side, side, scales, fractions.append)
+    with receiving(lambda done, total, unit, what: fractions.append(done / total)):
+        found = fit_pose(figure, pose, START, side, side, scales)
     assert fractions == sorted(fractions) and fractions[0] == 0.0
     assert (pose.dofs == rest_pose(figure.skeleton).dofs).all()
     aligned = found.similarity.apply(deform(found.figure, found.pose)[0])
@@ -79,6 +81,6 @@ def test_too_few_pairs_do_not_change_the_template():
     far = START.apply(deform(figure)[0]) + 1000.0
     side = Triangles(far, figure.mesh.triangles, 500)
     pose = rest_pose(figure.skeleton)
-    found = fit_pose(figure, pose, START, side, side, True, lambda fraction: None)
+    found = fit_pose(figure, pose, START, side, side, True)
     assert found.similarity is START
     assert (found.pose.dofs == pose.dofs).all() and not found.rotated.any()

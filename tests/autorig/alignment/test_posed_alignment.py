@@ -13,6 +13,7 @@ from viewer.autorig.alignment.posed_alignment import align_posed
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.loading import bundled_body, load
+from viewer.progress import Cancelled, receiving
 from viewer.rig.pose import rest_pose
 from viewer.rig.skinning import deform, joint_matrices
 
@@ -23,14 +24,10 @@ SAMPLES = 125
 LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
 
 
-def silent(fraction, what):
-    pass
-
-
-def aligned(figure, target, fits=True, report=silent, **settings):
+def aligned(figure, target, fits=True, **settings):
     settings = {"samples": SAMPLES, **settings}
     pose = rest_pose(figure.skeleton)
-    return align_posed(figure, pose, target, AlignmentSettings(**settings), fits, report), pose
+    return align_posed(figure, pose, target, AlignmentSettings(**settings), fits), pose
 
 
 @pytest.fixture(scope="module")
@@ -195,16 +192,13 @@ def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):
 def test_progress_increases_and_cancels():
     figure, _, target = bent(1.5)
 
-    class CancelledError(RuntimeError):
-        pass
-
     fractions = []
 
-    def report(fraction, what):
-        fractions.append(fraction)
-        if what == "pose" and fraction > 0.6:
-            raise CancelledError
+    def receive(done, total, unit, what):
+        fractions.append(done / total)
+        if what == "fitting pose and proportions" and done > 60:
+            raise Cancelled
 
-    with pytest.raises(CancelledError):
-        aligned(figure, target, report=report)
+    with pytest.raises(Cancelled), receiving(receive):
+        aligned(figure, target)
     assert fractions == sorted(fractions) and fractions[0] == 0.0

@@ -15,6 +15,7 @@ from viewer.autorig.alignment.surface_alignment import (
     similarity_of,
 )
 from viewer.errors import RigError
+from viewer.progress import Cancelled, receiving
 from viewer.rig.mesh import vertex_normals
 
 pytestmark = pytest.mark.slow
@@ -25,13 +26,9 @@ SAMPLES = 125
 TEMPLATE = Posed(POSITIONS, TRIANGLES)
 
 
-def silent(fraction, what):
-    pass
-
-
-def aligned(positions, triangles=TRIANGLES, report=silent, up="y", **settings):
+def aligned(positions, triangles=TRIANGLES, up="y", **settings):
     settings = {"samples": SAMPLES, **settings}
-    return align(TEMPLATE, Posed(positions, triangles), up, AlignmentSettings(**settings), report)
+    return align(TEMPLATE, Posed(positions, triangles), up, AlignmentSettings(**settings))
 
 
 def test_alignment_of_an_aligned_target_is_unchanged():
@@ -120,22 +117,18 @@ def test_given_matrix_is_used_unchanged():
 
 
 def test_cancelling_from_the_report_ends_the_search():
-    class CancelledError(RuntimeError):
-        pass
+    def receive(done, total, unit, what):
+        if done > 30:
+            raise Cancelled
 
-    def cancel(fraction, what):
-        if fraction > 0.3:
-            raise CancelledError
-
-    with pytest.raises(CancelledError):
-        aligned(POSITIONS @ turn([0, 1, 0], 0.3).T, report=cancel)
+    with pytest.raises(Cancelled), receiving(receive):
+        aligned(POSITIONS @ turn([0, 1, 0], 0.3).T)
 
 
 def test_progress_increases():
     fractions = []
-    aligned(
-        POSITIONS @ turn([0, 1, 0], 0.3).T, report=lambda fraction, what: fractions.append(fraction)
-    )
+    with receiving(lambda done, total, unit, what: fractions.append(done / total)):
+        aligned(POSITIONS @ turn([0, 1, 0], 0.3).T)
     assert fractions == sorted(fractions) and fractions[0] == 0.0 and fractions[-1] <= 1.0
 
 

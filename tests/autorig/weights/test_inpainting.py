@@ -7,10 +7,7 @@ from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import weld
 from viewer.autorig.weights.weight_transfer import inpaint
 from viewer.errors import RigError
-
-
-def silent(fraction, what):
-    pass
+from viewer.progress import Cancelled, receiving
 
 
 def wavy_grid(count=9):
@@ -55,8 +52,8 @@ def smooth_energy(operator, areas):
     return dense + dense @ np.diag(1.0 / areas) @ dense
 
 
-def run(operator, areas, weights, unknown, report=silent):
-    return inpaint(operator, areas, sparse.csr_array(weights), ~unknown, unknown, report)
+def run(operator, areas, weights, unknown):
+    return inpaint(operator, areas, sparse.csr_array(weights), ~unknown, unknown)
 
 
 def test_inpainting_minimises_the_energy():
@@ -92,7 +89,7 @@ def test_inpainting_skips_vertices_that_are_neither_known_nor_requested():
     matched = np.concatenate([~unknown, [False, False]])
     wanted = np.concatenate([unknown, [False, False]])
     found, _ = inpaint(
-        far, np.concatenate([areas, [1.0, 1.0]]), sparse.csr_array(weights), matched, wanted, silent
+        far, np.concatenate([areas, [1.0, 1.0]]), sparse.csr_array(weights), matched, wanted
     )
     expected, _ = run(operator, areas, weights[:-2], unknown)
     np.testing.assert_allclose(found.toarray(), expected.toarray(), atol=1e-12)
@@ -153,14 +150,11 @@ def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
 def test_inpainting_can_be_cancelled():
     operator, areas, weights, unknown = problem(np.random.default_rng(7))
 
-    class StoppedError(Exception):
-        pass
+    def stop(done, total, unit, what):
+        raise Cancelled
 
-    def stop(fraction, what):
-        raise StoppedError
-
-    with pytest.raises(StoppedError):
-        run(operator, areas, weights, unknown, stop)
+    with pytest.raises(Cancelled), receiving(stop):
+        run(operator, areas, weights, unknown)
 
 
 def test_inpainting_solves_in_blocks_of_joints(monkeypatch):
@@ -168,7 +162,8 @@ def test_inpainting_solves_in_blocks_of_joints(monkeypatch):
     whole, _ = run(operator, areas, weights, unknown)
     monkeypatch.setattr("viewer.autorig.weights.weight_transfer._BLOCK", 1)
     seen = []
-    single, _ = run(operator, areas, weights, unknown, lambda *step: seen.append(step))
+    with receiving(lambda *step: seen.append(step)):
+        single, _ = run(operator, areas, weights, unknown)
     np.testing.assert_allclose(single.toarray(), whole.toarray(), atol=1e-12)
-    assert [what for _, what in seen] == ["factorising"] + 3 * ["inpainting weights"]
-    assert [fraction for fraction, _ in seen] == [0.0, 0.0, 1 / 3, 2 / 3]
+    assert [step[3] for step in seen] == ["factorising"] + 3 * ["inpainting weights"]
+    assert [step[:2] for step in seen] == [(0, 100), (0, 100), (33, 100), (67, 100)]

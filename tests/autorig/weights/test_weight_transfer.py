@@ -10,14 +10,11 @@ from viewer.autorig.weights.weight_transfer import (
     transferred_weights,
 )
 from viewer.errors import RigError
+from viewer.progress import Cancelled, receiving
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import Skin, skin_from_entries, skin_from_lists
 
 BIND = np.tile(np.eye(4), (3, 1, 1))
-
-
-def silent(fraction, what):
-    pass
 
 
 def tube(rings=13, sides=16, length=3.0):
@@ -54,11 +51,9 @@ def template():
     return Template(positions, triangles), skin_of_rows(along(positions[:, 0]))
 
 
-def transfer(positions, triangles, settings=None, report=silent):
+def transfer(positions, triangles, settings=None):
     surface, skin = template()
-    return transferred_weights(
-        surface, skin, positions, triangles, settings or WeightSettings(), report
-    )
+    return transferred_weights(surface, skin, positions, triangles, settings or WeightSettings())
 
 
 def test_tube_faces_outwards():
@@ -169,7 +164,6 @@ def test_transfer_does_not_depend_on_unit_or_position():
         positions @ turn.T * 100.0 + 40.0,
         triangles,
         WeightSettings(),
-        silent,
     )
     # The tolerance is rounding of coordinates of order 100 in a system with condition number 1e6.
     np.testing.assert_allclose(dense(there), dense(here), atol=1e-7)
@@ -192,21 +186,18 @@ def test_transfer_can_smooth_and_prune():
 def test_transfer_reports_its_progress_and_can_be_cancelled():
     positions, triangles = tube(rings=25)
     positions[np.abs(positions[:, 0] - 0.75) < 0.2, 1:] *= 2.5
-    seen = []
-    transfer(positions, triangles, report=lambda *step: seen.append(step))
-    fractions = [fraction for fraction, _ in seen]
+    fractions = []
+    with receiving(lambda done, total, unit, what: fractions.append(done / total)):
+        transfer(positions, triangles)
     assert fractions == sorted(fractions)
     assert (fractions[0], fractions[-1]) == (0.0, 1.0)
 
-    class StoppedError(Exception):
-        pass
-
-    def stop(fraction, what):
+    def stop(done, total, unit, what):
         if what == "factorising":
-            raise StoppedError
+            raise Cancelled
 
-    with pytest.raises(StoppedError):
-        transfer(positions, triangles, report=stop)
+    with pytest.raises(Cancelled), receiving(stop):
+        transfer(positions, triangles)
 
 
 def test_transfer_refuses_a_distant_target():
@@ -239,7 +230,7 @@ def test_transfer_reports_negative_template_weights():
     rows = along(positions[:, 0])
     rows[0] = 1.0, -0.5, 0.0
     result = transferred_weights(
-        template()[0], skin_of_rows(rows), positions, triangles, WeightSettings(), silent
+        template()[0], skin_of_rows(rows), positions, triangles, WeightSettings()
     )
     assert told(result.lines)[0] == ("R005.negative-weights", {"n": 1})
     np.testing.assert_allclose(dense(result)[0], [1.0, 0.0, 0.0], atol=1e-12)

@@ -1,97 +1,112 @@
-"""Jobs that take longer than a frame, with their progress and cancellation."""
+"""Jobs that take longer than a frame: their progress, their result, and their cancellation."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Generator
-from typing import Protocol
+from contextvars import copy_context
 
 from viewer.errors import ViewerError
 from viewer.phrases import printable
-
-Report = Callable[[int, int, str], None]
-"""Called with the completed steps, their total and the next step's name; raises to cancel."""
+from viewer.progress import Cancelled, receiving
 
 
-class Job(Protocol):
-    """Interface of a running job."""
+class Job:
+    """A job whose reports of progress it receives, and which ends at the next one if cancelled.
 
-    title: str
-    """Description of the job."""
-    error: str
-    """Reason why the job failed; empty if it did not."""
-    lines: list[str]
-    """Messages when the job ends."""
-    output: str
-    """The kind of output that is lost if the job does not end, such as ``"export"``; empty if it
-    has none."""
-    is_cancelled: bool
-    """Whether it was cancelled; its thread may need a moment to end."""
+    ``output``: the kind of files that are lost if the job does not end, such as ``"export"``; empty
+    if it writes none. ``names_steps``: whether the reported steps become the title.
+    """
+
+    def __init__(self, title: str, output: str = "", names_steps: bool = True) -> None:
+        self.title, self.output, self._names_steps = title, output, names_steps
+        self.progress = (0, 0, "")
+        """Completed steps, their total (0 if unknown), and their unit."""
+        self.error = ""
+        """Reason why the job failed; empty if it did not."""
+        self.lines: list[str] = []
+        """Messages when the job ends."""
+        self.is_cancelled = False
+        """Whether it was cancelled; its thread may need a moment to end."""
+        self.is_change = False
+        """Whether the job has a result to apply that changes the scene."""
+        self._started = time.monotonic()
 
     @property
     def is_done(self) -> bool:
         """Whether it has ended, successfully or not."""
+        return False
 
     @property
-    def progress(self) -> tuple[int, int]:
-        """Completed steps and number of steps; (0, 0) if unknown."""
+    def seconds(self) -> float:
+        """Seconds since it began."""
+        return time.monotonic() - self._started
 
     def step(self) -> None:
-        """Perform the next step if the job runs between frames."""
+        """Perform the part of the job that runs in the frame loop; called once a frame."""
 
     def cancel(self) -> None:
-        """Cancel the job; no partial file remains."""
+        """End the job at its next report, and discard its result; no partial file remains."""
+        self.is_cancelled = True
+
+    def receive(self, done: int, total: int, unit: str, what: str) -> None:
+        """Receive reported progress."""
+        if self.is_cancelled:
+            raise Cancelled
+        self.progress = (done, total, unit)
+        if what and self._names_steps:
+            self.title = what
 
 
-def unexpected(title: str, problem: BaseException) -> str:
-    """Return the message about an error that a thread does not expect."""
-    return f"{title}: unexpected {type(problem).__name__}: {printable(problem, 300)}"
+class ThreadJob(Job):
+    """Job in its own thread.
 
-
-class _EndedError(ViewerError):
-    """Raised to unwind a cancelled job."""
-
-
-class CountedJob:
-    """Job in its own thread that reports its progress and can be cancelled between steps.
-
-    ``act``: gets a ``Report`` and returns messages about the result; may raise ViewerError.
-    ``output``: the kind of files that the job writes, such as ``"export"``; empty if it writes
-    none.
+    ``act``: does the work and returns messages; it is cancelled between two reports of progress.
+    ``finish``: applies the result of a successful job; called in the frame loop. ``wake``: called
+    in the thread when it ends. ``is_daemon``: whether the program may end before the thread.
     """
 
     def __init__(
         self,
         title: str,
-        act: Callable[[Report], list[str]],
+        act: Callable[[], list[str] | None],
         finish: Callable[[], None] | None = None,
         output: str = "",
+        wake: Callable[[], None] = lambda: None,
+        names_steps: bool = True,
+        is_daemon: bool = False,
     ) -> None:
-        self.title, self.error, self.output, self.is_cancelled = title, "", output, False
-        self.lines: list[str] = []
-        self._act, self._finish = act, finish
+        super().__init__(title, output, names_steps)
+        self._act, self._finish, self._wake = act, finish, wake
         self.is_change = finish is not None and not output
-        self._progress = (0, 0)
-        self._thread = threading.Thread(target=self._run)
+        # The thread records diagnostics where its caller does.
+        run = copy_context().run
+        self._thread = threading.Thread(target=run, args=(self._run,), daemon=is_daemon)
         self._thread.start()
 
     def _run(self) -> None:
         try:
-            self.lines = self._act(self._report)
-        except _EndedError:
-            return
-        except ViewerError as problem:
-            self.error = str(problem)
-        except MemoryError:
-            self.error = f"{self.title}: not enough memory"
-        except BaseException as problem:  # a programming error: the traceback is printed
-            self.error = unexpected(self.title, problem)
-            raise
+            with receiving(self.receive):
+                self.lines = self._act() or []
+        except Cancelled:
+            pass
+        except BaseException as problem:
+            self.fail(problem)
+        finally:
+            if not self.is_cancelled:  # otherwise, the window may have been closed
+                self._wake()
 
-    def _report(self, done: int, total: int, what: str) -> None:
-        if self.is_cancelled:
-            raise _EndedError(self.title)
-        self._progress, self.title = (done, total), what or self.title
+    def fail(self, problem: BaseException) -> None:
+        """Keep the message about an error; a programming error is raised on and printed."""
+        if isinstance(problem, ViewerError):
+            self.error = str(problem)
+        elif isinstance(problem, MemoryError):
+            self.error = f"{self.title}: not enough memory"
+        else:
+            self.error = f"{self.title}: unexpected {type(problem).__name__}: "
+            self.error += printable(problem, 300)
+            raise problem
 
     @property
     def is_done(self) -> bool:
@@ -101,11 +116,6 @@ class CountedJob:
         """
         return not self._thread.is_alive() and (self.is_cancelled or self._finish is None)
 
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Completed steps and number of steps; (0, 0) before the first."""
-        return self._progress
-
     def step(self) -> None:
         """Apply the result of a thread that has ended."""
         if self._finish is None or self.is_cancelled or self._thread.is_alive():
@@ -114,28 +124,21 @@ class CountedJob:
         if not self.error:
             finish()
 
-    def cancel(self) -> None:
-        """End the job before its next step, and discard its result."""
-        self.is_cancelled = True
-
-    def wait(self) -> None:
-        """Wait until the thread has ended."""
-        self._thread.join()
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait until the thread has ended, for at most some seconds; return whether it has."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
 
 
-class FrameJob:
+class FrameJob(Job):
     """Job that draws, one step after each frame of the window.
 
-    ``output``: the kind of files that the job writes, such as ``"recording"``.
+    ``steps``: a generator that returns messages; closing it removes partial output.
     """
 
-    def __init__(
-        self, title: str, steps: Generator[tuple[int, int], None, list[str]], output: str
-    ) -> None:
-        self.title, self.error, self.output, self.is_cancelled = title, "", output, False
-        self.lines: list[str] = []
+    def __init__(self, title: str, steps: Generator[object, None, list[str]], output: str) -> None:
+        super().__init__(title, output)
         self._steps = steps
-        self._progress = (0, 1)
         self._is_done = False
 
     @property
@@ -143,23 +146,19 @@ class FrameJob:
         """Whether it has ended."""
         return self._is_done
 
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Completed steps and number of steps."""
-        return self._progress
-
     def step(self) -> None:
         """Perform the next step."""
         if self._is_done:
             return
         try:
-            self._progress = next(self._steps)
+            with receiving(self.receive):
+                next(self._steps)
         except StopIteration as end:
             self.lines, self._is_done = end.value or [], True
         except ViewerError as problem:
             self.error, self._is_done = str(problem), True
 
     def cancel(self) -> None:
-        """Cancel the job; the generator removes partial output."""
+        """Cancel the job at once, while the context is current."""
         self._steps.close()
         self.is_cancelled = self._is_done = True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -78,7 +77,7 @@ def no_job_room(state: AppState) -> str:
 def no_undo(state: AppState) -> str:
     """Return the reason why there is nothing to undo."""
     job = state.job
-    is_changing = isinstance(job, CountedJob) and job.is_change and not job.is_cancelled
+    is_changing = job is not None and job.is_change and not job.is_cancelled
     return "" if is_changing or state.history.can_undo else "nothing to undo"
 
 

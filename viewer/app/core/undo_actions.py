@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 
-from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
 from viewer.rig.scene import Actor
 
@@ -38,7 +37,7 @@ def _cancels_change(state: AppState) -> bool:
     undone meanwhile.
     """
     job = state.job
-    if not isinstance(job, CountedJob) or not job.is_change or job.is_cancelled:
+    if job is None or not job.is_change or job.is_cancelled:
         return False
     job.cancel()
     return True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
@@ -12,7 +11,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.core.edited_animations import Animations, keep_edited
-from viewer.app.core.jobs import unexpected
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button
@@ -33,7 +32,7 @@ from viewer.loading import (
 from viewer.loading.additions import add_to_actor
 from viewer.loading.capturing import Builder
 from viewer.phrases import printable
-from viewer.progress import Cancelled, receiving
+from viewer.progress import Cancelled, part_of_work, silent
 from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
@@ -74,14 +73,10 @@ class Files:
     """Whether opened files are stored in the list of recent files."""
 
 
-class Loader:
-    """Thread that reads files.
+class Loader(ThreadJob):
+    """Thread that reads files; dropping it discards its result.
 
-    Dropping a loader discards its result.
-
-    ``addition``: poses and images for the open figure, if the files contain nothing else.
-    ``error``: reason why nothing was read; empty if there is no error. ``attempts``: tried in order
-    until one loads; if all fail, the last error is reported.
+    ``attempts``: tried in order until one loads; if all fail, the last error is reported.
     """
 
     def __init__(
@@ -96,27 +91,11 @@ class Loader:
         self.scene: Scene | None = None
         self.builders: list[Builder] = []
         self.addition: Contents | None = None
-        self.error = ""
-        self._attempts, self._wake, self._settings = attempts, wake, settings
+        """Poses and images for the open figure, if the files contain nothing else."""
+        self._attempts, self._settings = attempts, settings
         self._opened = tuple(opened)
-        self._is_cancelled = False
-        self._progress = (0, 0, "")
-        self._started = time.monotonic()
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        self._thread.start()
-
-    def _read(self) -> None:
-        try:
-            with receiving(self._receive):
-                self._try_all()
-        except Cancelled:
-            return
-        self._wake()
-
-    def _receive(self, done: int, total: int, unit: str, _: str) -> None:
-        if self._is_cancelled:
-            raise Cancelled
-        self._progress = (done, total, unit)
+        title = f"Opening {printable(self.paths[-1].name, 60)}"
+        super().__init__(title, self._try_all, wake=wake, names_steps=False, is_daemon=True)
 
     def _try_all(self) -> None:
         for paths in self._attempts:
@@ -161,99 +140,57 @@ class Loader:
             self.scene, self.builders = begin(contents, self._settings)
         self.paths = (*(path for path in self._opened if path in kept), *paths)
 
-    @property
-    def is_done(self) -> bool:
-        """Whether there is a scene or an error."""
-        return not self._thread.is_alive()
 
-    @property
-    def progress(self) -> tuple[int, int, str]:
-        """Completed steps, their total and their unit; the total is 0 if it is unknown."""
-        return self._progress
-
-    def cancel(self) -> None:
-        """Stop reading at the next part of a file."""
-        self._is_cancelled = True
-
-    @property
-    def seconds(self) -> float:
-        """Seconds since loading began."""
-        return time.monotonic() - self._started
-
-    def wait(self) -> None:
-        """Wait until loading ends."""
-        self._thread.join()
-
-
-class Stream:
-    """Thread that reads parts of captures, which the frame loop adds to the scene.
-
-    ``error``: reason why reading ended early; empty if there is no error. ``finishing``: completed
-    fraction of the final motions of driven figures; negative before they are begun.
-    """
+class Stream(ThreadJob):
+    """Thread that reads parts of captures, which the frame loop adds to the scene."""
 
     def __init__(self, builders: Sequence[Builder], wake: Callable[[], None]) -> None:
         self.builders = tuple(builder for builder in builders if not builder.is_done)
-        self.error, self.finishing = "", -1.0
-        self._wake = wake
         self._parts: queue.Queue[tuple[Builder, CapturePart | _Motions]] = queue.Queue(_WAITING)
         for builder in self.builders:
             builder.defers = True
-        self._stop, self._is_waiting = threading.Event(), False
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        self._thread.start()
+        self._is_waiting = False
+        self._names = printable(", ".join(one.capture.name for one in self.builders), 60)
+        super().__init__(f"Reading {self._names}", self._read_all, wake=wake, is_daemon=True)
+        self._count()
 
-    def _read(self) -> None:
-        try:
-            for builder in self.builders:
+    def _read_all(self) -> None:
+        for builder in self.builders:
+            with silent():  # the frames in the scene are counted instead
                 for part in builder.parts():
                     if builder.is_cut:
                         break
-                    if not self._hand_over(builder, part):
-                        return
-                if not self._finish(builder):
-                    return
-        except Cancelled:
-            return
-        except ViewerError as problem:
-            self.error = str(problem)
-        except MemoryError:
-            self.error = f"{self.builders[0].capture.name}: not enough memory"
-        except BaseException as problem:  # a programming error: the traceback is printed
-            self.error = unexpected(self.builders[0].capture.name, problem)
-            raise
-        finally:
-            if not self._stop.is_set():  # the window may have been closed
-                self._wake()
+                    self._hand_over(builder, part)
+            self._complete(builder)
 
-    def _finish(self, builder: Builder) -> bool:
-        """Compute the final motions after all parts were added; return False if cancelled."""
+    def _complete(self, builder: Builder) -> None:
+        """Compute the final motions after all parts were added."""
         self._is_waiting = True
         while self._parts.unfinished_tasks:
-            if self._stop.wait(0.02):
-                return False
+            if self.is_cancelled:
+                raise Cancelled
+            time.sleep(0.02)
         self._is_waiting = False
-        # Cancelling takes effect between two steps of the work.
-        with receiving(self._receive):
+        with part_of_work(f"Retargeting {self._names}", (0.0, 1.0)):
             motions = builder.final_motions()
-        return self._hand_over(builder, motions) if motions else True
+        if motions:
+            self._hand_over(builder, motions)
 
-    def _receive(self, done: int, total: int, unit: str, what: str) -> None:
-        if self._stop.is_set():
-            raise Cancelled
-        self.finishing = done / max(total, 1)
-        self._wake()
-
-    def _hand_over(self, builder: Builder, part: CapturePart | _Motions) -> bool:
-        """Put a part into the queue when it has room; return False if reading was cancelled."""
-        while not self._stop.is_set():
+    def _hand_over(self, builder: Builder, part: CapturePart | _Motions) -> None:
+        """Put a part into the queue when it has room."""
+        while not self.is_cancelled:
             try:
                 self._parts.put((builder, part), timeout=0.1)
             except queue.Full:
                 continue
             self._wake()
-            return True
-        return False
+            return
+        raise Cancelled
+
+    def receive(self, done: int, total: int, unit: str, what: str) -> None:
+        """Receive the progress of retargeting."""
+        super().receive(done, total, unit, what)
+        self._wake()
 
     def take(self) -> tuple[list[Actor], list[Diagnostic], bool]:
         """Add the parts read since the last call to the scene.
@@ -269,7 +206,7 @@ class Stream:
             try:
                 builder, part = self._parts.get_nowait()
             except queue.Empty:
-                return new, notes, grew
+                break
             try:
                 if builder.is_cut:
                     continue
@@ -285,30 +222,33 @@ class Stream:
                 notes += said
             finally:
                 self._parts.task_done()
+        if grew:
+            self._count()
+        return new, notes, grew
+
+    def _count(self) -> None:
+        """Show the number of frames in the scene, and their total."""
+        read = sum(builder.n_read for builder in self.builders)
+        total = sum(builder.capture.n_frames for builder in self.builders)
+        self.progress = (read, total, "frames")
 
     @property
     def is_done(self) -> bool:
         """Whether everything has been read and added."""
         return not self._thread.is_alive() and self._parts.empty()
 
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Number of frames in the scene, and their total."""
-        read = sum(builder.n_read for builder in self.builders)
-        return read, sum(builder.capture.n_frames for builder in self.builders)
-
     def cancel(self) -> None:
         """Stop reading; frames already in the scene remain."""
-        self._stop.set()
+        super().cancel()
         for builder in self.builders:
             builder.is_cut = True
 
-    def wait(self) -> None:
+    def wait(self, seconds: float | None = None) -> bool:
         """Wait until the thread has ended or waits for parts to be added; used by tests."""
-        while self._thread.is_alive():
-            self._thread.join(0.01)
+        while not super().wait(0.01):
             if self._parts.full() or self._is_waiting:
-                return
+                return False
+        return True
 
 
 def keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
@@ -347,6 +287,8 @@ def open_files(state: AppState, paths: Sequence[Path]) -> None:
 
     A skin opened while the scene is a lone skeleton, or the reverse, is attached if it matches.
     """
+    if not paths:
+        return
     files = state.of(Files)
     attempts = [[*paths]]
     figures = [actor.figure for actor in state.scene.actors]
@@ -366,14 +308,8 @@ def take_loaded(
 ) -> bool:
     """Show the files that were read, or the error; return whether they have replaced the scene.
 
-    Parameters
-    ----------
-    state : AppState
-        State that shows them.
-    may_replace : callable
-        Returns whether nothing would be lost; until then, they wait.
-    prepare : callable
-        Uploads a scene, and raises RenderError if that is impossible.
+    ``may_replace``: returns whether nothing would be lost; until then, they wait. ``prepare``:
+    uploads a scene, and raises ``RenderError`` if that is impossible.
     """
     files = state.of(Files)
     loader = files.loader

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, explain, menu_item, note_item
@@ -17,7 +17,6 @@ from viewer.models import found_models, known_models, load_model_folder, save_mo
 from viewer.models.catalog import CATALOG, Publication
 from viewer.models.download import ADDABLE, add_model
 from viewer.phrases import counted, printable
-from viewer.progress import receiving
 
 
 def draw_model_menu(state: AppState) -> None:
@@ -86,12 +85,11 @@ def _start_adding(state: AppState, kind: str) -> None:
     """Download a model in a thread."""
     title = CATALOG[kind].title
 
-    def add(report: Report) -> list[str]:
-        with receiving(lambda *_: report(0, 0, "")):
-            path = add_model(kind)
+    def add() -> list[str]:
+        path = add_model(kind)
         return [f"{title} was added: open it with File > Models > {kind} ({path.name})"]
 
-    state.job = CountedJob(f"Downloading {title}", add, output="download")
+    state.job = ThreadJob(f"Downloading {title}", add, output="download")
 
 
 def set_model_folder(state: AppState, paths: list[Path]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.core.edited_animations import Animations, edited_aside, with_edited_keys
-from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
@@ -36,7 +36,7 @@ from viewer.export._options import SAFE_NAMES
 from viewer.export.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
 from viewer.phrases import printable
-from viewer.progress import receiving
+from viewer.progress import part_of_work, report
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
@@ -219,18 +219,15 @@ def save_motion(
     more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
     title = f"Writing {printable(motions[0].path.name, 60)}{more}"
 
-    def write(report: Report) -> list[str]:
-        def receive(done: int, total: int, unit: str, what: str) -> None:
-            report(done, total, f"{title}: {what}" if what else "")
-
-        with receiving(receive), all_or_none(files if path.suffix else []):
+    def write() -> list[str]:
+        with part_of_work(title), all_or_none(files if path.suffix else []):
             parts = _parts(scene, motions, still, path, options)
             notes = export(Selection(parts, scene, counted), path, options=options)
             if path.suffix:
-                report(1, 1, "")  # as in save_in_background
+                report(1, 1)  # as in save_in_background
             return [*map(str, [*notes, *left_out])]
 
-    state.job = CountedJob(title, write, lambda: known.add(*written), "export")
+    state.job = ThreadJob(title, write, lambda: known.add(*written), "export")
 
 
 def _motions(

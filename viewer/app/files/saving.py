@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
-from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.errors import ViewerError
 from viewer.formats import all_or_none, check_targets, free_path, save_image
 from viewer.phrases import printable
-from viewer.progress import receiving
+from viewer.progress import report
 from viewer.rig.arrays import Bytes
 
 
@@ -52,14 +53,15 @@ def save_in_background(
         state.error = str(problem)
         return
 
-    def write(report: Report) -> list[str]:
-        with receiving(lambda done, total, *_: report(done, total, "")), all_or_none(files):
+    def write() -> list[str]:
+        with all_or_none(files):
             notes = act()
-            report(1, 1, "")  # the last chance to cancel, before the old files are discarded
+            report(1, 1)  # the last chance to cancel, before the old files are discarded
         return [*map(str, notes), _saved(files)]
 
     title, known = f"Writing {printable(files[0].name, 60)}", state.of(SavedWork)
-    state.job = CountedJob(title, write, lambda: known.add(saved), "export")
+    finish = partial(known.add, saved)
+    state.job = ThreadJob(title, write, finish, "export", names_steps=False)
 
 
 def _saved(files: Sequence[Path]) -> str:

@@ -9,7 +9,7 @@ from dataclasses import field, replace
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
@@ -77,7 +77,7 @@ class Checked:
 class _Running:
     """A check that runs in a thread, which stores its result here."""
 
-    job: CountedJob | None = None
+    job: ThreadJob | None = None
     result: Checked | None = None
 
 
@@ -229,7 +229,7 @@ def _draw_progress(state: AppState) -> None:
     if running is None or running.job is None or running.job is not state.job:
         return
     job = running.job
-    done, total = job.progress
+    done, total, _ = job.progress
     fraction = done / total if total else -imgui.get_time()
     imgui.progress_bar(fraction, (-1.0, 0.0), f"{done} of {total}" if total else "")
     if button(state, "Cancel check", "it is being cancelled" if job.is_cancelled else ""):
@@ -394,13 +394,13 @@ def start_check(state: AppState) -> None:
     copy, paths = _copied(source), state.paths
     settings, since = state.motion_settings, state.opened_at
 
-    def check(report: Report) -> list[str]:
-        found = recheck(copy, paths, options, settings, since, report)
+    def check() -> list[str]:
+        found = recheck(copy, paths, options, settings, since)
         findings = tuple(worst_first(found.findings))
         running.result = Checked(source, copy, options, findings, found.n_files, found.notes)
         return [f"Checked: {summary(findings)}"]
 
-    running.job = state.job = CountedJob(_TITLE, check)
+    running.job = state.job = ThreadJob(_TITLE, check)
     state.of(Linting).running = running
 
 

@@ -76,7 +76,7 @@ def _recording_steps(
     settings: RecordSettings,
     path: Path,
     ghost: Ghost | None = None,
-) -> Generator[tuple[int, int], None, list[str]]:
+) -> Generator[object, None, list[str]]:
     """Record the playback range from the current view.
 
     ``state``: state with the scene, which is copied: later edits do not affect the recording.
@@ -96,8 +96,7 @@ def _recording_steps(
     try:
         # The recording must be closed before its renderer, even if this generator is closed.
         with contextlib.closing(record(recording, renderer, sink)) as steps:
-            for progress in steps:
-                yield progress.done, progress.total
+            yield from steps
     except (ViewerError, GeneratorExit):
         kept = getattr(sink, "n_written", 0)
         if kept:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import field, replace
 
-from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_drive, no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
-from viewer.progress import Receiver, receiving
+from viewer.progress import part_of_work
 from viewer.rig.motion.sampled_clip import SampledClip, with_rate
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
@@ -35,7 +35,7 @@ def no_edit(state: AppState) -> str:
 class _Change:
     """The drives that a job is computing."""
 
-    job: CountedJob | None = None
+    job: ThreadJob | None = None
     drives: dict[Actor, Drive] = field(default_factory=dict)
 
 
@@ -65,11 +65,11 @@ def change_drive(
     before = [actor.drive for actor, _ in work]
     changed: list[SampledClip] = []
 
-    def act(report: Report) -> list[str]:
+    def act() -> None:
         for number, (actor, drive) in enumerate(work):
-            with receiving(_shown(report, number, len(work), actor.title)):
+            span = number / len(work), (number + 1) / len(work)
+            with part_of_work(f"Retargeting {printable(actor.title, 60)}", span):
                 changed.append(_retargeted(actor, drive))
-        return []
 
     def finish() -> None:
         if state.scene is not scene:
@@ -84,25 +84,15 @@ def change_drive(
         tell()
 
     if sum(drive.motion.clip.n_rows for _, drive in work) > _SHORT:
-        job = state.job = CountedJob(f"Retargeting {printable(first.title, 60)}", act, finish)
+        job = state.job = ThreadJob(f"Retargeting {printable(first.title, 60)}", act, finish)
         state.put(_Change(job, dict(work)))
         return
     try:
-        act(lambda *_: None)
+        act()
     except ViewerError as problem:
         state.error = str(problem)
     else:
         finish()
-
-
-def _shown(report: Report, number: int, count: int, title: str) -> Receiver:
-    """Return a receiver that reports the steps of one person as percentages of all."""
-
-    def receive(done: int, total: int, unit: str, what: str) -> None:
-        fraction = (number + done / max(total, 1)) / count
-        report(int(100.0 * fraction), 100, f"Retargeting {printable(title, 60)}")
-
-    return receive
 
 
 def _is_together(actor: Actor, first: Actor) -> bool:

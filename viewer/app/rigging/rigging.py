@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.app.core.jobs import CountedJob
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
@@ -123,7 +123,7 @@ class Running:
     """A job in a thread, and the function that applies its result in the frame loop."""
 
     source: Scene
-    job: CountedJob | None = None
+    job: ThreadJob | None = None
     finish: Callable[[AppState], None] | None = None
 
 

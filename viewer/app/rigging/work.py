@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import aligned_template, placing_now, target_place
@@ -43,6 +43,7 @@ from viewer.errors import RigError
 from viewer.loading import load
 from viewer.loading.placing import placed_like
 from viewer.phrases import printable
+from viewer.progress import part_of_work, report
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import surface_point
@@ -53,31 +54,20 @@ from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 
 _Finish = Callable[[AppState], None]
-_STEPS = {
-    "alignment": "aligning the template",
-    "pose": "fitting pose and proportions",
-    "joints": "placing the joints",
-    "rest pose": "inverse skinning",
-    "checks": "checking the result",
-    "weighing": "transferring weights",
-}
-"""Progress labels for the steps of the transfer."""
 _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the mesh's name
-_Progress = Callable[[float, str], None]
 
 
-def _begin(state: AppState, title: str, act: Callable[[Report], _Finish], output: str = "") -> None:
+def _begin(state: AppState, title: str, act: Callable[[], _Finish], output: str = "") -> None:
     """Start a job in a thread; the frame loop later calls the function that the job returns."""
     if no_job_room(state):
         state.say_status(no_job_room(state))
         return
     running = Running(state.scene)
 
-    def work(report: Report) -> list[str]:
-        running.finish = act(report)
-        return []
+    def work() -> None:
+        running.finish = act()
 
-    running.job = state.job = CountedJob(title, work, output=output)
+    running.job = state.job = ThreadJob(title, work, output=output)
     state.of(Rigging).running = running
 
 
@@ -96,8 +86,8 @@ def finish_work(state: AppState) -> None:
 def start_adding(state: AppState, path: Path) -> None:
     """Read a mesh to rig, and add it to the scene."""
 
-    def act(report: Report) -> _Finish:
-        report(0, 0, f"Reading {printable(path.name, 60)}")
+    def act() -> _Finish:
+        report(0, 0, "", f"Reading {printable(path.name, 60)}")
         scene = load(path)
         found = [actor for actor in scene.actors if actor.figure.mesh is not None]
         if len(found) != 1:
@@ -137,8 +127,8 @@ def start_reading(
     """
     key = "file" if paths else state.of(Rigging).template_key
 
-    def act(report: Report) -> _Finish:
-        report(0, 0, "Reading the template")
+    def act() -> _Finish:
+        report(0, 0, "", "Reading the template")
         template = read_template(paths or template_files(key), key)
 
         def finish(state: AppState) -> None:
@@ -153,7 +143,7 @@ def start_reading(
     _begin(state, "Reading the template", act)
 
 
-def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
+def _snapshot(state: AppState, aligned: bool) -> Callable[[], Template]:
     """Return a function that provides a thread with the template in its current or aligned pose.
 
     The thread reads the template first if necessary.
@@ -164,10 +154,10 @@ def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
     )
     if known is not None:
         copied = replace(known, pose=known.pose.copy())
-        return lambda report: copied
+        return lambda: copied
 
-    def read(report: Report) -> Template:
-        report(0, 0, "Reading the template")
+    def read() -> Template:
+        report(0, 0, "", "Reading the template")
         return read_template(template_files(key), key)
 
     return read
@@ -181,18 +171,6 @@ def _keep(state: AppState, template: Template) -> None:
         view.template = template
 
 
-def _part_progress(
-    report: Report, low: float = 0.0, high: float = 1.0, title: str = ""
-) -> Callable[[float, str], None]:
-    """Return a function that reports the progress of one part of a job."""
-
-    def progress(fraction: float, what: str) -> None:
-        text = title + _STEPS.get(what, what)
-        report(round(100 * (low + (high - low) * fraction)), 100, text[:1].upper() + text[1:])
-
-    return progress
-
-
 def start_align(state: AppState, settings: AlignmentSettings | None = None) -> None:
     """Align the template with the target, by a search unless settings are given."""
     choices, target = state.of(Rigging).choices, target_mesh(state)
@@ -202,9 +180,10 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
     fits = choices.fits and how.matrix is None
     asked = state.of(Rigging).placing
 
-    def act(report: Report) -> _Finish:
-        template = take(report)
-        found = align_template(template, own or template, target, how, fits, _part_progress(report))
+    def act() -> _Finish:
+        template = take()
+        with part_of_work("Aligning", (0.0, 1.0)):
+            found = align_template(template, own or template, target, how, fits)
 
         def finish(state: AppState) -> None:
             _keep(state, template)
@@ -263,9 +242,9 @@ def start_match(state: AppState) -> None:
     take, similarity = _snapshot(state, aligned=True), placing.similarity
     mesh = target_mesh(state)
 
-    def act(report: Report) -> _Finish:
-        template = take(report)
-        report(0, 0, "Finding closest points")
+    def act() -> _Finish:
+        template = take()
+        report(0, 0, "", "Finding closest points")
         fields, fraction = _match_fields(template, similarity, mesh, settings)
         return lambda state: show_match(state, actor, fields, fraction)
 
@@ -287,22 +266,22 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
     take, mesh, name = _snapshot(state, aligned=True), target_mesh(state), target.title
     place, own = target_place(target), current_template(state)
 
-    def act(report: Report) -> _Finish:
-        report(0, 100, f"Preparing {printable(name, 40)}")
-        template, found, start = take(report), placing, 0.0
+    def act() -> _Finish:
+        report(0, 100, "", f"Preparing {printable(name, 40)}")
+        template, found, start = take(), placing, 0.0
         aligned = template
         if found is None and "robust" in methods:
             start, how = 0.4, _search_settings(choices)
-            progress = _part_progress(report, 0.0, start)
-            found = align_template(template, own or template, mesh, how, choices.fits, progress)
+            with part_of_work("Aligning", (0.0, start)):
+                found = align_template(template, own or template, mesh, how, choices.fits)
             aligned = found.fitted or template
         results = []
         for number, method in enumerate(methods):
             low, high = (start + (1.0 - start) * (number + k) / len(methods) for k in (0, 1))
-            progress = _part_progress(report, low, high, f"{printable(name, 40)}, {method}: ")
             settings = _transfer_settings(choices, method, found)
             called = f"{name} {_CALLED[method]}"
-            rigged = transfer(aligned.figure, aligned.pose, mesh, settings, progress, name=called)
+            with part_of_work(f"{printable(name, 40)}, {method}", (low, high)):
+                rigged = transfer(aligned.figure, aligned.pose, mesh, settings, called)
             rigged = _with_known_method(rigged, found)
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
@@ -324,7 +303,6 @@ def align_template(
     target: Mesh,
     settings: AlignmentSettings,
     fits: bool,
-    progress: _Progress,
 ) -> Placing:
     """Align a template with a target.
 
@@ -333,7 +311,7 @@ def align_template(
     plain = template.pose.copy()
     plain.shape_weights = np.zeros(0)  # the shape is now part of the figure
     figure = shaped(template.figure, template.pose.shape_weights)
-    found = align_posed(figure, plain, target, settings, fits, progress)
+    found = align_posed(figure, plain, target, settings, fits)
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
     is_fitted = is_other or bool(found.lines)
     return Placing(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import permutations, product
 
 import numpy as np
@@ -12,6 +11,7 @@ from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import SurfaceSamples
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
+from viewer.progress import report_fraction
 from viewer.rig.arrays import Floats
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
@@ -111,7 +111,6 @@ def search(
     target: Cloud,
     rotations: list[Floats],
     scale: float | None,
-    report: Callable[[float], None],
 ) -> Candidate:
     """Return the best candidate after a few iterations for each, and more for the best four.
 
@@ -128,13 +127,13 @@ def search(
         begun = Similarity(start, rotation, shift, np.ones(3))
         similarity = iterate(few[0], few[1], begun, _QUICK, scales=scale is None)
         found.append(judge(few[0], few[1], similarity))
-        report(0.6 * (index + 1) / len(rotations))
+        report_fraction(0.6 * (index + 1) / len(rotations))
     best = []
     finalists = sorted(found, key=lambda candidate: candidate.error)[:_FINALISTS]
     for index, finalist in enumerate(finalists):
         similarity = iterate(template, target, finalist.similarity, _LONG, scales=scale is None)
         best.append(judge(template, target, similarity))
-        report(0.6 + 0.4 * (index + 1) / len(finalists))
+        report_fraction(0.6 + 0.4 * (index + 1) / len(finalists))
     return min(best, key=lambda candidate: candidate.error)
 
 

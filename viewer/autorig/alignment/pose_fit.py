@@ -26,8 +26,6 @@ the surface does not determine, such as the rotation of a limb about its own axi
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from viewer.autorig.alignment.icp import Side
@@ -35,6 +33,7 @@ from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
 from viewer.data_classes import dataclass
+from viewer.progress import report_fraction
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import (
@@ -96,7 +95,6 @@ def fit_pose(
     far: Side,
     near: Side,
     scales: bool,
-    report: Callable[[float], None],
 ) -> Fitted:
     """Rotate a template's joints and scale its limbs until its surface matches the target's.
 
@@ -111,7 +109,7 @@ def fit_pose(
     rotated = np.zeros((skeleton.n_joints, 3))
     state = Fitted(template, pose.copy(), similarity, rotated, np.zeros((2, skeleton.n_joints)))
     for number in range(_ROUNDS):
-        report(number / _ROUNDS)
+        report_fraction(number / _ROUNDS, "fitting pose and proportions")
         aligned = _aligned_template(state, limbs)
         late = min(number / _NEARING, 1.0)
         target = far if late < 1.0 else near

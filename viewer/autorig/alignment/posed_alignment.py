@@ -9,7 +9,6 @@ are fitted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +29,7 @@ from viewer.autorig.alignment.surface_alignment import (
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -92,7 +92,6 @@ def align_posed(
     target: Mesh,
     settings: AlignmentSettings,
     fits: bool,
-    report: Callable[[float, str], None],
 ) -> PosedAlignment:
     """Align a template with a target, rotating its joints if its pose differs.
 
@@ -107,7 +106,8 @@ def align_posed(
     if volume(target.positions, triangles) < 0.0:
         triangles = triangles[:, ::-1]  # outward normals distinguish the two sides of a limb
     theirs = Posed(target.positions, triangles)
-    rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
+    with part_of_work(span=(0.0, 0.5)):
+        rigid = align(ours, theirs, template.up, settings)
     kept = PosedAlignment(rigid, template, pose, posed, ())
     is_part = rigid.away > PART
     gap = misfit(rigid, is_part)
@@ -116,7 +116,7 @@ def align_posed(
     exact = Triangles(target.positions, triangles, settings.samples)
     stretched = None
     if settings.scale == "uniform" and rigid.how in _FOUND and not is_part:
-        report(0.5, "proportions")
+        report_fraction(0.5, "proportions")
         stretched = _stretched(ours, exact, kept, settings.samples)
         if fits and stretched is not None and misfit(stretched.alignment, False) <= _STRETCH_GAP:
             return stretched
@@ -124,7 +124,7 @@ def align_posed(
         dense = sample_surface(target.positions, triangles, settings.dense)
         scales = settings.scale != "none" and not is_part
         job = _Job(template, pose, Cloud(exact.samples, dense), exact, scales, settings)
-        kept = _if_better(job, ours, kept, report)
+        kept = _if_better(job, ours, kept)
     if stretched is None or not _is_closer(stretched, kept):
         return kept
     return stretched if fits else replace(kept, lines=(_advice(stretched, kept),))
@@ -134,18 +134,19 @@ def _if_better(
     job: _Job,
     ours: Posed,
     kept: PosedAlignment,
-    report: Callable[[float, str], None],
 ) -> PosedAlignment:
     """Return the template with fitted pose and proportions if these remove most of the error."""
     rigid = kept.alignment
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
-    found = _fitted(job, rigid, lambda fraction: report(0.5 + 0.25 * fraction, "pose"))
+    with part_of_work(span=(0.5, 0.75)):
+        found = _fitted(job, rigid)
     may_face_back = rigid.how in _FOUND and job.settings.facing is None and not is_part
     if may_face_back and misfit(found.alignment, False) > _SURE:
         behind = _facing_back(job, ours, rigid, job.template.up)
         if misfit(behind, False) < _ALIKE * before:
-            other = _fitted(job, behind, lambda fraction: report(0.75 + 0.25 * fraction, "pose"))
+            with part_of_work(span=(0.75, 1.0)):
+                other = _fitted(job, behind)
             if misfit(other.alignment, False) < _CLEARLY * misfit(found.alignment, False):
                 found = other
     after = misfit(found.alignment, is_part)
@@ -161,9 +162,9 @@ def _if_better(
     return replace(found, lines=(*found.lines, Diagnostic("R004.gap", values=gap)))
 
 
-def _fitted(job: _Job, start: Alignment, report: Callable[[float], None]) -> PosedAlignment:
+def _fitted(job: _Job, start: Alignment) -> PosedAlignment:
     template = job.template
-    found = fit_pose(template, job.pose, start.similarity, job.cloud, job.exact, job.scales, report)
+    found = fit_pose(template, job.pose, start.similarity, job.cloud, job.exact, job.scales)
     posed = deform(found.figure, found.pose)[0]
     ours = Triangles(posed, template.require_mesh().triangles, job.settings.samples)
     how = start.how if start.how == "landmarks" else "fit"

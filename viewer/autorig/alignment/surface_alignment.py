@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import field
 
 import numpy as np
@@ -24,6 +23,7 @@ from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats, Ints, frozen
 
 SCALES = ("uniform", "axes", "none")
@@ -147,7 +147,6 @@ def align(
     target: Posed,
     template_up: str,
     settings: AlignmentSettings,
-    report: Callable[[float, str], None],
 ) -> Alignment:
     """Find the similarity that aligns the template with the target.
 
@@ -159,7 +158,7 @@ def align(
     ``template_up``: either "y" or "z", the template's up axis. Raises ``RigError`` if a mesh has no
     area, landmarks are collinear, or axes contradict each other.
     """
-    report(0.0, "alignment")
+    report_fraction(0.0, "aligning the template")
     samples = settings.samples
     ours, theirs = fine = _surface(template, samples), _surface(target, samples)
     if settings.matrix is not None:
@@ -171,24 +170,23 @@ def align(
     if settings.landmarks is not None:
         start = _landmark_fit(settings.landmarks, settings.scale)
         if settings.refines:
-            report(0.2, "alignment")
+            report_fraction(0.2, "aligning the template")
             start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
-        return Alignment.of(ours, theirs, _refined(fine, start, settings, report), "landmarks")
+        return Alignment.of(ours, theirs, _refined(fine, start, settings), "landmarks")
     rotations = axis_rotations(template_up, settings.up, settings.facing)
     stays = in_place(coarse[0], coarse[1], rotations, scaled=settings.scale != "none")
-    report(0.1, "alignment")
+    report_fraction(0.1, "aligning the template")
     if stays.error <= _SURELY:
         return Alignment.of(ours, theirs, stays.similarity, "in place")
     scale = 1.0 if settings.scale == "none" else None
-    best = search(
-        coarse[0], coarse[1], rotations, scale, lambda s: report(0.1 + 0.7 * s, "alignment")
-    )
+    with part_of_work(span=(0.1, 0.8)):
+        best = search(coarse[0], coarse[1], rotations, scale)
     left = Alignment.of(ours, theirs, stays.similarity, "in place")
     found = Alignment.of(ours, theirs, best.similarity, "search")
     is_part = found.away > PART
     # Sliding refines a close fit; between different poses it is slow and does not converge.
     if settings.scale == "axes" or misfit(found, True) <= _SLIDING:
-        similarity = _refined(fine, best.similarity, settings, report)
+        similarity = _refined(fine, best.similarity, settings)
         slid = Alignment.of(ours, theirs, similarity, "search")
         is_part &= slid.away > PART
         # Sliding considers only surfaces that face the same way, and may miss the ends of limbs.
@@ -211,10 +209,9 @@ def _refined(
     fine: tuple[Triangles, Triangles],
     start: Similarity,
     settings: AlignmentSettings,
-    report: Callable[[float, str], None],
 ) -> Similarity:
     if settings.refines:
-        report(0.85, "alignment")
+        report_fraction(0.85, "aligning the template")
         start = slide(fine[0], fine[1], start, _SLIDES, settings.scale != "none")
     if settings.scale == "axes":
         return fit_axes(fine[0], fine[1], start, _AXES_ROUNDS, settings.refines)

@@ -33,12 +33,12 @@ from viewer.autorig.weights.result import (
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.skin import Skin, limit_influences, skin_rows
 
-Report = Callable[[float, str], None]
 _Solve = Callable[[Floats], Floats]
 
 # Weight below which 0 is used: solutions decay without reaching 0, and each iteration of smoothing
@@ -88,12 +88,10 @@ def transferred_weights(
     positions: Floats,
     triangles: Ints,
     settings: WeightSettings,
-    report: Report,
 ) -> WeightTransfer:
     """Transfer weights by closest points, and inpaint vertices that do not meet the template.
 
     ``positions``: (V, 3), the target's vertices. ``triangles``: (T, 3), triangles of the target.
-    ``report``: called with a fraction from 0 to 1 and the current step; may raise to cancel.
     Returns weights whose rows sum to 1. No weight of the template is dropped, only inpainted
     weights below 1e-6, and those of corners with a barycentric coordinate below 1e-6. Raises
     ``RigError`` if no vertex of the target meets the template, the target is a point, weights of
@@ -105,24 +103,24 @@ def transferred_weights(
         raise RigError(
             f"target: expected a mesh with a size, found {len(positions)} coincident vertices"
         )
-    report(0.0, "welding seams")
+    report_fraction(0.0, "welding seams")
     target = weld(positions, triangles)
-    report(0.1, "finding closest points")
+    report_fraction(0.1, "finding closest points")
     found = match(template, target, size, settings.match)
     if not found.matched.any():
         raise RigError(nothing_matched(found.points.distances, size))
-    report(0.4, "weighing")
+    report_fraction(0.4, "transferring weights")
     rows = interpolate(_without_residue(found.points), template.triangles, source)
     has_match = np.bincount(target.islands, found.matched, target.n_islands) > 0
     rows, rigid = _with_rigid(template, source, target, rows, np.nonzero(~has_match)[0])
     inpainted = ~found.matched & has_match[target.islands]
-    rows, method = _inpainted(target, size, rows, found.matched, inpainted, report)
+    rows, method = _inpainted(target, size, rows, found.matched, inpainted)
     if settings.smoothing_rounds and inpainted.any():
-        report(0.95, "smoothing")
+        report_fraction(0.95, "smoothing")
         reach = settings.match.max_distance * size
         active = within(target.positions, target.triangles, inpainted, reach)
         rows = smooth(rows, target.triangles, active, settings.smoothing_rounds)
-    report(1.0, "weights found")
+    report_fraction(1.0, "weights found")
     lines = (
         *template_lines(weights),
         *match_lines(found, inpainted, method),
@@ -196,18 +194,16 @@ def _with_rigid(
 
 
 def _inpainted(
-    target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools, report: Report
+    target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools
 ) -> tuple[Any, str]:
     """Solve for the unknown rows on the mesh scaled to size 1, as the operator is dimensionless."""
     if not unknown.any():
         return rows, "direct"
-    report(0.5, "measuring the surface")
+    report_fraction(0.5, "measuring the surface")
     operator, areas = laplacian(replace(target, positions=target.positions / size))
 
-    def part(fraction: float, what: str) -> None:
-        report(0.55 + 0.4 * fraction, what)
-
-    values, method = inpaint(operator, areas, rows, matched, unknown, part)
+    with part_of_work(span=(0.55, 0.95)):
+        values, method = inpaint(operator, areas, rows, matched, unknown)
     return put_rows(rows, np.nonzero(unknown)[0], values), method
 
 
@@ -244,7 +240,7 @@ def _in_vertices(
 
 
 def inpaint(
-    laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools, report: Report
+    laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools
 ) -> tuple[Any, str]:
     """Solve for the weights of unmatched vertices.
 
@@ -264,7 +260,7 @@ def inpaint(
     rows = laplacian[wanted]
     energy = sparse.csr_array(rows + rows @ sparse.diags_array(1.0 / areas) @ laplacian)
     border, harmonic_border = energy[:, given], rows[:, given]
-    report(0.0, "factorising")
+    report_fraction(0.0, "factorising")
     for method, matrix, known in (
         ("direct", energy[:, wanted], border),
         ("shifted", _shifted(energy[:, wanted]), border),
@@ -274,13 +270,13 @@ def inpaint(
     ):
         solve = _iterative(matrix) if "conjugate" in method else _factorised(matrix)
         if solve is not None and _is_true(solve, known):
-            return _solved(solve, known, weights[given], report), method
+            return _solved(solve, known, weights[given]), method
     raise RigError(
         "the weights of unmatched vertices could not be computed: the mesh is too irregular"
     )
 
 
-def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
+def _solved(solve: _Solve, border: Any, weights: Any) -> Any:
     """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
     from scipy import sparse
 
@@ -290,7 +286,7 @@ def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
     step = max(1, _BLOCK // right.shape[0])
     parts = []
     for start in range(0, len(joints), step):
-        report(start / len(joints), "inpainting weights")
+        report_fraction(start / len(joints), "inpainting weights")
         values = solve(right[:, joints[start : start + step]].toarray())
         values[values < _NEGLIGIBLE] = 0.0
         parts.append(sparse.csc_array(values))

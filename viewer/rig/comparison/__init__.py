@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.comparison.pairs import (
     Pairs,
@@ -43,7 +44,6 @@ def compare(
     skinning: Skinning | None = None,
     n_poses: int = 8,
     frames: FrameRange | None = None,
-    report: Callable[[int, int], None] | None = None,
 ) -> Difference:
     """Compare two actors, regardless of their placements in a scene.
 
@@ -60,7 +60,7 @@ def compare(
     missing.
     """
     steps = steps_of(first, second, n_poses, frames)
-    return _Comparison(first, second, skinning or Skinning(), steps).run(report)
+    return _Comparison(first, second, skinning or Skinning(), steps).run()
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +212,7 @@ class _Comparison:
         self.tallies.append(_Tally(name, kind, count, items))
         return self.tallies[-1]
 
-    def run(self, report: Callable[[int, int], None] | None) -> Difference:
+    def run(self) -> Difference:
         """Compare the actors in all steps."""
         count, size = self.steps.count, 0.0
         n_searches = min(count, _MOST_SEARCHES)
@@ -223,8 +223,7 @@ class _Comparison:
         absent = 0
         for number in range(count):
             step = self.steps.pose(number, self.first, self.second)
-            if report is not None:
-                report(number, count)
+            report(number, count)
             if self.first.is_present != self.second.is_present:
                 absent += 1
             if not (self.first.is_present and self.second.is_present):
