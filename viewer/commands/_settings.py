@@ -5,7 +5,8 @@ is the option's type, its default is the option's default. Flags are fields that
 True: then the option is ``--no-NAME``. Lists are options that may be repeated. Metadata changes
 that: ``flag`` is another option string; ``given`` the option's own default, if it is not the
 field's (None: the field's default applies unless the option is given); ``read`` the function from
-the option's value to the field's; ``limits`` the lowest and highest value. ``type``, ``choices``,
+the option's value to the field's; ``limits`` the lowest and highest value; ``usual`` the text for
+``{usual}`` in the help, if the default depends on the command. ``type``, ``choices``,
 ``metavar``, ``nargs``, ``const`` and ``action`` are those of ``argparse``.
 """
 
@@ -32,7 +33,7 @@ def number(text: str) -> float:
 
 _TYPES: dict[str, Callable[[str], object]] = {"float": number, "int": int}
 """Parsers of options, by the first word of their field's annotation."""
-_OWN = ("flag", "given", "help", "limits", "read")
+_OWN = ("flag", "given", "help", "limits", "read", "usual")
 """Metadata that is not passed on to ``argparse``."""
 
 
@@ -52,7 +53,7 @@ def add_settings(
         facts = {**each.metadata, **changes}
         default = each.default_factory() if callable(each.default_factory) else each.default
         shown = f"{default:g}" if _is_number(default) else str(default)
-        text = facts["help"].replace("{default}", shown)
+        text = facts["help"].replace("{default}", shown).replace("{usual}", facts.get("usual", ""))
         how = {key: value for key, value in facts.items() if key not in _OWN}
         if isinstance(default, bool) and "choices" not in how and "action" not in how:
             group.add_argument(_flag(each), action="store_true", help=text, **how)

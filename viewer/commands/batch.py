@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from viewer.commands._batch.display import Display, summary_lines
 from viewer.commands._batch.jobs import JOBS, job_parser
-from viewer.commands._batch.options import add_batch_arguments
-from viewer.commands._batch.planning import plan_of
+from viewer.commands._batch.planning import add_batch_arguments, plan_of
 from viewer.commands._batch.requests import request_of
 from viewer.commands._batch.results import add_result_arguments, save_results
 from viewer.commands._scene import print_warnings

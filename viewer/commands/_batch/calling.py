@@ -16,8 +16,7 @@ from viewer.batching.execution import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
 from viewer.commands._batch.jobs import JOBS, job_parser
-from viewer.commands._batch.options import RETRIES
-from viewer.commands._batch.planning import Plan, Request, plan_of
+from viewer.commands._batch.planning import RETRIES, Plan, Request, plan_of
 from viewer.commands._batch.requests import request_of
 from viewer.commands._batch.results import check_results, name_in_shard, save_results
 from viewer.commands._usage import Parser

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
 import os
 import stat
@@ -24,50 +25,143 @@ from viewer.batching.naming import (
 )
 from viewer.batching.overview import overview_files
 from viewer.batching.running import Settings, shard_of
-from viewer.commands._batch.options import RETRIES, TIMEOUT
-from viewer.data_classes import dataclass
+from viewer.commands._scene import parse_bytes
+from viewer.commands._settings import add_settings
+from viewer.data_classes import dataclass, setting
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import counted, listed, printable
 
+RETRIES = 2
+TIMEOUT = 600.0  # default time limit of an attempt, seconds
 _SMALL = 50e6  # total bytes of inputs above which workers run even a few inputs
 _LISTED = 10  # maximum number of names in a message
 
 
+def whole(text: str) -> int:
+    """Return a number of processes or attempts; argparse prefixes the error with the option."""
+    if not (text.isdecimal() and int(text) <= 10_000):
+        raise argparse.ArgumentTypeError(f"expected a number from 0 to 10000, found {text}")
+    return int(text)
+
+
 @dataclass(frozen=True)
 class Request:
-    """The user's request; see the options of the same names.
-
-    ``identity``: job, options and version, which are part of the items' keys.
-    ``shared``: files that all items read.
-    ``few``: maximum number of items for which no worker process is started.
-    ``usual_timeout``: the time limit if ``timeout`` is None.
-    ``memory``: bytes that a worker may use; None for no limit.
-    ``notes``: messages about the paths.
-    ``joint_map``: template for the joint map of each item.
-    """
+    """The user's request."""
 
     paths: Sequence[str]
-    lists: Sequence[str] = ()
+    lists: Sequence[str] = setting(
+        [],
+        "file with one path per line, or - for standard input",
+        flag="--from-list",
+        metavar="FILE|-",
+    )
     output: str = ""
-    to: str = ""
+    to: str = setting(
+        "",
+        "format of the outputs if OUT is a folder, such as bvh; folder for outputs that are "
+        "folders{usual}",
+        metavar="SUFFIX",
+    )
     keeps_folders: bool = False
     identity: str = ""
+    """Job, options and version, which are part of the items' keys."""
     shared: Sequence[str] = ()
+    """Files that all items read."""
     few: int = 16
-    workers: int | None = None
-    cluster: str = ""
-    shard: str = ""
-    resume: bool = False
-    force: bool = False
-    retries: int = RETRIES
-    timeout: float | None = None
+    """Maximum number of items for which no worker process is started."""
+    workers: int | None = setting(
+        None,
+        "worker processes; 0: run in this process (default: 0 for few inputs, otherwise one per "
+        "core; with --cluster slurm, the workers of one job)",
+        type=whole,
+        metavar="N",
+    )
+    cluster: str = setting(
+        "",
+        "run on Dask workers: local, an address such as tcp://host:8786, or "
+        "slurm[:partition=gpu,time=2:00:00]",
+        metavar="CLUSTER",
+    )
+    retries: int = setting(
+        RETRIES,
+        "run an input again if its worker crashed, hung or ran out of memory, at most N times "
+        "(default: {default})",
+        type=whole,
+        metavar="N",
+    )
+    timeout: float | None = setting(
+        None,
+        "terminate workers that take longer for one input; 0: never (default: {usual}; no limit "
+        "with --workers 0)",
+        metavar="SECONDS",
+    )
     usual_timeout: float | None = TIMEOUT
-    memory: int | None = None
-    report: str = ""
+    """The time limit if ``timeout`` is None."""
+    memory: int | None = setting(
+        None,
+        "memory that a worker may use, such as 4G; suffixes k, M, G (default: no limit)",
+        flag="--limit-memory",
+        type=str,
+        read=lambda text: parse_bytes(text, "--limit-memory") if text else None,
+        metavar="SIZE",
+    )
+    """In bytes."""
+    report: str = setting(
+        "",
+        "write one line of JSON per input (default: report.jsonl in OUT, if that is a folder)",
+        metavar="FILE",
+    )
+    resume: bool = setting(
+        False,
+        "skip inputs that the report lists as done with the same content, options and version, and "
+        "run all others again, replacing their outputs",
+    )
+    shard: str = setting(
+        "",
+        "run only every N-th input, starting with input I (0 to N - 1), for job arrays: "
+        "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT with --array=0-7",
+        metavar="I/N",
+    )
+    force: bool = False
     notes: Sequence[str] = ()
+    """Messages about the paths."""
     table: str = ""
     overview: str = ""
     joint_map: str = ""
+    """Template for the joint map of each item."""
+
+
+def add_batch_arguments(
+    parser: argparse.ArgumentParser,
+    suffix: str = "",
+    writes: str = "always",
+    has_fixed: bool = False,
+    timeout: float | None = TIMEOUT,
+) -> None:
+    """Add the options that all jobs share.
+
+    ``parser``: parser of a job.
+    ``suffix``: default of ``--to``.
+    ``writes``: whether the job writes files: ``always``, ``maybe`` or ``never``.
+    ``has_fixed``: whether the job itself has an option for files shared by all items.
+    ``timeout``: default of ``--timeout``.
+    """
+    group = parser.add_argument_group("batch")
+    if writes != "never":
+        add_settings(group, Request, "to", usual=f" (default: {suffix})" if suffix else "")
+    if not has_fixed:
+        group.add_argument(
+            "--with",
+            dest="fixed",
+            action="append",
+            default=[],
+            metavar="FILE",
+            help="also open this file with every input, such as the .skel of .anim files",
+        )
+    add_settings(group, Request, "lists", "workers", "cluster", "retries")
+    usual = "0" if timeout is None else f"{timeout:g}; 0 for render"
+    add_settings(group, Request, "timeout", usual=usual)
+    add_settings(group, Request, "memory", "report", "resume", "shard")
 
 
 @dataclass(frozen=True)

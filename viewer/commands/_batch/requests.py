@@ -31,7 +31,7 @@ from viewer.commands._batch.jobs import JOBS, CommandJob, add_job_arguments
 from viewer.commands._batch.planning import Request
 from viewer.commands._batch.results import check_results, name_in_shard
 from viewer.commands._input_files import input_files
-from viewer.commands._scene import parse_bytes
+from viewer.commands._settings import settings_of
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
@@ -64,32 +64,25 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         remark = use_model_folder(command.model_path)
         if not remark:  # remembered: items need not name it again
             command.model_path = None
-    fixed = _fixed(arguments)
+    fixed = _fixed(getattr(arguments, "fixed", []))
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
-    paths, notes = _inputs(arguments)
-    notes += [remark] if remark else []
-    request = Request(
+    paths, notes = _inputs(name, arguments.files)
+    request = settings_of(
+        Request,
+        arguments,
         paths=paths,
-        lists=arguments.from_list,
         output=output,
-        to=_suffix(arguments, kind.suffix),
+        # A template includes the suffix.
+        to=getattr(arguments, "to", None) or ("" if "{" in output else kind.suffix),
         keeps_folders=kind.is_folder_input,
         identity=_identity(name, command, getattr(arguments, "expect", [])),
         shared=tuple(dict.fromkeys([*fixed, *_files_in(command)])),
         few=kind.few,
-        workers=arguments.workers,
-        cluster=arguments.cluster,
-        shard=arguments.shard,
-        resume=arguments.resume,
         force=arguments.force,
-        retries=arguments.retries,
-        timeout=arguments.timeout,
         usual_timeout=kind.timeout,
-        memory=_memory(arguments),
-        report=arguments.report or "",
-        notes=notes,
+        notes=[*notes, remark] if remark else notes,
         table=name_in_shard(arguments.table, arguments.shard),
         overview=name_in_shard(arguments.overview, arguments.shard),
         joint_map=getattr(arguments, "save_joint_map", None) or "",
@@ -102,9 +95,8 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     return request, job
 
 
-def _fixed(arguments: argparse.Namespace) -> list[str]:
+def _fixed(names: Sequence[str]) -> list[str]:
     """Return the files that are opened with every item; raise if one is missing."""
-    names = getattr(arguments, "fixed", [])
     fixed = [str(path) for name in names for path in named_files(name)]
     for file in fixed:
         if not os.path.exists(file):
@@ -112,26 +104,14 @@ def _fixed(arguments: argparse.Namespace) -> list[str]:
     return fixed
 
 
-def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
+def _inputs(job: str, files: list[str]) -> tuple[list[str], list[str]]:
     """Return the paths of the batch, and messages about omitted paths."""
-    if arguments.job != "diff" or not all(map(os.path.lexists, arguments.files)):
-        return arguments.files, []
-    found = find_submissions(arguments.files)
+    if job != "diff" or not all(map(os.path.lexists, files)):
+        return files, []
+    found = find_submissions(files)
     names = listed([printable(path.name, 60) for path in found.ignored])
     note = f"ignored because they are neither folders nor archives: {names}"
     return [*map(str, found.submissions)], [note] if found.ignored else []
-
-
-def _memory(arguments: argparse.Namespace) -> int | None:
-    """Return the bytes that a worker may use; None for no limit."""
-    given = arguments.limit_memory
-    return parse_bytes(given, "--limit-memory") if given else None
-
-
-def _suffix(arguments: argparse.Namespace, default: str) -> str:
-    """Return the suffix of outputs in a folder, or "" if a template includes it."""
-    given: str = getattr(arguments, "to", "")
-    return given or ("" if "{" in (getattr(arguments, "output", None) or "") else default)
 
 
 def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
