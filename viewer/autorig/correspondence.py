@@ -39,7 +39,8 @@ _CANCELLED = 1e-3
 _CLOSED = 0.25
 _MOST_REVERSED = 0.5  # fraction of the target's area above which an island is reversed
 
-_MAX_ANGLE = 30.0  # usual limit of the angle between matching normals, degrees
+MAX_ANGLE = 30.0
+"""Usual limit of the angle between matching normals, degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +55,9 @@ class MatchSettings:
     )
     """Fraction of the target's box diagonal."""
     max_angle: float = setting(
-        math.radians(_MAX_ANGLE),
-        f"maximum angle between the normals of matching points (default: {_MAX_ANGLE:g})",
-        given=_MAX_ANGLE,
+        math.radians(MAX_ANGLE),
+        f"maximum angle between the normals of matching points (default: {MAX_ANGLE:g})",
+        given=MAX_ANGLE,
         limits=(0.0, 180.0),
         read=math.radians,
         metavar="DEG",
@@ -64,9 +65,9 @@ class MatchSettings:
     """Radians between the normals of both surfaces."""
     near_distance: float = 0.005
     near_angle: float = math.radians(60.0)
-    """Within this fraction of the diagonal, this angle suffices: normals of sharp and thin parts of
-    a coarse mesh are unreliable. Sheets thinner than this are matched on the side whose normal
-    agrees."""
+    """Within this fraction of the diagonal, this angle suffices, or ``max_angle`` if it is larger:
+    normals of sharp and thin parts of a coarse mesh are unreliable. Sheets thinner than this are
+    matched on the side whose normal agrees."""
     flipped_normals: bool = False
     """Also accept opposite normals. An island that is entirely inside out is reversed in any
     case."""
@@ -76,6 +77,8 @@ class MatchSettings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise RigError(f"{name}: expected a number of at least 0, found {value}")
+        # The stricter limit for all points must not exclude what the wider one admits.
+        object.__setattr__(self, "near_angle", max(self.near_angle, self.max_angle))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -269,13 +269,11 @@ def _settings(
         landmarks = read_landmarks(source, template.figure, template.require_pose())
     if arguments.smooth < 0:
         raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
-    match = settings_of(MatchSettings, arguments)
-    match = replace(match, near_angle=max(match.max_angle, match.near_angle))
     settings = settings_of(
         TransferSettings,
         arguments,
         alignment=settings_of(AlignmentSettings, arguments, landmarks=landmarks),
-        weights=settings_of(WeightSettings, arguments, match=match),
+        weights=settings_of(WeightSettings, arguments, match=settings_of(MatchSettings, arguments)),
     )
     as_rig = output is not None and output.suffix.lower() != ".npz"
     return replace(settings, correctives=False) if as_rig else settings

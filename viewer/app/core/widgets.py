@@ -6,7 +6,8 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import field
+from dataclasses import field, fields
+from typing import Any
 
 from imgui_bundle import imgui
 
@@ -141,6 +142,14 @@ def slider(
     note_item(state, label)
     # "nan" and "1e99" can be typed into a slider.
     return moved if changed and math.isfinite(moved) else value
+
+
+def setting_slider(state: AppState, label: str, settings: Any, name: str) -> None:
+    """Draw a slider for a setting between the limits that its field states."""
+    low, high = next(each for each in fields(settings) if each.name == name).metadata["limits"]
+    clamp = imgui.SliderFlags_.always_clamp
+    moved = slider(state, label, getattr(settings, name), low, high, flags=clamp)
+    setattr(settings, name, moved)
 
 
 def count_slider(

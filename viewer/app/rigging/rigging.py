@@ -12,7 +12,9 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
+from viewer.autorig.correspondence import MAX_ANGLE
 from viewer.autorig.rigged import Rigged
+from viewer.autorig.settings import TransferSettings
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
@@ -42,6 +44,7 @@ GHOSTS = {"": "hidden", "translucent": "translucent", "wireframe": "wireframe", 
 """Styles in which the template is drawn, with their labels."""
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
+_USUAL = TransferSettings()
 _posed: Memo[Skin, Mesh] = Memo()
 
 
@@ -134,25 +137,18 @@ class RigChoices:
     up: str = ""
     facing: str = ""
     """Up and forward axes of the target; empty to search for them."""
-    scale: str = "uniform"
-    """One of ``SCALES``."""
-    refines: bool = True
-    """Whether an alignment is refined by closest points."""
-    fits: bool = True
-    """Whether the template's joints are rotated and its limbs resized if necessary."""
-    method: str = "robust"
-    joints: str = "surface"
-    """As in ``TransferSettings``."""
-    max_distance: float = 0.05
-    """Maximum distance of a match, relative to the target's size."""
-    max_angle: float = 30.0
-    """Maximum angle between the normals of a match, degrees."""
-    smoothing: int = 0
-    """Number of smoothing iterations."""
+    scale: str = _USUAL.alignment.scale
+    refines: bool = _USUAL.alignment.refines
+    fits: bool = _USUAL.fits
+    method: str = _USUAL.method
+    joints: str = _USUAL.joints
+    max_distance: float = _USUAL.weights.match.max_distance
+    max_angle: float = MAX_ANGLE
+    """In degrees; the others are those of ``TransferSettings``."""
+    smoothing: int = _USUAL.weights.smoothing_rounds
     max_influences: int = 0
     """Maximum number of influences per vertex; 0 for all."""
-    correctives: bool = True
-    """Whether pose correctives are transferred."""
+    correctives: bool = _USUAL.correctives
 
 
 @dataclass(slots=True)

@@ -368,10 +368,7 @@ def _match_fields(
 
 def _match_settings(choices: RigChoices) -> MatchSettings:
     """Return the conditions for a match that are set in the panel."""
-    angle, usual = math.radians(choices.max_angle), MatchSettings()
-    return MatchSettings(
-        max_distance=choices.max_distance, max_angle=angle, near_angle=max(angle, usual.near_angle)
-    )
+    return MatchSettings(choices.max_distance, math.radians(choices.max_angle))
 
 
 def _transfer_settings(

@@ -7,7 +7,16 @@ from imgui_bundle import imgui
 
 from viewer.app.core.camera_moves import fit_again, fit_points, fit_shown, look_through_view
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider, with_key
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    choice,
+    explain,
+    note_item,
+    setting_slider,
+    slider,
+    with_key,
+)
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
 from viewer.errors import ViewerError
@@ -88,9 +97,7 @@ def _draw_views(state: AppState) -> None:
     options.cameras = checkbox(state, "Show cameras", options.cameras)
     explain("frusta of the calibrated cameras, with their images")
     if fixed is not None and state.scene.images is not None:
-        options.image_brightness = slider(
-            state, "Image brightness", options.image_brightness, 0.0, 1.0, "%.2f", _CLAMP
-        )
+        setting_slider(state, "Image brightness", options, "image_brightness")
 
 
 def _digits(size: float) -> str:

@@ -16,6 +16,7 @@ from viewer.app.core.widgets import (
     menu_item,
     note_item,
     same_line_if_room,
+    setting_slider,
     slider,
     with_key,
 )
@@ -101,7 +102,7 @@ def draw(state: AppState) -> None:
             explain("", missing[key])
         if key == "skeleton":
             _draw_bones(state, missing[key])
-    options.opacity = slider(state, "Opacity", options.opacity, 0.0, 1.0, flags=_CLAMP)
+    setting_slider(state, "Opacity", options, "opacity")
     explain("opacity of all figures")
     if options.show == "both":
         _draw_opacity(state)
@@ -138,8 +139,7 @@ def _draw_surface(state: AppState) -> None:
         options.matcap = choice(state, "Matcap", options.matcap, MATCAPS)
     if options.shading == "pbr":
         for name in ("metallic", "roughness"):
-            value = slider(state, name.capitalize(), getattr(options, name), 0.0, 1.0, flags=_CLAMP)
-            setattr(options, name, value)
+            setting_slider(state, name.capitalize(), options, name)
             explain("value for materials that do not specify one")
 
 
