@@ -292,14 +292,18 @@ class Source:
         """Whether the lines of its elements are known."""
         return bool(self._offsets)
 
+    def knows(self, kind: str) -> bool:
+        """Return whether the lines of elements of a kind are known."""
+        return kind in self._offsets
+
     def place(self, kind: str, index: int) -> tuple[Path, int] | None:
         """Return the file and line of an element; None if its kind is not registered.
 
         If a file has no normals, they are computed: only the vertices can be corrected.
         """
-        if kind == "normals" and kind not in self._offsets:
+        if kind == "normals" and not self.knows(kind):
             kind = "positions"
-        if kind not in self._offsets:
+        if not self.knows(kind):
             return None
         source, offset_of = self._offsets[kind]
         return source.path, source.line(offset_of(index))

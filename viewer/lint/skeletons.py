@@ -9,11 +9,11 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
+from viewer.rig.inspection.faults import UNIT_ROTATION
 from viewer.rig.pose import Pose
 from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels, shown_joints
 
-_UNIT = 1e-3  # deviation of a quaternion's length from 1, for files with three digits
 _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
 
 
@@ -81,7 +81,7 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     findings = []
     known = subject.valid("joints", skeleton.n_joints)
     lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
-    odd = np.flatnonzero((np.abs(lengths - 1.0) > _UNIT) & known)
+    odd = np.flatnonzero((np.abs(lengths - 1.0) > UNIT_ROTATION) & known)
     if len(odd):
         findings.append(
             subject.found(

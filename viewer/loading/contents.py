@@ -33,13 +33,13 @@ Place = tuple[Path, int | None, str]
 """File, line and JSON pointer of an element; None or empty if unknown."""
 _PEEK = 16  # number of bytes that identify an image
 _LISTS = {
+    "Figure": "figures",
     "Clip": "clips",
     "PoseRecord": "poses",
     "BodyMotion": "body_motions",
     "SkeletonMotion": "skeleton_motions",
     "Capture": "captures",
     "MorphTarget": "morphs",
-    "Figure": "figures",
 }
 """Fields by class name: only readers that create a class import its module."""
 
@@ -73,13 +73,13 @@ class Contents:
 
     def items(self) -> Iterator[tuple[Path, object]]:
         """Yield everything that can be assembled, with its file."""
-        for name in (*_LISTS.values(), "pictures"):
+        for name in ("pictures", *_LISTS.values()):
             yield from getattr(self, name)
 
     def without(self, path: Path) -> Contents:
         """Return the contents of all other files."""
         others = replace(self)
-        for name in (*_LISTS.values(), "pictures"):
+        for name in ("pictures", *_LISTS.values()):
             setattr(others, name, [item for item in getattr(self, name) if item[0] != path])
         return others
 

@@ -181,21 +181,21 @@ def filled_normals(
 ) -> Floats:
     """Return a normal for every vertex, from the file or computed.
 
-    ``normals``: (V, 3) or None, normals of the file; NaN if there is none. ``positions``,
+    ``normals``: (V, 3) or None, normals of the file; with NaN if there is none. ``positions``,
     ``triangles``: (V, 3), (T, 3), the mesh.
     """
     if normals is None:
         return vertex_normals(positions, triangles)
-    absent = np.isnan(normals[:, 0])
     # Columns are reduced one by one, because numpy is slow at reducing rows of three.
     x, y, z = (np.abs(column) for column in normals.T)
-    zero = np.maximum(np.maximum(x, y), z) < _SHORTEST
+    longest = np.maximum(np.maximum(x, y), z)
+    zero = longest < _SHORTEST
     if zero.any():
         places = np.flatnonzero(zero)
-        source.warn(
-            "M007.computed", part="positions", places=places, n=len(places), vertex=int(places[0])
-        )
-    missing = absent | zero
+        first = int(places[0])
+        offset = source.offset_of("normals", first) if source.knows("normals") else None
+        source.warn("M007.computed", offset, 1, "positions", places, n=len(places), vertex=first)
+    missing = zero | np.isnan(longest)
     if not missing.any():
         return normals
     return np.where(missing[:, None], vertex_normals(positions, triangles), normals)

@@ -18,9 +18,9 @@ from viewer.formats._vrm.parts import listed, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.inspection.faults import UNIT_ROTATION
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
-_UNIT = 1e-3  # tolerance of the deviation of a quaternion's length from 1
 _NORMAL_ROUNDING = 5e-4  # tolerance of lengths and of the sign of tangents
 _SHEAR = 1e-4  # tolerance of the cosines of the angles between the axes of a matrix
 _LARGEST = 3.4028235e38  # largest number in single precision
@@ -227,7 +227,7 @@ def _check_rotations(document: Document, sampler: Element) -> None:
     one = _ONES.get(document.accessors[accessor].whole("componentType"), 1.0)
     lengths = np.linalg.norm(keys, axis=1) / one
     # Integers are rounded: 1 / 127 for each component of a byte.
-    odd = np.abs(lengths - 1.0) > (_UNIT if one == 1.0 else 0.02)
+    odd = np.abs(lengths - 1.0) > (UNIT_ROTATION if one == 1.0 else 0.02)
     if odd.any():
         key = int(odd.argmax())
         found = {"index": key, "found": float(lengths[key])}

@@ -32,8 +32,8 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
 )
 from viewer.rig.hierarchy import cycle_members
+from viewer.rig.inspection.faults import UNIT_ROTATION
 
-_UNIT = 1e-3  # maximum deviation of a quaternion's length from 1 that is not reported
 _TINY = 1e-12  # minimum length of a quaternion with a direction
 
 # Relative error of T R S compared with the matrix: the rounding of a few products in float32.
@@ -164,7 +164,7 @@ def _transforms(table: Table) -> _Transforms:
 def _unit(table: Table, places: Ints, rotations: Floats) -> Floats:
     """Return quaternions of unit length; those without a direction become the identity."""
     lengths = np.linalg.norm(rotations, axis=1)
-    odd = np.abs(lengths - 1.0) > _UNIT
+    odd = np.abs(lengths - 1.0) > UNIT_ROTATION
     if odd.any():
         first = int(odd.argmax())
         pointer = table[int(places[first])].at("rotation")

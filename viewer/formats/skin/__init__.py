@@ -26,6 +26,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
+from viewer.formats._mesh.polygons import filled_normals
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
@@ -42,13 +43,11 @@ from viewer.formats.skin.tables import KEYWORDS
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
 from viewer.phrases import printable
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh, vertex_normals, without_seams
+from viewer.rig.mesh import Mesh, without_seams
 from viewer.rig.skin import Skin, skin_rows
-
-_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
 
 
 def read(source: Source) -> Figure:
@@ -101,29 +100,9 @@ def _require_positions(source: Source, sections: Sections) -> None:
 
 def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
     normals = sections.tables.get("normals")
-    if normals is None:
-        if "normals" not in sections.offsets:
-            source.warn("F007.skin-normals")
-        return vertex_normals(positions, triangles)
-    # Columns are reduced one by one, because numpy is slow at reducing rows of three.
-    x, y, z = np.abs(normals.T)
-    longest = np.maximum(np.maximum(x, y), z)
-    zero: Bools = longest < _SHORTEST
-    if zero.any():
-        first = int(zero.argmax())
-        source.warn(
-            "M007.computed",
-            source.offset_of("normals", first),
-            1,
-            "positions",
-            [first],
-            n=int(zero.sum()),
-            vertex=first,
-        )
-    missing: Bools = zero | np.isnan(longest)
-    if missing.any():
-        normals = np.where(missing[:, None], vertex_normals(positions, triangles), normals)
-    return normals
+    if normals is None and "normals" not in sections.offsets:
+        source.warn("F007.skin-normals")
+    return filled_normals(source, normals, positions, triangles)
 
 
 def _skin(source: Source, sections: Sections) -> Skin | None:

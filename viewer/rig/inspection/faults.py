@@ -26,6 +26,8 @@ _WRONG = 5e-3  # four influences with three digits, each with an error of half a
 _SINGULAR = 1e-12
 _NEARLY = 1e6  # minimum condition number of an ill-conditioned matrix
 _AFFINE = 1e-6  # maximum absolute error of the last row
+UNIT_ROTATION = 1e-3
+"""Maximum deviation of the length of a unit quaternion from 1: files round to three digits."""
 # Multiple of the median distance of vertices from their median: feet are at 16 times that distance
 # in models with half of their vertices in the face.
 _FAR = 40.0
