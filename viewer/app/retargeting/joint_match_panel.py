@@ -34,9 +34,8 @@ from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.driven_clip import full_map, matches_of
+from viewer.rig.retargeting.driven_clip import aligned_rests, front_axes, full_map, matches_of
 from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.retargeting.rest_positions import front_axes, rest_positions
 from viewer.rig.skeleton import joint_label, joint_labels, shown_joints
 
 _ORIGINS = {
@@ -441,7 +440,7 @@ def _match(drive: Drive, figure: Figure) -> _Shown:
     for joint, partner in enumerate(matches.partners.tolist()):
         if partner >= 0:
             driven.setdefault(partner, []).append(joint)
-    source, target = rest_positions(drive, figure)
+    source, target = aligned_rests(drive, figure)
     mine = target @ front_axes(target, matches, figure.up, is_source=False).T
     theirs = source @ front_axes(source, matches, figure.up, is_source=True).T
     sides = _side(figure, mine), _side(drive.motion.figure, theirs)

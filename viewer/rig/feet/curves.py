@@ -20,10 +20,10 @@ from viewer.rig.arrays import Floats
 
 
 def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
-    """Return the curves that minimise the sum above, independently of each other: (S, N, C).
+    """Return the curves that minimise the sum above, independently of each other: (..., N, C).
 
-    ``targets``: (S, N, C), targets t of S curves with C components. ``weights``: (S, N), weights w,
-    greater than 0. ``span``: length s in rows.
+    ``targets``: (..., N, C), targets t of curves with C components. ``weights``: (..., N), weights
+    w, greater than 0. ``span``: length s in rows.
     """
     from scipy.linalg import solveh_banded  # loads for 0.3 s, and only planted feet need it
 
@@ -31,7 +31,7 @@ def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
     # second differences D, whose rows are 1 -2 1. D^T D reaches two rows to either side, so the
     # matrix is symmetric with the diagonal and two bands above it. It is positive definite, because
     # W is: a banded Cholesky factorisation solves it in N steps.
-    count = targets.shape[1]
+    count = targets.shape[-2]
     bands = np.zeros((3, count))  # scipy's upper form: element (i, j) is in row 2 + i - j, column j
     inner = max(count - 2, 0)  # number of second differences
     for offset, factor in enumerate((1.0, -2.0, 1.0)):
@@ -40,10 +40,11 @@ def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
         bands[1, offset : offset + inner] -= 2.0 * span**4
     bands[0, 2:] = span**4
     result = np.empty_like(targets)
-    for curve, weight, target in zip(result, weights, targets, strict=True):
+    for curve in np.ndindex(targets.shape[:-2]):
         matrix = bands.copy()
-        matrix[2] += weight
-        curve[:] = solveh_banded(matrix[-min(3, count) :], weight[:, None] * target)
+        matrix[2] += weights[curve]
+        right = weights[curve][:, None] * targets[curve]
+        result[curve] = solveh_banded(matrix[-min(3, count) :], right)
     return result
 
 

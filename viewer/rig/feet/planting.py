@@ -390,13 +390,12 @@ def _steadied(plan: FootPlan, rotations: Floats, holds: Floats) -> Floats:
     # components and normalising is smoothing the rotation (error of third order in the angle).
     rotations = rotations.copy()
     align_signs(rotations.swapaxes(0, 1))
-    smooth, ones = np.empty_like(rotations), np.ones(holds.shape)
-    for part in (0, 1):
-        smooth[part] = _curves(plan, rotations[part], ones[part], _NOISE)
+    ones = np.ones_like(holds).swapaxes(1, 2)
+    smooth = _smoothed(plan, rotations.swapaxes(1, 2), ones, _NOISE).swapaxes(1, 2)
     # A blend by the holds themselves would jump where a contact begins; their smooth curve rises
     # over _LEVELS seconds. It overshoots a little, so it is clipped to a fraction.
-    blend = np.stack([_curves(plan, h[..., None], ones[0], _LEVELS)[..., 0] for h in holds])
-    mixed = rotations + np.clip(blend, 0.0, 1.0)[..., None] * (smooth - rotations)
+    blend = _smoothed(plan, holds[..., None].swapaxes(1, 2), ones, _LEVELS).swapaxes(1, 2)
+    mixed = rotations + np.clip(blend, 0.0, 1.0) * (smooth - rotations)
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
 
 
@@ -420,18 +419,8 @@ def _faded_tilts(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
     # to a few ten-thousandths; the exponent in between lets the weight grow evenly over the orders
     # of magnitude, so that the curve tightens gradually as a foot lands.
     weights = 1.0 + holds * 10.0 ** (_FLAT * holds)
-    parts = zip(targets, weights, strict=True)
-    return np.stack([_curves(plan, target, weight, _LEVELS) for target, weight in parts])
-
-
-def _curves(plan: FootPlan, targets: Floats, weights: Floats, seconds: float) -> Floats:
-    """Return smooth curves of all feet, (N, L, C); gaps in time separate them."""
-    result = np.empty_like(targets)
-    for start, stop in plan.spans:
-        part = slice(start, stop)
-        rows = targets[part].swapaxes(0, 1), weights[part].swapaxes(0, 1)
-        result[part] = smooth_curves(*rows, seconds * plan.rate).swapaxes(0, 1)
-    return result
+    weights, targets = weights.swapaxes(1, 2), targets.swapaxes(1, 2)
+    return _smoothed(plan, targets, weights, _LEVELS).swapaxes(1, 2)
 
 
 def _rotated(clip: SampledClip, body: BodyLegs, old: Floats, new: Floats) -> SampledClip:
@@ -623,11 +612,11 @@ def _strength(holds: Floats) -> Floats:
 
 
 def _smoothed(plan: FootPlan, targets: Floats, weights: Floats, seconds: float = _EASE) -> Floats:
-    """Return smooth corrections, (S, N, C); gaps in time separate them."""
+    """Return smooth curves, (..., N, C), with weights (..., N); gaps in time separate them."""
     result = np.empty_like(targets)
     for start, stop in plan.spans:
-        part = slice(start, stop)
-        result[:, part] = smooth_curves(targets[:, part], weights[:, part], seconds * plan.rate)
+        rows = targets[..., start:stop, :], weights[..., start:stop]
+        result[..., start:stop, :] = smooth_curves(*rows, seconds * plan.rate)
     return result
 
 

@@ -11,6 +11,7 @@ the body's: see ``_parallel_axes``.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -22,7 +23,10 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rig.retargeting.rest_poses import SIDES, Postures, shortest_arc, unit
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.joint_names import joint_meanings
+from viewer.rig.retargeting.rest_poses import shortest_arc
 from viewer.rig.skeleton import Skeleton
 
 _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
@@ -34,6 +38,103 @@ _ALONG = np.cos(np.radians(30.0))  # between a forearm and the fingers of a stra
 _BENT = np.cos(np.radians(85.0))  # mean bend of a wrist beyond which its zero pose is not straight
 _SLOPE = np.radians(30.0)  # slope from the ankle down to the ball of a standing foot
 _STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sole level
+SIDES = ("left", "right")
+_NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")  # joints of limbs with names
+_MOST = 4000  # maximum number of frames; for longer motions, every n-th frame is used
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Postures:
+    """Poses of a human body whose limbs have known names."""
+
+    rows: Ints
+    """(F,). Row of each pose in the clip."""
+    rotations: Floats
+    """(F, J, 3, 3). World rotations, in the skeleton's axes."""
+    points: Floats
+    """(F, J, 3). World positions, relative to the root, in the skeleton's axes."""
+    joints: dict[str, int]
+    """Joints by their names in SMPL."""
+    up: Floats
+    """(3,). The up axis of the file; the up axis of the body if it is upside down."""
+
+    def direction(self, start: str, end: str) -> Floats:
+        """Return unit vectors from one joint to another: (F, 3)."""
+        return unit(self.points[:, self.joints[end]] - self.points[:, self.joints[start]])
+
+    def trunk(self) -> Floats:
+        """Return unit vectors from the middle of the hips to the neck: (F, 3)."""
+        hips = self.points[:, [self.joints["left_hip"], self.joints["right_hip"]]].mean(axis=1)
+        top = self.joints["neck" if "neck" in self.joints else "head"]
+        return unit(self.points[:, top] - hips)
+
+    def left(self) -> Floats:
+        """Return horizontal unit vectors to the body's left: (F, 3)."""
+        side = self.direction("right_hip", "left_hip")
+        return unit(side - (side @ self.up)[:, None] * self.up)
+
+    def forward(self) -> Floats:
+        """Return horizontal unit vectors to the front of the body: (F, 3)."""
+        return np.cross(self.left(), self.up)
+
+    def righted(self) -> Postures:
+        """Return the poses rotated as a whole, with the trunk along ``up`` and the left along x."""
+        trunk, side = self.trunk(), self.direction("right_hip", "left_hip")
+        ahead = unit(np.cross(side, trunk))
+        own = np.stack([np.cross(trunk, ahead), trunk, ahead], axis=2)
+        left = np.array([1.0, 0.0, 0.0])
+        stands = np.stack([left, self.up, np.cross(left, self.up)], axis=1)
+        turns = stands @ np.swapaxes(own, 1, 2)
+        return replace(
+            self,
+            rotations=turns[:, None] @ self.rotations,
+            points=np.einsum("fab,fjb->fja", turns, self.points),
+        )
+
+    def chosen(self, frames: Bools) -> Postures:
+        """Return the poses at the given indices."""
+        return replace(
+            self,
+            rows=self.rows[frames],
+            rotations=self.rotations[frames],
+            points=self.points[frames],
+        )
+
+
+def postures_of(motion: SkeletonMotion) -> Postures | None:
+    """Return the poses of a motion; None if its limbs or its head have no known names."""
+    skeleton = motion.figure.skeleton
+    rows = motion.clip.timing.rows
+    rows = rows[rows >= 0]
+    if skeleton is None or not len(rows):
+        return None
+    rows = rows[:: -(-len(rows) // _MOST)]
+    return _postures(skeleton, motion.figure.up, rows, motion.clip.rotations[rows])
+
+
+def rest_posture(skeleton: Skeleton, up: str) -> Postures | None:
+    """Return the rest pose of a skeleton, with all DOFs at 0, as a single pose."""
+    return _postures(skeleton, up, np.zeros(1, dtype=np.int32), skeleton.rest_rotations[None])
+
+
+def _postures(skeleton: Skeleton, up: str, rows: Ints, local: Floats) -> Postures | None:
+    joints: dict[str, int] = {}
+    for joint, name in enumerate(joint_meanings(skeleton)):
+        if name:
+            joints.setdefault(name, joint)
+    needed = {f"{side}_{part}" for side in SIDES for part in _NEEDED}
+    if not needed <= set(joints) or not {"neck", "head"} & set(joints):
+        return None
+    rotations = quaternion_to_matrix(local)
+    points = np.zeros((len(rows), skeleton.n_joints, 3))
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            above, offset = rotations[:, parent], skeleton.rest_translations[joint]
+            points[:, joint] = points[:, parent] + above @ offset
+            rotations[:, joint] = above @ rotations[:, joint]
+    found = Postures(rows, rotations, points, joints, np.eye(3)["xyz".index(up)])
+    is_over = float(np.median(found.trunk() @ found.up)) < 0.0
+    return replace(found, up=-found.up) if is_over else found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

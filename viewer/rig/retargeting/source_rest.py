@@ -18,8 +18,15 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.anatomical_rest import anatomical_rest, limb_axes, upright_frames
-from viewer.rig.retargeting.rest_poses import SIDES, Postures, postures_of, rest_posture
+from viewer.rig.retargeting.anatomical_rest import (
+    SIDES,
+    Postures,
+    anatomical_rest,
+    limb_axes,
+    postures_of,
+    rest_posture,
+    upright_frames,
+)
 from viewer.rig.skeleton import Skeleton
 
 SourceRest = int | str
