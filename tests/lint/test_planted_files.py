@@ -257,6 +257,16 @@ def test_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
     ]
 
 
+def test_files_given_as_motions_are_checked(tmp_path: Path) -> None:
+    from viewer.loading import MotionSettings
+
+    good, bad = tmp_path / "good.bvh", tmp_path / "bad.bvh"
+    good.write_text(bvh_text.GOOD)
+    bad.write_text(bvh_text.GOOD.replace("0.1 0.0 0.0", "0.1 nan 0.0"))
+    found = lint_files([good], settings=MotionSettings(motions=(bad,)))[1]
+    assert ("F003", bad, 8) in [(f.code, f.file, f.line) for f in found]
+
+
 def test_every_code_is_produced_by_a_planted_fault() -> None:
     from formats.gltf.planted_gltf import PLANTED as GLTF
     from lint.planted import FAULTS as FIGURES

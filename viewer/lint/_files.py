@@ -18,14 +18,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Collector, Diagnostic
+from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.diagnostic import merged
 from viewer.diagnostics.wording import PLACES
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding, LintOptions
 from viewer.lint._running import lint_scene
-from viewer.loading import Contents, MotionSettings, begin, read_source
+from viewer.loading import Contents, MotionSettings, begin, read_files
+from viewer.loading.contents import resolved
 from viewer.phrases import listed, printable
 from viewer.progress import report
 from viewer.rig.arrays import Ints
@@ -91,46 +92,23 @@ def open_files(
     ``paths``: as for ``viewer.loading.load``. ``max_size``: size in bytes above which files are not
     read.
     """
-    opened = Opened()
-    known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
-    queue = list(reversed(known.values()))
-    for number, path in enumerate(queue):  # the list grows during iteration: a .rig refers to files
-        report(number, len(queue), what=f"reading {printable(path, 60)}")
-        named = _read(opened, path, settings or MotionSettings(), max_size)
-        for other in named:
-            if _resolved(other) not in known:
-                known[_resolved(other)] = other
-                queue.append(other)
-    _assemble(opened, settings)
-    return opened
-
-
-def _resolved(path: Path) -> Path:
-    """Return a path that identifies a file; invalid paths are reported by reading them."""
-    try:
-        return path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a cycle of links, or NUL in the name
-        return path
-
-
-def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
-    """Read one file, recording all recoverable errors; return the files that it refers to."""
-    contents, recorded = opened.contents, Collector(keeps_errors=True)
-    named: tuple[Path, ...] = ()
-    refusals: list[Finding] = []
-    try:
-        contents.sources[path] = source = Source.open(path, max_size, recorded)
-        named = read_source(source, contents, settings)
+    distinct = {resolved(Path(path)): Path(path) for path in reversed(paths)}
+    refusals: dict[Path, ViewerError] = {}
+    contents = read_files([*reversed(distinct.values())], max_size, settings, refusals)
+    opened = Opened(contents=contents)
+    for path, source in contents.sources.items():
+        late: list[Finding] = []
         contents.figures = [
-            (own, _loaded(figure, refusals) if own == path else figure)
+            (own, _loaded(figure, late) if own == path else figure)
             for own, figure in contents.figures
         ]
-    except ViewerError as problem:
-        refusals.append(_of_refusal(problem, path))
-    opened.findings += map(of_diagnostic, merged(recorded.errors))
-    opened.findings += refusals
-    opened.findings += map(of_diagnostic, recorded.warnings)
-    return named
+        opened.findings += map(of_diagnostic, merged(source.diagnostics.errors))
+        opened.findings += late
+        if path in refusals:
+            opened.findings.append(_of_refusal(refusals[path], path))
+        opened.findings += map(of_diagnostic, source.diagnostics.warnings)
+    _assemble(opened, settings)
+    return opened
 
 
 def _of_refusal(problem: ViewerError, path: Path) -> Finding:

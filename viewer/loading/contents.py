@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError, RigError
+from viewer.diagnostics import Collector, Diagnostic
+from viewer.errors import FormatError, RigError, ViewerError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.settings import MotionSettings
+from viewer.phrases import printable
+from viewer.progress import report
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure, Origin
 from viewer.rig.material import Material, Texture
@@ -67,7 +70,7 @@ class Contents:
     files: tuple[Path, ...] = ()
     """All files that were read."""
     sources: dict[Path, Source] = field(default_factory=dict)
-    """Files in which the lines of elements are known."""
+    """Files in which the lines of elements are known; all files if errors are collected."""
     used_options: set[str] | None = None
     """Options that had an effect on the contents; None if unused options are not to be reported."""
 
@@ -121,23 +124,60 @@ class Contents:
 
 
 def read_files(
-    paths: Sequence[str | Path], max_size: int = MAX_SIZE, settings: MotionSettings | None = None
+    paths: Sequence[str | Path],
+    max_size: int = MAX_SIZE,
+    settings: MotionSettings | None = None,
+    refusals: dict[Path, ViewerError] | None = None,
 ) -> Contents:
-    """Read files without assembling them; see ``viewer.loading.load``."""
-    contents = Contents()
-    sources = [Source.open(path, max_size) for path in paths]
-    known = {source.path.resolve() for source in sources}
-    for source in sources:  # the list grows during iteration: a .rig refers to files
-        for path in read_source(source, contents, settings or MotionSettings()):
-            if path.resolve() not in known:  # a .rig may refer to another, or to itself
-                known.add(path.resolve())
-                called = contents.called.get(source.path.resolve(), source.path.stem)
-                contents.called[path.resolve()] = called
-                sources.append(Source.open(path, max_size))
-    for path in (settings or MotionSettings()).motions:
-        source = Source.open(path, max_size)
-        sources.append(source)
-        _add_motion(source, contents, settings or MotionSettings())
+    """Read files without assembling them; see ``viewer.loading.load``.
+
+    ``refusals``: if given, all files are read as far as possible. It receives the errors that
+    stopped a file; the other errors and the warnings are those of ``Contents.sources``.
+    """
+    settings = settings or MotionSettings()
+    contents, sources = Contents(), list[Source]()
+    is_strict, stopped = refusals is None, {} if refusals is None else refusals
+
+    @contextlib.contextmanager
+    def reading(path: Path) -> Iterator[None]:
+        try:
+            yield
+        except ViewerError as problem:
+            if is_strict:
+                raise
+            stopped[path] = problem
+
+    def append(path: Path) -> None:
+        sources.append(Source(path))
+        with reading(path):
+            sources[-1] = Source.open(path, max_size, Collector(keeps_errors=not is_strict))
+
+    for path in paths:
+        append(Path(path))
+    known = {resolved(source.path) for source in sources}
+    for number, source in enumerate(sources):  # the list grows: a .rig refers to files
+        if not is_strict:
+            report(number, len(sources), what=f"reading {printable(source.path, 60)}")
+        named: tuple[Path, ...] = ()
+        if source.path not in stopped:
+            with reading(source.path):
+                named = read_source(source, contents, settings)
+        for path in named:
+            if resolved(path) not in known:  # a .rig may refer to another, or to itself
+                known.add(resolved(path))
+                called = contents.called.get(resolved(source.path), source.path.stem)
+                contents.called[resolved(path)] = called
+                append(path)
+    for path in settings.motions:
+        append(path)
+        if path not in stopped:
+            with reading(path):
+                _add_motion(sources[-1], contents, settings)
+    read = (path for source in sources for path in (source.path, *source.also_read))
+    contents.files = tuple(dict.fromkeys(read))
+    if not is_strict:
+        contents.sources = {source.path: source for source in sources}
+        return contents
     contents.diagnostics = tuple(
         found for source in sources for found in source.diagnostics.warnings
     )
@@ -145,9 +185,15 @@ def read_files(
     for source in contents.sources.values():
         source.release()  # it is read again if the line of a fault is needed
     contents.used_options = {name for source in sources for name in source.used_options}
-    read = (path for source in sources for path in (source.path, *source.also_read))
-    contents.files = tuple(dict.fromkeys(read))
     return contents
+
+
+def resolved(path: Path) -> Path:
+    """Return a path that identifies a file; invalid paths are reported by reading them."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError, ValueError):  # a cycle of links, or NUL in the name
+        return path
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
