@@ -26,6 +26,7 @@ NAMES = [
     "observing",
     "losses",
     "lint",
+    "feet",
     "transfer",
     "video",
     "quality",

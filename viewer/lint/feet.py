@@ -22,14 +22,6 @@ from viewer.rig.feet.soles import extent
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import joint_labels
 
-# Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm if it is a guess.
-_SINKS, _SINKS_OF_GUESS = 0.01, 0.03
-_FLOATS = 0.03  # height above the ground relative to the height at rest: 51 mm for a person
-# 100 mm for a person: above this, the foot may be on a step unless the ground is given.
-_STEPS = 0.06
-_RESTS = 0.3  # minimum seconds for which the lower foot rests: at the top of a jump, it is 0.1
-_FACTOR = 3.0  # multiple of the limit above which even a single frame is reported
-
 
 def check(subject: Subject) -> list[Finding]:
     """Check the feet of a moving body: a skeleton whose joint names include two ankles."""
@@ -44,7 +36,7 @@ def check(subject: Subject) -> list[Finding]:
     sole, height = extent(figure)
     heights = track.soles
     given = subject.options.ground
-    ground, sinks = 0.0, _SINKS
+    ground, sinks = 0.0, limits.SINKS
     if isinstance(given, float | int):
         ground = float(given)
     else:
@@ -55,7 +47,7 @@ def check(subject: Subject) -> list[Finding]:
         found = ground_of(heights.min(axis=1), track.present, step, track.scale * height, likely)
         if found.height is None:
             return [_unsure(subject, found, step)]
-        ground, sinks = found.height, _SINKS_OF_GUESS if found.is_guess else _SINKS
+        ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
     return [
         *_sunk(subject, track, feet, labels, heights - ground, sinks * height),
@@ -97,7 +89,7 @@ def _sunk(
     is_deep = np.pad(deepest > limit * track.scale, 1)
     # A single frame may be noise, unless it is far too deep.
     lasts = is_deep[1:-1] & (is_deep[:-2] | is_deep[2:])
-    frames = np.flatnonzero(lasts | (deepest > _FACTOR * limit * track.scale))
+    frames = np.flatnonzero(lasts | (deepest > limits.FAR_TOO_DEEP * limit * track.scale))
     if len(frames) == 0:
         return []
     frames = frames[np.argsort(-deepest[frames], kind="stable")]
@@ -135,9 +127,9 @@ def _floating(
     """
     lowest, size = heights.min(axis=1), track.scale * height
     step = float(track.times[1] - track.times[0])
-    rests = resting_frames(lowest, track.present, step, size, _RESTS)
-    most = _STEPS * size if may_step else np.inf
-    frames = np.flatnonzero(rests & (lowest > _FLOATS * size) & (lowest < most))
+    rests = resting_frames(lowest, track.present, step, size, limits.RESTS_FOR)
+    most = limits.STEPS * size if may_step else np.inf
+    frames = np.flatnonzero(rests & (lowest > limits.FLOATS * size) & (lowest < most))
     if len(frames) == 0:
         return []
     frames = frames[np.argsort(-lowest[frames], kind="stable")]

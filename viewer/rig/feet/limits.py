@@ -82,3 +82,15 @@ DRAGS_FOR = 1.0
 """Seconds for which only a dragged foot stays low and moves: swings are shorter."""
 FAR = 0.04
 """Minimum total distance of sliding, 68 mm."""
+
+# Feet below and above the ground, relative to the figure's height at rest: 0.01 is 17 mm.
+
+SINKS, SINKS_OF_GUESS = 0.01, 0.03
+"""Depth below the ground from which a foot sinks into it, and that below a guessed ground."""
+FAR_TOO_DEEP = 3.0
+"""Multiple of this depth above which even a single frame is reported: others may be noise."""
+FLOATS, STEPS = 0.03, 0.06
+"""Heights above the ground between which a body that rests floats: lower is inexact, and higher may
+be a step, unless the ground is given."""
+RESTS_FOR = 0.3
+"""Minimum seconds for which the lower foot rests: at the top of a jump, it does for 0.1."""
