@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
+from typing import Literal
 
 from viewer.commands._settings import add_settings, number, settings_of
 from viewer.data_classes import dataclass, setting
@@ -162,6 +163,8 @@ class Frames:
     )
     interpolates: bool = False
     """Whether gaps of captures are interpolated."""
+    gaps: Literal["", "hold", "split"] = ""
+    """How gaps are written that are not interpolated; empty for the format's default."""
     option: str = "--frame"
     """The option that gave ``frame``, for messages."""
 
@@ -173,7 +176,8 @@ class Frames:
 
 def frames_of(arguments: argparse.Namespace) -> Frames:
     """Return the requested frames."""
-    return settings_of(Frames, arguments, interpolates=arguments.interpolate_gaps)
+    gaps = getattr(arguments, "gaps", None) or ""
+    return settings_of(Frames, arguments, interpolates=arguments.interpolate_gaps, gaps=gaps)
 
 
 def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None:

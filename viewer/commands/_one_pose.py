@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from viewer.commands._frames import numbering_of
+from viewer.commands._frames import Frames, numbering_of
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, ExportOptions, Part
@@ -15,22 +14,22 @@ from viewer.rig.motion.timing import frame_at
 from viewer.rig.scene import Actor, Scene
 
 
-def check_frame_options(arguments: argparse.Namespace) -> None:
+def check_frame_options(frames: Frames) -> None:
     """Check that a range of frames and a single one are not both given.
 
     Raises ViewerError if both are given.
     """
     for option in ("frame", "time"):
-        if arguments.frames is not None and getattr(arguments, option) is not None:
+        if frames.frames is not None and getattr(frames, option) is not None:
             raise ViewerError(f"--frames and --{option}: expected one of them, found both")
 
 
-def asks_one_pose(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
+def asks_one_pose(frames: Frames, output: Path, scene: Scene) -> bool:
     """Return whether a single pose is written: at a frame or time, or if there is no motion."""
-    if arguments.frames is not None or all(actor.pose is None for actor in scene.actors):
+    if frames.frames is not None or all(actor.pose is None for actor in scene.actors):
         return False
     is_still = not _moving(scene) and "{frame" not in output.name
-    return is_still or _at_one_time(arguments)
+    return is_still or frames.is_one
 
 
 def posed_actors(scene: Scene) -> list[Actor]:
@@ -39,35 +38,31 @@ def posed_actors(scene: Scene) -> list[Actor]:
 
 
 def part_of_pose(
-    arguments: argparse.Namespace, key: str, options: ExportOptions, scene: Scene, actor: Actor
+    frames: Frames, key: str, options: ExportOptions, scene: Scene, actor: Actor
 ) -> Part:
     """Return an actor's current pose as a motion of one frame, for an exporter.
 
     The frame has the number that ``--frame`` uses; between two frames, it is that of the displayed
     frame.
     """
-    frames = numbering_of(scene.actors, arguments.fps)
-    time = frames.start if scene.time is None else scene.time
-    number = frames.first + frame_at(time - frames.start, frames.rate)
+    numbering = numbering_of(scene.actors, frames.fps)
+    time = numbering.start if scene.time is None else scene.time
+    number = numbering.first + frame_at(time - numbering.start, numbering.rate)
     keeps_world = EXPORTERS[key].keeps_world and not options.up
     return Part(
-        actor, None, *upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
+        actor, None, *upright_single_frame(scene, actor, numbering.rate, number, time, keeps_world)
     )
 
 
-def pose_note(arguments: argparse.Namespace, scene: Scene) -> Diagnostic:
+def pose_note(frames: Frames, scene: Scene) -> Diagnostic:
     """Return the note that explains why there is only one frame."""
     if not _moving(scene):
         return Diagnostic("X001.current-pose")
-    if arguments.frame is not None:
-        return Diagnostic("X001.pose-at-frame", values={"frame": arguments.frame})
-    if arguments.time is not None:
-        return Diagnostic("X001.pose-at-time", values={"time": float(arguments.time)})
+    if frames.frame is not None:
+        return Diagnostic("X001.pose-at-frame", values={"frame": frames.frame})
+    if frames.time is not None:
+        return Diagnostic("X001.pose-at-time", values={"time": frames.time})
     return Diagnostic("X001.current-pose")
-
-
-def _at_one_time(arguments: argparse.Namespace) -> bool:
-    return arguments.frame is not None or arguments.time is not None
 
 
 def _moving(scene: Scene) -> list[Actor]:

@@ -7,7 +7,7 @@ that: ``flag`` is another option string; ``given`` the option's own default, if 
 field's (None: the field's default applies unless the option is given); ``read`` the function from
 the option's value to the field's; ``limits`` the lowest and highest value; ``usual`` the text for
 ``{usual}`` in the help, if the default depends on the command. ``type``, ``choices``,
-``metavar``, ``nargs``, ``const`` and ``action`` are those of ``argparse``.
+``dest``, ``metavar``, ``nargs``, ``const`` and ``action`` are those of ``argparse``.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def _flag(each: Field[Any]) -> str:
 
 def _destination(each: Field[Any]) -> str:
     """Return the name of a field's option among the arguments."""
-    return _flag(each).lstrip("-").replace("-", "_")
+    return str(each.metadata.get("dest", _flag(each).lstrip("-").replace("-", "_")))
 
 
 def _is_number(value: object) -> bool:

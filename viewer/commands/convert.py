@@ -19,6 +19,7 @@ from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._frames import add_frame_arguments
 from viewer.commands._one_pose import check_frame_options
 from viewer.commands._pose import (
+    PoseOptions,
     add_pose_arguments,
     add_skinning_arguments,
     apply_pose,
@@ -40,11 +41,11 @@ from viewer.commands._writing.motion_export import (
     add_motion_arguments,
     check_kind,
     check_numbered,
-    motion_options,
+    export_options,
     requested_frames,
     selected,
 )
-from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
+from viewer.commands._writing.vrm_meta import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
@@ -77,23 +78,6 @@ if TYPE_CHECKING:
 # Streamed conversion.
 _PEEK = 1 << 16  # bytes that identify the format
 _LARGE = 8_000_000  # bytes; smaller files are read as a whole
-
-# Options that involve other files, or pose the figure: none of them can be streamed.
-_OTHERS = (
-    "body",
-    "model",
-    "motion",
-    "joint_map",
-    "save_joint_map",
-    "video",
-    "images",
-    "hands",
-    "pose",
-    "shape",
-    "expression",
-    "dof",
-    "mirror",
-)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -132,41 +116,42 @@ def _known_suffixes() -> str:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write poses or motions; print messages about written files and losses."""
-    output = Path(arguments.output)
-    asked = scene_options(arguments)
-    _check_suffix(arguments, asked, output)
+    output, asked = Path(arguments.output), scene_options(arguments)
     skinning = settings_of(Skinning, arguments)
-    notes = convert_streamed(arguments, asked, output, skinning)
+    options = export_options(arguments, asked.frames, skinning)
+    _check_suffix(asked, options, output, arguments.force)
+    joint_map = None if arguments.save_joint_map is None else Path(arguments.save_joint_map)
+    notes = convert_streamed(asked, options, output) if joint_map is None else None
     if notes is None:
-        notes = _converted(arguments, asked, output, skinning)
+        scene = open_scene(asked)
+        use_file_method(scene, skinning, stated(Skinning, arguments))
+        baked = bake_springs(asked.motion.springs, asked.frames.fps, scene, output)
+        saving = _saving_joint_map(joint_map, asked, scene, output, arguments.force)
+        with saving, shown_progress("converting"):
+            notes = [*_written(asked, options, scene, output, arguments.force), *baked]
     for note in notes:
         note_found(note)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 
 
-def _converted(
-    arguments: argparse.Namespace, asked: SceneOptions, output: Path, skinning: Skinning
+def _written(
+    asked: SceneOptions, options: ExportOptions, scene: Scene, output: Path, force: bool
 ) -> list[Diagnostic]:
-    """Open all files, and write what is requested; return the notes."""
-    scene = open_scene(asked)
-    arguments.fps = asked.frames.fps
-    use_file_method(scene, skinning, stated(Skinning, arguments))
-    baked = bake_springs(arguments, scene, output)
-    with _saving_joint_map(arguments, asked, scene), shown_progress("converting"):
-        selection, options, chosen = selected(arguments, scene, output, skinning)
-        files, inputs = output_files(selection, output, options), inputs_of(asked, scene)
-        if output.suffix:
-            check_targets(files, inputs, arguments.force)
-        else:
-            check_folder_target(files[0], inputs, arguments.force)
-        with raising():
-            return [*export(selection, output, options=options), *chosen, *baked]
+    """Write what is requested of a scene; return the notes."""
+    selection, options, chosen = selected(asked, options, scene, output)
+    files, inputs = output_files(selection, output, options), inputs_of(asked, scene)
+    if output.suffix:
+        check_targets(files, inputs, force)
+    else:
+        check_folder_target(files[0], inputs, force)
+    with raising():
+        return [*export(selection, output, options=options), *chosen]
 
 
-def _check_suffix(arguments: argparse.Namespace, asked: SceneOptions, output: Path) -> None:
+def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, force: bool) -> None:
     """Check the output before anything is read."""
-    check_frame_options(arguments)
+    check_frame_options(asked.frames)
     require_stdout(output)
     if is_stdout(output) and not output.suffix:
         name = printable(output, 300)
@@ -177,29 +162,27 @@ def _check_suffix(arguments: argparse.Namespace, asked: SceneOptions, output: Pa
     suffix, kinds = output.suffix.lower() or FOLDER, exporters_at(output)
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
-    if arguments.optimize and not any("optimizes" in kind.options for kind in kinds):
+    if options.optimizes and not any("optimizes" in kind.options for kind in kinds):
         raise ViewerError(f"--optimize: expected .glb, .gltf or .vrm, found {printable(suffix)}")
-    vrm_meta(arguments, output)
-    check_kind(arguments, output)
-    check_numbered(arguments, output)
+    check_meta(options.meta, output)
+    check_kind(options.kind, output)
+    check_numbered(bool(asked.frames.frames), output)
     if not output.suffix or "{frame" in output.name:
         return  # the files are unknown until the motion has been read
     is_pose = all("pose" in kind.stores for kind in kinds)
     files = files_written(output) if is_pose else [output]
-    check_targets(files, inputs_of(asked), arguments.force)
+    check_targets(files, inputs_of(asked), force)
 
 
 @contextmanager
 def _saving_joint_map(
-    arguments: argparse.Namespace, asked: SceneOptions, scene: Scene
+    path: Path | None, asked: SceneOptions, scene: Scene, output: Path, force: bool
 ) -> Iterator[None]:
     """Write the requested joint map before the block; remove it if the block fails.
 
-    ``arguments``: arguments of ``convert``.
-    ``scene``: the opened scene.
     Raises OutputError if a file may not be written, RigError if no motion drives a figure.
     """
-    if arguments.save_joint_map is None:
+    if path is None:
         yield
         return
     from viewer.formats._joint_map import joint_map_text
@@ -216,9 +199,8 @@ def _saving_joint_map(
             "--save-joint-map: expected a motion that drives a figure with different joints, found "
             "none"
         )
-    files = motion_paths(Path(arguments.save_joint_map), [*texts.values()])
-    check_targets(files, inputs_of(asked, scene), arguments.force)
-    output = Path(arguments.output)
+    files = motion_paths(path, [*texts.values()])
+    check_targets(files, inputs_of(asked, scene), force)
     if output.suffix and "{frame" not in output.name:
         check_targets([*files, output], (), force=True)  # the files must be different
     with all_or_none(files):
@@ -228,24 +210,22 @@ def _saving_joint_map(
 
 
 def convert_streamed(
-    arguments: argparse.Namespace, asked: SceneOptions, output: Path, skinning: Skinning
+    asked: SceneOptions, options: ExportOptions, output: Path
 ) -> list[Diagnostic] | None:
     """Convert a long, regular file part by part; print warnings and return the notes.
 
-    ``arguments``: arguments of ``convert``.
     ``output``: the requested file, which may be replaced.
-    ``skinning``: the requested method.
     Returns None, and leaves the file unchanged, if the files or options need the whole motion in
     memory.
     """
-    if not _is_streamable(arguments, asked, output):
+    if not _is_streamable(asked, options.kind, output):
         return None
     from viewer.export.bvh.streaming import Parts, export_parts
     from viewer.formats.bvh.streaming import Irregular
 
     try:
-        options = motion_options(arguments, skinning)
-        request = _opened(arguments, asked, options)
+        options = replace(options)
+        request = _opened(asked, options)
     except ViewerError:
         return None  # reading the whole file finds and reports what is wrong
     if request is None:
@@ -266,16 +246,18 @@ def convert_streamed(
     return notes
 
 
-def _is_streamable(arguments: argparse.Namespace, asked: SceneOptions, output: Path) -> bool:
-    """Return whether the options can be applied to parts, and the output is a ``.bvh`` file."""
-    given = [name for name in _OTHERS if getattr(arguments, name)]
-    # Frame 0 and time 0 are values, too.
-    given += [
-        name for name in ("frame", "time", "model_path") if getattr(arguments, name) is not None
-    ]
-    if given or arguments.springs == "on" or not asked.changes.is_empty:
+def _is_streamable(asked: SceneOptions, kind: str, output: Path) -> bool:
+    """Return whether the options can be applied to parts, and the output is a ``.bvh`` file.
+
+    Options that involve other files, or pose the figure, need the whole motion.
+    """
+    motion = asked.motion
+    files = asked.body, motion.model, motion.motions, asked.joint_map, motion.video, motion.images
+    if any(files) or asked.model_path is not None or asked.pose != PoseOptions():
         return False
-    if arguments.kind not in (None, "bvh") or len(arguments.files) != 1:
+    if asked.frames.is_one or motion.springs or not asked.changes.is_empty:
+        return False
+    if kind not in ("", "bvh") or len(asked.files) != 1:
         return False
     is_file = not is_stdout(output) and (output.is_file() or not output.exists())
     is_pattern = "{frame" in output.name or PERSON in output.name
@@ -307,9 +289,7 @@ class _Request:
             yield replace(part, first_frame=first)
 
 
-def _opened(
-    arguments: argparse.Namespace, asked: SceneOptions, options: ExportOptions
-) -> _Request | None:
+def _opened(asked: SceneOptions, options: ExportOptions) -> _Request | None:
     """Return the request, or None if the file must be read as a whole."""
     from viewer.formats.bvh.streaming import open_stream
 
@@ -334,6 +314,8 @@ def _opened(
     warnings = [*scene.diagnostics, *apply_pose(scene, asked.pose, asked.frames)]
     actor = scene.actors[0]
     assert isinstance(actor.clip, SampledClip)  # that of the stream
-    span = frame_range(actor.clip, actor.clip.timing.frame_rate, requested_frames(arguments, actor))
+    span = frame_range(
+        actor.clip, actor.clip.timing.frame_rate, requested_frames(asked.frames, actor)
+    )
     up = sampled("bvh", options, scene, actor, frames=(0, 1)).up
     return _Request(stream, settings, scene, warnings, span, up)

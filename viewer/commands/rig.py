@@ -34,12 +34,20 @@ from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, settings_of
-from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
+from viewer.commands._writing.vrm_meta import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
-from viewer.export import ExportOptions, Selection, check_figure, export, exporter_for, sampled
+from viewer.export import (
+    ExportOptions,
+    Selection,
+    VrmMeta,
+    check_figure,
+    export,
+    exporter_for,
+    sampled,
+)
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
@@ -153,7 +161,8 @@ def run(arguments: argparse.Namespace) -> int:
     from viewer.export._rigged_files import files_of, write_rigged
 
     output = None if arguments.output is None else Path(arguments.output)
-    meta = vrm_meta(arguments, output)
+    meta = settings_of(VrmMeta, arguments)
+    check_meta(meta, output)
     pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
     inputs = _inputs(
         [

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from viewer.data_classes import dataclass
+from viewer.data_classes import dataclass, setting
 from viewer.rig.skinning import Skinning
+from viewer.rig.units import METRES
 
 ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 """Orders of rotation channels as BVH lists them: the product R = Rz Ry Rx is ``zyx``."""
@@ -33,46 +34,78 @@ _CLOSED = "hold"  # default of formats that do not support missing frames
 class VrmMeta:
     """Meta data of a VRM character; empty values keep those of its file."""
 
-    name: str = ""
-    """Name of the character; that of the figure if it has no VRM file."""
-    authors: tuple[str, ...] = ()
-    """At least one for figures from other files."""
-    licence: str = ""
-    """Address of the licence."""
-    upgrades: bool = False
-    """Write characters from VRM 0.x files as VRM 1.0."""
+    name: str = setting("", "name of the character", flag="--vrm-name", metavar="NAME")
+    """That of the figure if it is empty and there is no VRM file."""
+    authors: tuple[str, ...] = setting(
+        (),
+        "an author; may be repeated; required for figures from other formats",
+        flag="--vrm-author",
+        action="append",
+        given=[],
+        read=tuple,
+        metavar="NAME",
+    )
+    licence: str = setting(
+        "",
+        "address of the licence; required for figures from other formats",
+        flag="--vrm-licence",
+        metavar="URL",
+    )
+    upgrades: bool = setting(
+        False,
+        "write characters from VRM 0.x files as VRM 1.0 (default: the file's version)",
+        flag="--vrm-version",
+        choices=("1.0", "1"),
+        given=None,
+        read=bool,
+    )
 
 
 @dataclass(slots=True)
 class ExportOptions:
     """Options for writing poses and motions."""
 
-    kind: str = ""
+    kind: str = setting(
+        "",
+        "the format, if the suffix is ambiguous; motions: {usual}",
+        flag="--as",
+        dest="kind",
+    )
     """A key of ``EXPORTERS``; empty for the one that suits the suffix and the figures."""
-    unit: str = ""
-    """A key of ``viewer.rig.units.METRES``; empty for the format's default."""
-    up: str = ""
-    """One of "y", "z" or "": up axis of the file; empty for the format's default."""
-    rotation_order: str = "zyx"
-    """One of ``ROTATION_ORDERS``."""
-    quaternions: str = "xyzw"
-    """One of ``QUATERNIONS``."""
+    unit: str = setting(
+        "", "unit of the file (default: cm in BVH)", flag="--to-unit", choices=METRES
+    )
+    up: str = setting(
+        "",
+        "up axis of the file (default: y in BVH, z in SMPL-X)",
+        flag="--to-up",
+        choices=("y", "z"),
+    )
+    rotation_order: str = setting("zyx", "BVH (default: {default})", choices=ROTATION_ORDERS)
+    quaternions: str = setting(
+        "xyzw",
+        "arrays (.npz): order of the components (default: {default})",
+        choices=QUATERNIONS,
+    )
     gaps: str = ""
     """A key of ``GAPS``; empty for the format's default: missing frames are omitted if the format
     allows it, and held otherwise."""
-    rest_frame: bool = False
-    """Put the rest pose before the first frame."""
-    digits: int = 6
-    """Decimals of text formats."""
-    safe_names: bool = False
-    """Write the names of joints with letters, digits and underscores only, each name once."""
+    rest_frame: bool = setting(False, "BVH: begin with a rest pose frame")
+    digits: int = setting(
+        6, "BVH: decimals, 1 to 15 (default: {default})", limits=(1, 15), read=int, metavar="N"
+    )
+    safe_names: bool = setting(False, f"BVH: {SAFE_NAMES}")
     world_up: str = "y"
     """One of "y", "z", "-y" or "-z": the up axis of the animation's world; negative axes are only
     for exporters that keep that world."""
     skinning: Skinning = field(default_factory=Skinning)
     """Skinning method and options, if vertices are written."""
-    optimizes: bool = False
-    """Quantise the vertices of glTF files."""
+    optimizes: bool = setting(
+        False,
+        "glTF: quantise positions, normals, texture coordinates and weights to 16 bits "
+        "(KHR_mesh_quantization); the errors are printed",
+        flag="--optimize",
+    )
     meta: VrmMeta = field(default_factory=VrmMeta)
     """Name, authors and licence of a VRM character."""
 

@@ -26,12 +26,11 @@ def add_spring_argument(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> list[Diagnostic]:
+def bake_springs(bakes: bool, fps: float | None, scene: Scene, output: Path) -> list[Diagnostic]:
     """Replace motions of figures with spring joints by frames, if requested; return notes."""
     holds_motion = not any(kind.joints == "human" for kind in exporters_at(output))
     actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
     actors = actors if holds_motion else []
-    bakes = arguments.springs == "on"
     if bakes and not holds_motion:
         raise ViewerError(
             f"--bake-springs: {printable(output.suffix)} cannot store motions of spring joints"
@@ -43,7 +42,7 @@ def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> l
         springs = actor.figure.require_skeleton().springs
         count = 0 if springs is None else springs.n_joints
         if bakes:
-            actor.clip = with_baked_springs(actor, arguments.fps)
+            actor.clip = with_baked_springs(actor, fps)
             actor.springs, actor.animation = None, -1
         key = "X005.springs-baked" if bakes else "X003.springs"
         notes.append(Diagnostic(key, values={"figure": actor.name, "n": count}))

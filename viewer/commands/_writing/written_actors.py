@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
+from viewer.commands._frames import Frames
 from viewer.commands._one_pose import asks_one_pose, posed_actors
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
@@ -31,12 +31,12 @@ def pose_or_point_actors(scene: Scene) -> list[Actor]:
     return figures or list(scene.actors)
 
 
-def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) -> list[Actor]:
+def written_actors(frames: Frames, output: Path, scene: Scene) -> list[Actor]:
     """Return the actors whose motion is written, or whose pose is written as a one-frame motion.
 
     Raises RigError if there are none.
     """
-    if asks_one_pose(arguments, output, scene):
+    if asks_one_pose(frames, output, scene):
         return posed_actors(scene)
     return moving_actors(scene)
 
