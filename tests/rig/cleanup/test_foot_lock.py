@@ -98,3 +98,10 @@ def test_feet_are_not_held_where_they_glide_too_far(glides) -> None:
         assert lock.lowered < 1e-4 and lock.before < 1e-9
     else:
         assert_allclose(kept, np.broadcast_to(kept[:1], kept.shape), atol=1e-9)
+
+
+def test_motion_of_a_body_that_stands_still_is_unchanged() -> None:
+    clip = standing(FIGURE)
+    found, lock = lock_feet(FIGURE, clip, 1)
+    assert_allclose(found.rotations, clip.rotations, atol=0.0)
+    assert (lock.n_contacts, lock.before, lock.after, lock.lowered) == (2, 0.0, 0.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -28,4 +29,7 @@ def lock_feet(
     body = body_legs(figure, clip, legs, rest_up) if legs and clip.n_rows else None
     if body is None or body.size <= 0.0:
         return clip, PlantedFeet()
-    return plant(clip, body, body.worlds(clip), way * np.eye(3)[up])
+    planted, changes = plant(clip, body, body.worlds(clip), way * np.eye(3)[up])
+    if not changes.is_better:  # the motion is unchanged
+        changes = replace(changes, after=changes.before, lowered=0.0)
+    return planted, changes

@@ -70,13 +70,13 @@ def leg_rotations(
     """
     result = rotations.copy()
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
-    old = matrix_to_quaternion(_unscaled(world[..., :3, :3]))
+    old = matrix_to_quaternion(unscaled(world[..., :3, :3]))
     for leg, shift in zip(legs, shifts, strict=True):
         moves = (shift - drop).any(axis=1)
         if not moves.any():
             continue
         hips, knees, ankles = (world[:, j, :3, 3] + drop for j in (leg.hip, leg.knee, leg.ankle))
-        axis = hinges(_unscaled(world[:, leg.hip, :3, :3]), (hips, knees, ankles), across)
+        axis = hinges(unscaled(world[:, leg.hip, :3, :3]), (hips, knees, ankles), across)
         thigh, shin = bend(hips, knees, ankles, ankles - drop + shift, axis)
         above = int(parents[leg.hip])
         parent = old[:, above] if above >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
@@ -147,7 +147,8 @@ def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats
     return thighs @ unit(found)
 
 
-def _unscaled(linear: Floats) -> Floats:
+def unscaled(linear: Floats) -> Floats:
+    """Return matrices (..., 3, 3) with columns of length 1: the rotations of scaled joints."""
     return linear / np.maximum(np.linalg.norm(linear, axis=-2, keepdims=True), 1e-30)
 
 

@@ -28,7 +28,7 @@ from viewer.rig.feet.contacts import (
     step_height,
 )
 from viewer.rig.feet.curves import falling, smooth_curves
-from viewer.rig.feet.legs import Leg, leg_rotations, lowering
+from viewer.rig.feet.legs import Leg, leg_rotations, lowering, unscaled
 from viewer.rig.geometry.quaternion import (
     align_signs,
     conjugate,
@@ -355,9 +355,7 @@ def levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan) 
     """
     legs, up = body.legs, plan.up
     ankles, toes = [leg.ankle for leg in legs], [leg.toe for leg in legs]
-    linear = worlds[..., :3, :3]
-    lengths = np.maximum(np.linalg.norm(linear, axis=-2, keepdims=True), 1e-30)
-    old = matrix_to_quaternion(linear / lengths)
+    old = matrix_to_quaternion(unscaled(worlds[..., :3, :3]))
     holds, flat = _holds(plan, legs)
     if not (holds > 0.0).any():
         return clip
