@@ -1,8 +1,8 @@
 """Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without executing code in them.
 
-A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever passed to
-Python's unpickler: ``_pickle/`` supports the few opcodes needed for arrays and plain data, and
-rejects all others by name. All other values are returned as ``Opaque``.
+A pickle is a program, and so is an object array inside an ``.npz``. Neither can import or call
+anything: ``_pickle/`` supports the names needed for arrays and plain data, and rejects all others.
+All other values are returned as ``Opaque``.
 """
 
 from __future__ import annotations

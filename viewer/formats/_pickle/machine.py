@@ -1,23 +1,29 @@
-"""The pickle machine: its state, its opcodes, and the arrays in pickles of joblib.
+"""Python's own unpickler, with other steps for all that a hostile file could misuse.
 
-A pickle is a program for a stack machine. Its state is the bytes, a stack with marks, the memo and
-a budget. Nothing is recursive, no length is trusted before the bytes are known to exist, and the
-budget limits time and memory for any sequence of opcodes.
+A pickle is a program for a stack machine. Containers, numbers, marks and the memo are those of
+``pickle._Unpickler``, the unpickler in Python: it is not recursive, and its memo is a dict. The
+steps that are replaced make strings and bytes (here ranges of the file), import names, call
+functions, build objects, put keys into dicts, or reach outside the file. No length is trusted
+before the bytes are known to exist, and a budget limits time and memory for any opcodes.
+
+``pickle.Unpickler``, in C, cannot be bounded by ``find_class``: 16 bytes with a large memo index
+allocate 4 GB, and a megabyte of nested tuples as the key of a dict overflows the stack of the
+process. Besides, it reads all arrays of a file, and cannot pause before those of joblib.
 """
 
 from __future__ import annotations
 
 import codecs
+import pickle
 import re
-import struct
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import item_count
 from viewer.formats._archive.zip import Data
-from viewer.formats._pickle import names as names
+from viewer.formats._pickle import names
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.formats._source import InvalidValueError, Source
 
@@ -28,37 +34,55 @@ _BYTES_PER_STEP = 4
 _MOST_STEPS = 20_000_000
 _DEEPEST = 3  # maximum nesting of pickles inside pickles; real files have two levels
 _LONGEST_LINE = 256  # maximum number of characters of a name or number in the text protocols
-_INTEGER = re.compile(rb"[+-]?[0-9]+")
+_LAST_PROTOCOL = 5
+_MAX_INTEGER = 1024  # maximum length in bytes
+_LONGEST_NAME = 256
+_STOP = ord(".")
+
+# Escapes of Python 2's repr(). Others are refused, as Python's decoder warns about some of them.
+_ODD_ESCAPE = re.compile(rb"\\(?!x[0-9a-fA-F]{2}|[nrt'\"])")
+
+# Raised by the steps of the unpickler for values that do not fit.
+_DAMAGE = (
+    *(pickle.UnpicklingError, ValueError, TypeError, AttributeError),
+    *(LookupError, OverflowError),
+)
 
 
-class Machine:
+class Machine(pickle._Unpickler):
     """A pickle being read.
 
-    ``at``: offset of the next byte. ``end``: offset of the end of the pickle's bytes.
-    ``persistent``, ``load_bytes``: functions that return the value of a persistent id, and the
-    value of torch's storages saved as bytes; None if the file must not contain these.
+    ``data``: the file; ``at``: offset of the next byte; ``end``: end of the pickle's bytes;
+    ``depth``: number of pickles that contain this one; ``persistent``, ``load_bytes``: return the
+    value of a persistent id, and of torch's storages saved as bytes; None if the file must not
+    contain these.
     """
+
+    append: Callable[[object], None]
+    stack: list[object]
+    """Values since the last mark."""
+    pop_mark: Callable[[], list[object]]
 
     def __init__(
         self, source: Source, data: Data | None = None, start: int = 0, end: int | None = None
     ) -> None:
+        super().__init__(self)
         self.source, self.at = source, start
         self.data: Data = source.data if data is None else data
         self.end = len(self.data) if end is None else end
         self.depth = 0
         self.persistent: Callable[[object], object] | None = None
         self.load_bytes: Callable[[Machine, Span], object] | None = None
-        self.stack: list[object] = []
-        self.memo: dict[int, object] = {}
-        self._marks: list[int] = []
-        self._floor = 0  # height of the stack at the last mark
         self._most = max(_MAX_STEPS, min((self.end - start) // _BYTES_PER_STEP, _MOST_STEPS))
         self._budget = self._most
         self._step_at = 0
 
-    def fail(self, problem: Phrase) -> FormatError:
-        """Return an error with the offset of the current opcode."""
-        return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
+    def begin(self) -> None:
+        """Empty the stack and the memo, for the next pickle of a file."""
+        self.memo: dict[int, object] = {}
+        self.metastack: list[list[object]] = []
+        self.stack = []
+        self.append = self.stack.append
 
     def next_step(self) -> int:
         """Return the next opcode, and deduct it from the budget."""
@@ -90,12 +114,21 @@ class Machine:
         """Continue with the budget that a nested machine has left."""
         self._budget = inner._budget
 
-    # Methods that read bytes.
+    # Methods that read bytes; those without a docstring are called by the unpickler.
+
+    def read(self, size: int) -> bytes:
+        start = self.skip(size)
+        return self.data[start : self.at]
+
+    def readline(self) -> bytes:
+        start, end = self.line()
+        if self.data[start:end].endswith(b"\r"):
+            raise self.damaged_line_ends()
+        return self.data[start : self.at]
 
     def number(self, size: int, *, is_signed: bool = False) -> int:
         """Read an integer of ``size`` bytes, least significant first."""
-        start = self.skip(size)
-        return int.from_bytes(self.data[start : self.at], "little", signed=is_signed)
+        return int.from_bytes(self.read(size), "little", signed=is_signed)
 
     def skip(self, size: int) -> int:
         """Skip bytes, which must exist, and return the offset of the first."""
@@ -121,18 +154,15 @@ class Machine:
         self.at = end + 1
         return start, end
 
-    def word(self) -> bytes:
-        """Read a line with a name or a number."""
-        start, end = self.line()
-        if self.data[start:end].endswith(b"\r"):
-            raise self.damaged_line_ends()
-        return self.data[start:end]
+    # Errors.
 
-    def decimal(self, word: bytes) -> int:
-        """Return a number of the text protocols, whose length has been checked."""
-        if not _INTEGER.fullmatch(word):
-            raise self.fail(Phrase("pickle-decimal", found=word))
-        return int(word)
+    def fail(self, problem: Phrase) -> FormatError:
+        """Return an error with the offset of the current opcode."""
+        return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
+
+    def misfit(self) -> FormatError:
+        """Return the error for an opcode that does not fit the values before it."""
+        return self.fail(Phrase("pickle-misfit", found=bytes([self.data[self._step_at]])))
 
     def cut_short(self, wanted: int, found: int) -> FormatError:
         """Return the error for a length that exceeds the rest of the file."""
@@ -142,329 +172,55 @@ class Machine:
         """Return the error for a file damaged by a text-mode transfer."""
         return self.source.fault("F002.pickle-line-ends")
 
-    # Methods of the stack.
+    # What the unpickler would import, make or load.
 
-    def push(self, value: object) -> None:
-        """Push a value onto the stack."""
-        self.stack.append(value)
+    def find_class(self, module: str, name: str) -> StandIn:
+        """Return a stand-in for a name, which is never imported."""
+        return names.find(module, name)
 
-    def top(self) -> object:
-        """Return the topmost value."""
-        if len(self.stack) <= self._floor:
-            raise self.fail(Phrase("pickle-stack"))
-        return self.stack[-1]
+    def persistent_load(self, pid: object) -> object:
+        """Replace a persistent id by its value, if files of this kind define one."""
+        if self.persistent is None:
+            raise InvalidValueError(Phrase("pickle-refused", found=Phrase("noun-persistent")))
+        return self.persistent(pid)
 
-    def pop(self) -> object:
-        """Pop the topmost value, but never one below a mark."""
-        value = self.top()
-        self.stack.pop()
-        return value
-
-    def mark(self) -> None:
-        """Set a mark, the start of a list of values."""
-        self._marks.append(self._floor)
-        self._floor = len(self.stack)
-
-    def pop_mark(self) -> list[object]:
-        """Pop all values since the last mark, and the mark."""
-        if not self._marks:
-            raise self.fail(Phrase("pickle-mark"))
-        values = self.stack[self._floor :]
-        del self.stack[self._floor :]
-        self._floor = self._marks.pop()
-        return values
-
-    def drop(self) -> None:
-        """Pop the topmost value, or the last mark if there is no value above it."""
-        if self._marks and len(self.stack) == self._floor:
-            self.pop_mark()
-        else:
-            self.pop()
-
-    # Methods of the memo.
-
-    def remember(self, index: int) -> None:
-        """Store the topmost value in the memo."""
-        if index < 0:
-            raise self.fail(Phrase("pickle-memo", found=index))
-        self.memo[index] = self.top()
-
-    def recall(self, index: int) -> None:
-        """Push a value from the memo onto the stack."""
-        if index not in self.memo:
-            raise self.fail(Phrase("pickle-recall", found=index))
-        self.stack.append(self.memo[index])
-
-
-# Opcodes of pickles, protocols 0 to 5.
-#
-# They are named as in Python's ``pickletools``. Opcodes that reach outside the file are refused:
-# extension codes, out-of-band buffers, and persistent ids except in files of torch. Names are
-# resolved in ``names.py``.
-
-_Step = Callable[[Machine], None]
-_Result = TypeVar("_Result")
-_STOP = ord(".")
-_LAST_PROTOCOL = 5
-_MAX_INTEGER = 1024  # maximum length in bytes
-_LONGEST_NAME = 256
-_FLOAT = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|-?inf|-?nan")
-
-# Escapes of Python 2's repr(). Others are refused, as Python's decoder warns about some of them.
-_ODD_ESCAPE = re.compile(rb"\\(?!x[0-9a-fA-F]{2}|[nrt'\"])")
+    def _instantiate(self, klass: object, args: list[object]) -> None:
+        self.append(names.create(klass, tuple(args)))
 
 
 def run(machine: Machine) -> object:
     """Execute all opcodes up to STOP, and return the remaining value.
 
-    Raises ``FormatError``: at the first opcode that is damaged or refused.
+    Raises ``FormatError`` at the first opcode that is damaged or refused.
     """
-    code = machine.next_step()
-    while code != _STOP:
-        step = _STEPS.get(code)
-        if step is None:
-            raise machine.fail(Phrase("pickle-step", found=bytes([code])))
-        step(machine)
-        code = machine.next_step()
-    return machine.pop()
-
-
-def _guarded(machine: Machine, action: Callable[[], _Result]) -> _Result:
-    """Convert refusals of names, arguments and strings to errors that name the file."""
+    machine.begin()
     try:
-        return action()
+        while (code := machine.next_step()) != _STOP:
+            step = _STEPS.get(code)
+            if step is None:
+                raise machine.fail(Phrase("pickle-step", found=bytes([code])))
+            step(machine)
+        return machine.stack.pop()
     except UnicodeError:
         raise machine.fail(Phrase("pickle-bytes")) from None
     except InvalidValueError as problem:
         raise machine.source.fault("F002.pickle", problem=problem.problem) from None
+    except _DAMAGE:
+        raise machine.misfit() from None
 
 
-def _constant(value: object) -> _Step:
-    return lambda machine: machine.push(value)
-
-
-def _integer(size: int, *, is_signed: bool = False) -> _Step:
-    return lambda machine: machine.push(machine.number(size, is_signed=is_signed))
+_Step = Callable[[Machine], None]
 
 
 def _span(width: int, coding: str | None = None, *, is_signed: bool = False) -> _Step:
-    return lambda machine: machine.push(machine.span(width, coding, is_signed=is_signed))
+    return lambda machine: machine.append(machine.span(width, coding, is_signed=is_signed))
 
 
-def _refused(found: Phrase) -> _Step:
+def _refused(key: str) -> _Step:
     def refuse(machine: Machine) -> None:
-        problem = Phrase("pickle-refused", found=found)
-        raise machine.source.fault("F002.pickle", problem=problem)
+        raise InvalidValueError(Phrase("pickle-refused", found=Phrase(key)))
 
     return refuse
-
-
-# Numbers.
-
-
-def _long_integer(width: int) -> _Step:
-    def step(machine: Machine) -> None:
-        size = machine.number(width, is_signed=width == 4)
-        if not 0 <= size <= _MAX_INTEGER:
-            raise machine.fail(Phrase("pickle-long", most=_MAX_INTEGER, found=size))
-        machine.push(machine.number(size, is_signed=True))
-
-    return step
-
-
-def _decimal(machine: Machine) -> None:
-    word = machine.word()
-    # Protocol 1 has no other way to write True and False.
-    truth = {b"00": False, b"01": True}.get(word)
-    machine.push(machine.decimal(word) if truth is None else truth)
-
-
-def _long_decimal(machine: Machine) -> None:
-    machine.push(machine.decimal(machine.word().removesuffix(b"L")))
-
-
-def _float_text(machine: Machine) -> None:
-    word = machine.word()
-    if not _FLOAT.fullmatch(word):
-        raise machine.fail(Phrase("pickle-number", found=word))
-    machine.push(float(word))
-
-
-def _float(machine: Machine) -> None:
-    machine.push(struct.unpack(">d", machine.data[machine.skip(8) : machine.at])[0])
-
-
-# Strings.
-
-
-def _quoted(machine: Machine) -> None:
-    start, end = machine.line(None)
-    text = machine.data[start:end]
-    if text.endswith(b"\r"):
-        raise machine.damaged_line_ends()
-    if len(text) < 2 or text[:1] not in (b"'", b'"') or text[-1:] != text[:1]:
-        raise machine.fail(Phrase("pickle-quotes", found=text))
-    if b"\\" not in text:
-        machine.push(Span(machine.data, start + 1, end - 1, "latin-1"))
-        return
-    # Pairs of backslashes are matched first, so that every other backslash begins an escape.
-    if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
-        raise machine.fail(Phrase("pickle-escape"))
-    data = codecs.escape_decode(text[1:-1])[0]
-    machine.push(Span(data, 0, len(data), "latin-1"))
-
-
-def _text_line(machine: Machine) -> None:
-    machine.push(Span(machine.data, *machine.line(None), "raw-unicode-escape"))
-
-
-# Containers.
-
-
-def _tuple(count: int) -> _Step:
-    def step(machine: Machine) -> None:
-        values = [machine.pop() for _ in range(count)]
-        machine.push(tuple(reversed(values)))
-
-    return step
-
-
-def _list_of(machine: Machine) -> list[object]:
-    target = machine.top()
-    if not isinstance(target, list):
-        raise machine.fail(Phrase("pickle-list", found=noun(target)))
-    return target
-
-
-def _append(machine: Machine) -> None:
-    value = machine.pop()
-    _list_of(machine).append(value)
-
-
-def _appends(machine: Machine) -> None:
-    values = machine.pop_mark()
-    _list_of(machine).extend(values)
-
-
-def _put_pairs(machine: Machine, values: list[object]) -> None:
-    target = machine.top()
-    if not isinstance(target, dict):
-        raise machine.fail(Phrase("pickle-dict", found=noun(target)))
-    if len(values) % 2:
-        raise machine.fail(Phrase("pickle-pairs"))
-    keys = _guarded(machine, lambda: [names.as_key(key) for key in values[0::2]])
-    target.update(zip(keys, values[1::2], strict=True))
-
-
-def _set_item(machine: Machine) -> None:
-    value = machine.pop()
-    _put_pairs(machine, [machine.pop(), value])
-
-
-def _set_items(machine: Machine) -> None:
-    values = machine.pop_mark()
-    _put_pairs(machine, values)
-
-
-def _dict(machine: Machine) -> None:
-    values = machine.pop_mark()
-    machine.push({})
-    _put_pairs(machine, values)
-
-
-# Names and their uses.
-
-
-def _find(machine: Machine, module: str, name: str) -> object:
-    if module.endswith("\r") or name.endswith("\r"):
-        raise machine.damaged_line_ends()
-    return _guarded(machine, lambda: names.find(module, name))
-
-
-def _global_line(machine: Machine) -> object:
-    module, name = (machine.data[slice(*machine.line())].decode("utf-8", "replace") for _ in "mn")
-    return _find(machine, module, name)
-
-
-def _global(machine: Machine) -> None:
-    machine.push(_global_line(machine))
-
-
-def _stack_global(machine: Machine) -> None:
-    parts = [machine.pop(), machine.pop()]
-    texts = [part for part in parts if isinstance(part, Span) and len(part) <= _LONGEST_NAME]
-    if len(texts) < len(parts):
-        found = [noun(part) for part in parts]
-        raise machine.fail(Phrase("pickle-names", module=found[1], name=found[0]))
-    name, module = _guarded(machine, lambda: [text.text() for text in texts])
-    machine.push(_find(machine, module, name))
-
-
-def _persistent(machine: Machine) -> None:
-    """Replace a persistent id by its value, if files of this kind define one."""
-    found = machine.pop()
-    if machine.persistent is None:
-        _refused(Phrase("noun-persistent"))(machine)
-        return
-    ask = machine.persistent
-    machine.push(_guarded(machine, lambda: ask(found)))
-
-
-def _reduce(machine: Machine) -> None:
-    arguments, function = machine.pop(), machine.pop()
-    if isinstance(function, StandIn) and function.role == "torch-bytes":
-        machine.push(_loaded_bytes(machine, function, arguments))
-        return
-    value, copied = _guarded(machine, lambda: names.call(function, arguments))
-    machine.spend(copied)
-    machine.push(value)
-
-
-def _loaded_bytes(machine: Machine, function: StandIn, arguments: object) -> object:
-    """Return the value that torch saved as bytes inside the pickle."""
-    match arguments:
-        case (Span(coding=None | "latin-1") as data,) if machine.load_bytes is not None:
-            return machine.load_bytes(machine, data)
-    found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
-    problem = Phrase("pickle-arguments", name=function.name, found=found)
-    raise machine.source.fault("F002.pickle", problem=problem)
-
-
-def _create(machine: Machine, of: object, arguments: object) -> None:
-    machine.push(_guarded(machine, lambda: names.create(of, arguments)))
-
-
-def _new(machine: Machine) -> None:
-    arguments, of = machine.pop(), machine.pop()
-    _create(machine, of, arguments)
-
-
-def _new_with_keywords(machine: Machine) -> None:
-    keywords = machine.pop()
-    if keywords != {}:
-        raise machine.fail(Phrase("pickle-keywords", found=noun(keywords)))
-    _new(machine)
-
-
-def _instance(machine: Machine) -> None:
-    of = _global_line(machine)
-    _create(machine, of, tuple(machine.pop_mark()))
-
-
-def _object(machine: Machine) -> None:
-    of, *arguments = machine.pop_mark() or [None]
-    _create(machine, of, tuple(arguments))
-
-
-def _build(machine: Machine) -> None:
-    state, target = machine.pop(), machine.top()
-    _guarded(machine, lambda: names.build(target, state))
-    if isinstance(target, Instance) and target.of.role == "joblib":
-        machine.pop()
-        machine.push(_guarded(machine, lambda: _take_array(machine, target, run)))
-
-
-# Framing.
 
 
 def _protocol(machine: Machine) -> None:
@@ -479,6 +235,105 @@ def _frame(machine: Machine) -> None:
         raise machine.cut_short(size, machine.end - machine.at)
 
 
+def _long_integer(machine: Machine) -> None:
+    size = machine.number(4, is_signed=True)
+    if not 0 <= size <= _MAX_INTEGER:
+        raise machine.fail(Phrase("pickle-long", most=_MAX_INTEGER, found=size))
+    machine.append(machine.number(size, is_signed=True))
+
+
+def _quoted(machine: Machine) -> None:
+    start, end = machine.line(None)
+    text = machine.data[start:end]
+    if text.endswith(b"\r"):
+        raise machine.damaged_line_ends()
+    if len(text) < 2 or text[:1] not in (b"'", b'"') or text[-1:] != text[:1]:
+        raise machine.misfit()
+    if b"\\" not in text:
+        machine.append(Span(machine.data, start + 1, end - 1, "latin-1"))
+        return
+    # Pairs of backslashes are matched first, so that every other backslash begins an escape.
+    if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
+        raise machine.fail(Phrase("pickle-escape"))
+    data = codecs.escape_decode(text[1:-1])[0]
+    machine.append(Span(data, 0, len(data), "latin-1"))
+
+
+def _text_line(machine: Machine) -> None:
+    start, end = machine.line(None)
+    machine.append(Span(machine.data, start, end, "raw-unicode-escape"))
+
+
+def _put_pairs(machine: Machine, values: list[object]) -> None:
+    target = machine.stack[-1]
+    if not isinstance(target, dict) or len(values) % 2:
+        raise machine.misfit()
+    target.update(zip(map(names.as_key, values[0::2]), values[1::2], strict=True))
+
+
+def _set_item(machine: Machine) -> None:
+    value = machine.stack.pop()
+    _put_pairs(machine, [machine.stack.pop(), value])
+
+
+def _dict(machine: Machine) -> None:
+    values = machine.pop_mark()
+    machine.append({})
+    _put_pairs(machine, values)
+
+
+def _stack_global(machine: Machine) -> None:
+    name, module = machine.stack.pop(), machine.stack.pop()
+    if not isinstance(name, Span) or not isinstance(module, Span):
+        raise machine.misfit()
+    if max(len(name), len(module)) > _LONGEST_NAME:
+        raise machine.misfit()
+    machine.append(machine.find_class(module.text(), name.text()))
+
+
+def _reduce(machine: Machine) -> None:
+    arguments, function = machine.stack.pop(), machine.stack.pop()
+    if isinstance(function, StandIn) and function.role == "torch-bytes":
+        machine.append(_loaded_bytes(machine, function, arguments))
+        return
+    value, copied = names.call(function, arguments)
+    machine.spend(copied)
+    machine.append(value)
+
+
+def _loaded_bytes(machine: Machine, function: StandIn, arguments: object) -> object:
+    """Return the value that torch saved as bytes inside the pickle."""
+    match arguments:
+        case (Span(coding=None | "latin-1") as data,) if machine.load_bytes is not None:
+            return machine.load_bytes(machine, data)
+    found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
+    raise InvalidValueError(Phrase("pickle-arguments", name=function.name, found=found))
+
+
+def _new(machine: Machine) -> None:
+    arguments, of = machine.stack.pop(), machine.stack.pop()
+    machine.append(names.create(of, arguments))
+
+
+def _instance(machine: Machine) -> None:
+    _USUAL[ord("c")](machine)  # the usual step accepts ASCII names only
+    of = machine.stack.pop()
+    machine.append(names.create(of, tuple(machine.pop_mark())))
+
+
+def _new_with_keywords(machine: Machine) -> None:
+    if machine.stack.pop() != {}:
+        raise machine.misfit()
+    _new(machine)
+
+
+def _build(machine: Machine) -> None:
+    state, target = machine.stack.pop(), machine.stack[-1]
+    names.build(target, state)
+    if isinstance(target, Instance) and target.of.role == "joblib":
+        machine.stack[-1] = _take_array(machine, target)
+
+
 # Arrays in joblib's pickles, whose bytes follow the wrapper that describes them.
 #
 # ::
@@ -489,7 +344,7 @@ def _frame(machine: Machine) -> None:
 # Only files since joblib 1.1 have padding. An array of objects is a separate pickle.
 
 
-def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], object]) -> object:
+def _take_array(machine: Machine, wrapper: Instance) -> object:
     """Return the array behind a wrapper, and skip its bytes."""
     state = wrapper.state or {}
     shape, dtype, order = state.get("shape"), state.get("dtype"), state.get("order")
@@ -500,7 +355,7 @@ def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], ob
     if not isinstance(order, Span) or order.raw() not in (b"C", b"F"):
         raise InvalidValueError(Phrase("joblib-wrapper", name=wrapper.of.name))
     if dtype.code.startswith("O"):
-        return _objects(machine, run)
+        return _objects(machine)
     if padding is not None:
         machine.skip(machine.number(1))
     found = dtype.dtype()
@@ -515,7 +370,7 @@ def _take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], ob
     return array
 
 
-def _objects(machine: Machine, run: Callable[[Machine], object]) -> object:
+def _objects(machine: Machine) -> object:
     inner = machine.nested(machine.data, machine.at, machine.end)
     inner.load_bytes = machine.load_bytes
     found = run(inner)
@@ -526,20 +381,12 @@ def _objects(machine: Machine, run: Callable[[Machine], object]) -> object:
     return found
 
 
-_STEPS: dict[int, _Step] = {
-    # Numbers and constants
-    ord("N"): _constant(None),
-    0x88: _constant(True),
-    0x89: _constant(False),
-    ord("I"): _decimal,
-    ord("L"): _long_decimal,
-    ord("K"): _integer(1),
-    ord("M"): _integer(2),
-    ord("J"): _integer(4, is_signed=True),
-    0x8A: _long_integer(1),
-    0x8B: _long_integer(4),
-    ord("F"): _float_text,
-    ord("G"): _float,
+_USUAL: dict[int, Callable[[Any], None]] = {**pickle._Unpickler.dispatch}
+_STEPS: dict[int, Callable[[Any], None]] = {
+    **_USUAL,
+    0x80: _protocol,
+    0x95: _frame,
+    0x8B: _long_integer,
     # Strings and bytes
     ord("S"): _quoted,
     ord("T"): _span(4, "latin-1", is_signed=True),
@@ -552,54 +399,22 @@ _STEPS: dict[int, _Step] = {
     ord("C"): _span(1),
     0x8E: _span(8),
     0x96: _span(8),  # BYTEARRAY8
-    # Containers
-    ord(")"): _constant(()),
-    0x85: _tuple(1),
-    0x86: _tuple(2),
-    0x87: _tuple(3),
-    ord("t"): lambda machine: machine.push(tuple(machine.pop_mark())),
-    ord("]"): lambda machine: machine.push([]),
-    ord("l"): lambda machine: machine.push(machine.pop_mark()),
-    ord("a"): _append,
-    ord("e"): _appends,
-    ord("}"): lambda machine: machine.push({}),
+    # Dicts, and sets, which become lists, so that no hash of an item is computed
     ord("d"): _dict,
     ord("s"): _set_item,
-    ord("u"): _set_items,
-    # Sets become lists, so that no hash of an item is computed
-    0x8F: lambda machine: machine.push([]),
-    0x90: _appends,
-    0x91: lambda machine: machine.push(machine.pop_mark()),
-    # Stack and memo
-    ord("("): Machine.mark,
-    ord("0"): Machine.drop,
-    ord("1"): lambda machine: machine.pop_mark().clear(),
-    ord("2"): lambda machine: machine.push(machine.top()),
-    ord("p"): lambda machine: machine.remember(machine.decimal(machine.word())),
-    ord("q"): lambda machine: machine.remember(machine.number(1)),
-    ord("r"): lambda machine: machine.remember(machine.number(4)),
-    0x94: lambda machine: machine.remember(len(machine.memo)),
-    ord("g"): lambda machine: machine.recall(machine.decimal(machine.word())),
-    ord("h"): lambda machine: machine.recall(machine.number(1)),
-    ord("j"): lambda machine: machine.recall(machine.number(4)),
-    # Names
-    ord("c"): _global,
+    ord("u"): lambda machine: _put_pairs(machine, machine.pop_mark()),
+    0x8F: _USUAL[ord("]")],
+    0x90: _USUAL[ord("e")],
+    0x91: _USUAL[ord("l")],
+    # Names and their uses
     0x93: _stack_global,
     ord("R"): _reduce,
     ord("b"): _build,
     ord("i"): _instance,
-    ord("o"): _object,
     0x81: _new,
     0x92: _new_with_keywords,
-    # Framing
-    0x80: _protocol,
-    0x95: _frame,
     # Opcodes that reach outside the file
-    ord("P"): _refused(Phrase("noun-persistent")),
-    ord("Q"): _persistent,
-    0x82: _refused(Phrase("noun-extension")),
-    0x83: _refused(Phrase("noun-extension")),
-    0x84: _refused(Phrase("noun-extension")),
-    0x97: _refused(Phrase("noun-buffer")),
-    0x98: _refused(Phrase("noun-buffer")),
+    ord("P"): _refused("noun-persistent"),
+    **dict.fromkeys((0x82, 0x83, 0x84), _refused("noun-extension")),
+    **dict.fromkeys((0x97, 0x98), _refused("noun-buffer")),
 }

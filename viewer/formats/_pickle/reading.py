@@ -1,15 +1,13 @@
-"""Reader of pickles with arrays and plain data, which neither unpickles nor runs code.
+"""Reader of pickles with arrays and plain data, which runs no code.
 
 ::
 
-    reading.py        this file: the pickle must be a dict of named values, or a list of such dicts
-    steps.py          the opcodes of protocols 0 to 5
-    machine.py        bytes, stack, memo and budget of the machine that executes them
-    names.py          the allowed names and their arguments
-    values.py         inert values that represent these names
-    tensors.py        tensors of torch
-    joblib_arrays.py  arrays that follow their description, as joblib writes them
-    resolving.py      conversion of values to arrays, sparse matrices and plain data, key by key
+    reading.py  this file: the pickle must be a dict of named values, or a list of such dicts, whose
+                values are converted to arrays, sparse matrices and plain data, key by key
+    machine.py  Python's unpickler with other steps; the budget; arrays of joblib
+    names.py    the allowed names and their arguments
+    values.py   inert values that represent these names
+    tensors.py  tensors of torch
 
 Arrays are views of the file's bytes. They are often unaligned, so an array that is used in a loop
 should be copied first.
