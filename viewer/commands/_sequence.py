@@ -13,7 +13,7 @@ from viewer.commands._frames import Frames, Numbering, Range, numbering_of
 from viewer.commands._pose import PoseOptions
 from viewer.data_classes import dataclass, setting
 from viewer.errors import ViewerError
-from viewer.media.video_kinds import MOST_GIF_RATE
+from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from viewer.rendering.recorder import Recording
 
 _MOST_FRAMES = 1_000_000
-_ROTATION_SECONDS = 6.0  # duration of a turntable of a still scene
 _FULL = 360.0  # full revolution, degrees
 
 
@@ -87,7 +86,7 @@ class Request:
         None, "playback speed of videos: 0.5 is half as fast, -1 backwards", metavar="S"
     )
     video_quality: float = setting(
-        75.0, "quality of .mp4 and .webm: 0 to 100 (default: {default})", given=None, metavar="Q"
+        QUALITY, "quality of .mp4 and .webm: 0 to 100 (default: {default})", given=None, metavar="Q"
     )
     kind: Literal["", "pictures", "video", "sheet", "onion"] = ""
     """A still image, one file per frame, one video file, or one image of all frames: in cells or
@@ -136,7 +135,7 @@ def recording_of(
         notes += [*more, *_overridden(pose, scene)]
     else:
         assert request.turntable is not None  # something moves: figures or the camera
-        places = np.zeros(_count((request.turntable.seconds or _ROTATION_SECONDS) * rates.drawn))
+        places = np.zeros(_count((request.turntable.seconds or TURN_SECONDS) * rates.drawn))
     if request.contact_sheet is not None:
         places = _spread(places, request.contact_sheet, moves)
         notes += _too_few("contact-sheet", len(places), request.contact_sheet)

@@ -52,7 +52,7 @@ from viewer.interrupts import deferred, hold, poll
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.options import SIZE, DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     from viewer.media.video import VideoSink
     from viewer.rendering.recorder import Recording
 
-_SIZE = "1280x720"
 _OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")  # formats without transparency
 # Sequences.
 _FIELD = re.compile(r"\{frame[:!}]")  # the frame number in the name of an image
@@ -102,7 +101,7 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--size",
         metavar="WxH",
-        help="in pixels (default: 1280x720; with --overlay, the size of the video)",
+        help=f"in pixels (default: {SIZE[0]}x{SIZE[1]}; with --overlay, the size of the video)",
     )
     group.add_argument(
         "--overlay",
@@ -139,7 +138,7 @@ class _Drawing:
 def run(arguments: argparse.Namespace) -> int:
     """Render the images, write them, and print their names."""
     _check_overlay(arguments)
-    size = parse_size(_SIZE if arguments.size is None else arguments.size)
+    size = SIZE if arguments.size is None else parse_size(arguments.size)
     output = Path(arguments.output)
     asked, view = scene_options(arguments), settings_of(ViewOptions, arguments)
     _check_suffix(asked, output)

@@ -44,7 +44,7 @@ from viewer.phrases import printable
 from viewer.progress import Cancelled
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.index_sets import prepare_scene
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.options import SIZE, DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
@@ -52,10 +52,6 @@ from viewer.rig.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-
-
-SIZE = (1280, 720)
-"""Size of the image that is rendered if no window can be opened."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 
 from viewer.errors import OutputError, ViewerError
 from viewer.media.saving import Replacement
-from viewer.media.video_kinds import MOST_GIF_RATE, VideoKind, video_kind
+from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, VideoKind, video_kind
 from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from av.video.frame import VideoFrame
 
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
-_QUALITY = 75.0
 _GIF_SAMPLES = 12  # number of frames from which the palette is chosen
 
 _HUNDREDTH = Fraction(1, 100)  # seconds, the time unit of GIF
@@ -59,7 +58,7 @@ class VideoSink:
         path: Path,
         size: tuple[int, int],
         rate: float,
-        quality: float = _QUALITY,
+        quality: float = QUALITY,
         transparent: bool = False,
     ) -> None:
         self.path, self.size, self.workers, self.n_bytes = path, size, 1, 0

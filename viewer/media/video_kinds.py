@@ -1,4 +1,4 @@
-"""Table of video formats, available without importing an encoder."""
+"""Table of video formats, and usual settings, available without importing an encoder."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ from viewer.errors import UnsupportedFormatError
 
 MOST_GIF_RATE = 50.0
 """Frames per second; browsers play delays below 2/100 s as 10/100 s."""
+
+QUALITY = 75.0
+"""Usual quality of the compression, 0 to 100."""
+
+TURN_SECONDS = 6.0
+"""Usual duration of a full revolution of the camera about a still scene."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera, facing_camera, fit
 from viewer.rendering.gpu.context import Graphics, is_software, unreadable_devices
 from viewer.rendering.gpu.target import Target, check_size
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.options import SIZE, DisplayOptions
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes, Floats
@@ -136,7 +136,7 @@ def _framing(scene: Scene, size: tuple[int, int], points: Floats) -> Camera:
 
 def render(
     scene: Scene,
-    size: tuple[int, int] = (1280, 720),
+    size: tuple[int, int] = SIZE,
     camera: Camera | None = None,
     options: DisplayOptions | None = None,
 ) -> Bytes:

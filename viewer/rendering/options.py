@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 Color = tuple[float, float, float]
 
+SIZE = (1280, 720)
+"""Usual width and height of pictures, pixels."""
+
 SHOWN = {
     "skin": "Attached skin",
     "skeleton": "Skeleton",

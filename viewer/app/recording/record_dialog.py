@@ -26,11 +26,11 @@ from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
 from viewer.formats import file_stem
-from viewer.media.video_kinds import MOST_GIF_RATE
+from viewer.media.video_kinds import MOST_GIF_RATE, QUALITY, TURN_SECONDS
 from viewer.phrases import counted
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
-from viewer.rendering.options import QUALITIES, DisplayOptions
+from viewer.rendering.options import QUALITIES, SIZE, DisplayOptions
 from viewer.rendering.recorder import Follow
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats
@@ -82,17 +82,17 @@ class RecordSettings:
     """A key of ``KINDS``."""
     size: str = "view"
     """A key of the available sizes."""
-    own_size: tuple[int, int] = (1280, 720)
+    own_size: tuple[int, int] = SIZE
     """Width and height for the size ``"own"``."""
     rate: float = 0.0
     """Frames per second; 0 for the scene's own rate."""
     turntable: bool = False
     """Whether the camera orbits once around the scene."""
-    seconds: float = 6.0
+    seconds: float = TURN_SECONDS
     """Duration of the orbit if there is no motion."""
     n_cells: int = 12
     """Number of frames in a contact sheet."""
-    quality: int = 75
+    quality: int = int(QUALITY)
     """Quality of the compression of videos, 0 to 100."""
     look: str = ""
     """Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of the
