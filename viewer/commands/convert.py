@@ -54,6 +54,9 @@ from viewer.export import (
     EXPORTERS,
     FOLDER,
     ExportOptions,
+    Part,
+    SampledParts,
+    Selection,
     export,
     exporters_at,
     files_written,
@@ -220,7 +223,6 @@ def convert_streamed(
     """
     if not _is_streamable(asked, options.kind, output):
         return None
-    from viewer.export.bvh.streaming import Parts, export_parts
     from viewer.formats.bvh.streaming import Irregular
 
     try:
@@ -231,12 +233,12 @@ def convert_streamed(
     if request is None:
         return None
     first, stop = request.span
-    options.world_up = request.up
-    moves = request.stream.may_move_inner_joints
-    animation = Parts(lambda: request.parts(options), stop - first, moves)
+    options.kind, moves = "bvh", request.stream.may_move_inner_joints
+    motion = SampledParts(lambda: request.parts(options), stop - first, moves)
+    part = Part(request.actor, None, motion, request.up)
     try:
         with shown_progress("converting"), raising():
-            notes = export_parts(animation, output, options)
+            notes = export(Selection([part]), output, options=options)
     except (Irregular, FormatError, RigError):
         return None
     except OutputError:

@@ -12,7 +12,7 @@ from types import ModuleType
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError, UnsupportedFormatError
-from viewer.export._exporter import FOLDER, Content, Exporter, Part, Selection
+from viewer.export._exporter import FOLDER, Content, Exporter, Part, SampledParts, Selection
 from viewer.export._left_out import motion_notes
 from viewer.export._motion_paths import files_at, is_together, part_files, part_paths
 from viewer.export._options import ExportOptions, VrmMeta
@@ -34,6 +34,7 @@ __all__ = [
     "ExportOptions",
     "Exporter",
     "Part",
+    "SampledParts",
     "Selection",
     "VrmMeta",
     "check_figure",
@@ -139,7 +140,7 @@ EXPORTERS = {
         (".bvh",),
         "joints and their motion",
         "mesh, weights, changes of shape",
-        _MOTION,
+        _MOTION | {"parts"},
         needs="skeleton",
         options=frozenset({"safe_names"}),
     ),
@@ -417,13 +418,13 @@ def _placed(scene: Scene, part: Part) -> Part:
 
 def _span(part: Part) -> Phrase:
     """Return the numbers of a part's frames."""
-    assert part.frames is not None  # the caller has checked it
+    assert part.frames is not None and not isinstance(part.frames, SampledParts)
     first = part.frames.first_frame
     return frame_range(first, first + len(part.present) - 1)
 
 
 def _absent_note(part: Part) -> Diagnostic:
-    if part.frames is None:
+    if part.frames is None or isinstance(part.frames, SampledParts):
         return Diagnostic("X003.absent-now", values={"figure": part.actor.name})
     return Diagnostic("X003.absent", values={"figure": part.frames.name, "frames": _span(part)})
 
@@ -434,7 +435,9 @@ def _untracked_note(plan: _Plan) -> list[Diagnostic]:
     for each, path in plan.groups:
         for part in each.parts:
             person = part.actor.person
-            if part.frames is None or person is None or is_tracked(person):
+            if part.frames is None or isinstance(part.frames, SampledParts):
+                continue
+            if person is None or is_tracked(person):
                 continue
             if plan.kind.folder:
                 names.append(person_label(person))

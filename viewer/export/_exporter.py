@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Literal, TypeAlias
 
@@ -20,9 +20,9 @@ from viewer.rig.scene import Actor, Scene
 FOLDER = "/"
 """Placeholder, among suffixes, for a folder."""
 
-Content: TypeAlias = Literal["pose", "clips", "frames", "points"]
+Content: TypeAlias = Literal["pose", "clips", "frames", "parts", "points"]
 """What a file contains of an actor: its current pose, its animations with their own keys, a motion
-as poses at a rate, or captured points at a rate."""
+as poses at a rate (in parts if it is long), or captured points at a rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +75,27 @@ class Exporter:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SampledParts:
+    """A long motion, as consecutive parts that are read while they are written."""
+
+    parts: Callable[[], Iterator[SampledAnimation]]
+    """Yields the parts; may be called repeatedly. If there are several, the figure is always
+    present, and scales and shape are the same in all frames."""
+    n_frames: int
+    """Number of all frames, N."""
+    may_move_inner_joints: bool
+    """Whether a joint with a parent may be translated in the file; several roots get a common
+    parent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Part:
     """What is written of an actor: its pose, unless animations or frames are given."""
 
     actor: Actor
     clips: Sequence[TransformClip] | None = None
     """Animations that keep their own keys; the figure is then at rest."""
-    frames: SampledAnimation | SampledPoints | None = None
+    frames: SampledAnimation | SampledPoints | SampledParts | None = None
     """A motion at a rate."""
     up: str = "y"
     """"y", "z", "-y" or "-z": up axis of the frames; negative for those that keep their world."""
@@ -91,6 +105,8 @@ class Part:
         """What the file contains of the actor."""
         if self.frames is None:
             return "pose" if self.clips is None else "clips"
+        if isinstance(self.frames, SampledParts):
+            return "parts"
         return "frames" if isinstance(self.frames, SampledAnimation) else "points"
 
     @property
@@ -101,10 +117,10 @@ class Part:
 
     @property
     def present(self) -> Bools:
-        """Whether the actor is present in each frame; in its pose, one value."""
+        """Whether the actor is present in each frame; in its pose or parts, one value."""
         if isinstance(self.frames, SampledPoints):
             return self.frames.present
-        if self.frames is None:
+        if self.frames is None or isinstance(self.frames, SampledParts):
             return np.array([self.actor.is_present])
         return self.frames.frames.present
 

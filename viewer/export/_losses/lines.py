@@ -33,64 +33,49 @@ def shape_changes(frames: Frames) -> bool:
     return bool(np.ptp(weights, axis=0).any())
 
 
-def driven_losses(
-    path: Path,
-    animation: SampledAnimation,
-    written: Side,
-    how: Skinning,
-    span: tuple[int, int],
-    shape: Floats,
-) -> list[Diagnostic]:
-    """Return a note with the largest errors of a file without a mesh, if there are any.
+class PartLosses:
+    """Largest errors of a file without a mesh, found part by part.
 
-    ``path``: the written file.
-    ``animation``: the original; missing frames are not compared.
-    ``written``: contents of the file, indexed by the animation's frames.
-    ``how``: skinning of the mesh; LBS replaces its method.
-    ``span``: half-open range of frames in the file.
-    ``shape`` (S,): shape weights of the file's skeleton.
-    """
-    rows = span[0] + np.flatnonzero(animation.frames.present[slice(*span)])
-    linear = linear_as_opened(how)
-    expected = figure_side(animation.figure, animation.frames, linear, shape)
-    found = apart(expected, written, rows, negligible(animation.figure, animation.frames, rows))
-    first = animation.first_frame
-    return apart_notes(path, animation.figure, found, first, vertices="driven-vertices")
-
-
-class JointLosses:
-    """Largest error of a file, found part by part; neither the figure nor the file has a mesh.
-
-    The result is that of ``driven_losses``.
-
-    ``how``: skinning, as for ``driven_losses``.
-    ``n_frames``: number of all frames.
+    ``how``: skinning of the mesh; LBS replaces its method. ``n_frames``: number of all frames that
+    are compared: those in which the figure is present.
     """
 
     def __init__(self, how: Skinning, n_frames: int) -> None:
         self._how, self._n_frames = linear_as_opened(how), n_frames
-        self._n_seen, self._reach = 0, 0.0
-        self._worst: Farthest | None = None
+        self._n_seen, self._n_compared, self._reach = 0, 0, 0.0
+        self._joints: Farthest | None = None
+        self._vertices: Farthest | None = None
 
     def look(self, part: SampledAnimation, written: Side, shape: Floats) -> None:
-        """Compare all frames of the next part with those in the file."""
+        """Compare the next part with the contents of the file, indexed by the part's frames.
+
+        ``shape`` (S,): shape weights of the file's skeleton.
+        """
         figure, frames = part.figure, part.frames
-        rows = np.arange(frames.n_frames)
-        expected = figure_side(figure, frames, self._how, shape)
-        found = apart(expected, written, rows, 0.0).joints
-        if found is not None and (self._worst is None or found.distance > self._worst.distance):
-            self._worst = replace(found, frame=found.frame + self._n_seen)
-        sized = rows[(rows + self._n_seen) % sampling(self._n_frames) == 0]
+        rows = np.flatnonzero(frames.present)
+        found = apart(figure_side(figure, frames, self._how, shape), written, rows, 0.0)
+        self._joints = self._farther(self._joints, found.joints)
+        self._vertices = self._farther(self._vertices, found.vertices)
+        places = np.arange(len(rows)) + self._n_compared
+        sized = rows[places % sampling(self._n_frames) == 0]
         if len(sized):
             self._reach = max(self._reach, reach_of(figure, frames_between(frames, sized)))
         self._n_seen += frames.n_frames
+        self._n_compared += len(rows)
+
+    def _farther(self, known: Farthest | None, found: Farthest | None) -> Farthest | None:
+        if found is None or (known is not None and known.distance >= found.distance):
+            return known
+        return replace(found, frame=found.frame + self._n_seen)
 
     def notes(self, path: Path, figure: Figure, first_frame: int) -> list[Diagnostic]:
-        """Return a note with the largest error, if there is one."""
-        worst = self._worst
-        if worst is not None and worst.distance <= tolerance(figure, self._reach):
-            worst = None
-        found = Apart(worst, None, self._n_seen, self._n_seen)
+        """Return a note with the largest errors, if there are any."""
+        least = tolerance(figure, self._reach)
+        joints, vertices = (
+            None if each is None or each.distance <= least else each
+            for each in (self._joints, self._vertices)
+        )
+        found = Apart(joints, vertices, self._n_compared, self._n_compared)
         return apart_notes(path, figure, found, first_frame, vertices="driven-vertices")
 
 

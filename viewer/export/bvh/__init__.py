@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
-from viewer.export._exporter import Selection
+from viewer.export._exporter import SampledParts, Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
-from viewer.export._losses.lines import driven_losses, shape_changes
+from viewer.export._losses.lines import shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, ExportOptions
-from viewer.export.bvh.angles import unrolled
-from viewer.export.bvh.body import Body, Space, body_of, rest_matrices, shape_at
-from viewer.export.bvh.reading import BvhFile, read_back
+from viewer.export.bvh.angles import Unroller
+from viewer.export.bvh.body import BLOCK, Conversion, Space, rest_matrices, shape_at
+from viewer.export.bvh.reading import FileLosses
 from viewer.export.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
-from viewer.formats import Source, all_or_none, bvh, save_bytes
+from viewer.formats import all_or_none, save_parts
+from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.hierarchy import depth_first
-from viewer.rig.motion.evaluation import Frames, rest_translations_of
+from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
@@ -36,6 +37,7 @@ from viewer.rig.units import METRES, UNIT_NAMES
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
 _MOST_DIGITS = 15
+_PART = 2048  # frames of a motion in memory that are converted together
 # End sites
 _MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
 _FEW = 4  # minimum number of vertices for measuring a joint's extent
@@ -46,7 +48,7 @@ _DEFAULT_END = 1.0  # length of such an end if the unit is unknown
 
 
 def export(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write a motion, read it back, and report the errors of its joints and of a bound skin.
+    """Write a motion part by part, read each part back, and report the errors.
 
     Offsets are those of the shape in the first present frame. The root has offset 0 and its
     position in its channels, so that readers which add offsets and readers which replace them
@@ -55,42 +57,34 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     A file contains no mesh. The reported vertex error is the distance between the figure's mesh and
     the same mesh, in the shape of the bones, skinned with the file's joints; both use LBS.
 
-    ``path``: the file; ``gaps="split"`` writes ``name-1.bvh``, ``name-2.bvh`` … if there are gaps.
-    ``options``: unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest
-    frame, digits. Returns notes: the written files, the largest errors if any, and the data that
-    the format cannot hold. Raises ``RigError`` if no frame is present, numbers are not finite, or
-    an option is unknown. Raises ``OutputError`` if a file cannot be written.
+    Parts are converted once, or twice if joints with a parent may be translated, since a file has
+    position channels only for joints that move.
+
+    Unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest frame, digits are
+    options. Raises ``RigError`` if numbers are not finite, or an option is unknown.
     """
-    animation = selection.part.animation
-    check_options(options)
-    reference = int(animation.frames.present.argmax())
-    is_split = options.closing == "split" and not animation.frames.present.all()
-    frames = filled(animation.frames, options.closing == "interpolate")
-    figure, rigged = one_root(animation.figure, frames, reference)
-    space = space_of(figure, options)
-    with np.errstate(invalid="ignore", over="ignore"):
-        body = body_of(figure, rigged, reference, options.rotation_order, space)
-    check_finite(animation, body.angles, body.positions, body.offsets)
-    writer = Writer(
-        animation, figure, body, ends_of(animation, figure, space, reference), space, options
-    )
-    spans = runs(animation.frames.present) if is_split else [(0, frames.n_frames)]
+    _check_options(options)
+    given = selection.part.frames
+    motion = given if isinstance(given, SampledParts) else _parts_of(selection.part.animation)
+    writer = _Writer(motion, options)
+    first, present = writer.first, writer.first.frames.present
+    spans = [(0, motion.n_frames)]
+    if options.closing == "split" and not present.all():
+        spans = runs(present)
     paths = split_paths(path, len(spans))
-    texts = [writer.text(*span) for span in spans]
-    lost = [
-        line
-        for file, text, span in zip(paths, texts, spans, strict=True)
-        for line in writer.losses(file, text, reference, span)
-    ]
+    n_there = [motion.n_frames if present.all() else int(present[slice(*s)].sum()) for s in spans]
+    files = [_File(writer, *each) for each in zip(paths, spans, n_there, strict=True)]
     with all_or_none(paths):
-        for file, text in zip(paths, texts, strict=True):
-            save_bytes(file, text)
-    notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
-    lost += resampling_losses(path, animation, options.skinning)
-    return notes + lost + remarks(writer, reference)
+        for file in files:
+            save_parts(file.path, file.texts(), reports=False)
+    notes = [file.summary() for file in files]
+    notes += [note for file in files for note in file.losses.notes(file.path, first.figure)]
+    if not isinstance(given, SampledParts):
+        notes += resampling_losses(path, selection.part.animation, options.skinning)
+    return notes + _remarks(writer)
 
 
-def check_options(options: ExportOptions) -> None:
+def _check_options(options: ExportOptions) -> None:
     """Raise RigError for an option that the format does not have."""
     for what, value, known in (
         ("unit", options.unit, ("", *METRES)),
@@ -106,13 +100,7 @@ def check_options(options: ExportOptions) -> None:
         raise RigError(f"digits: expected 1 to {_MOST_DIGITS}, found {options.digits}")
 
 
-def check_finite(animation: SampledAnimation, *parts: Floats) -> None:
-    """Raise RigError if a number of a file would be infinite or NaN."""
-    if not all(np.isfinite(part).all() for part in parts):
-        raise RigError(f"{animation.name}: expected finite numbers in every frame")
-
-
-def space_of(figure: Figure, options: ExportOptions) -> Space:
+def _space_of(figure: Figure, options: ExportOptions) -> Space:
     """Return the transform to the requested unit and up axis."""
     up = options.up or "y"
     factor = 1.0
@@ -128,7 +116,7 @@ def _up_rotation(start: str, end: str) -> Floats:
     return np.round(axis_rotations(0, np.asarray(np.pi / 2 if end == "z" else -np.pi / 2)))
 
 
-def one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
+def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
     """Return a figure with one root: several roots become children of a joint at the origin."""
     skeleton = figure.require_skeleton()
     if int((skeleton.parents < 0).sum()) == 1:
@@ -158,7 +146,7 @@ def one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Fr
     )
 
 
-def ends_of(
+def _ends_of(
     animation: SampledAnimation, figure: Figure, space: Space, reference: int
 ) -> dict[int, Floats]:
     """Return the End Site of each leaf joint of the written figure, in the file's space."""
@@ -175,16 +163,81 @@ def ends_of(
     return {int(leaf) + shift: end for leaf, end in zip(leaves, ends, strict=True)}
 
 
-@dataclass(frozen=True, slots=True)
-class Writer:
-    """Writer of all files of one animation."""
+def _parts_of(animation: SampledAnimation) -> SampledParts:
+    """Return a motion in memory as parts; as one if gaps, shape or mesh need all of its frames."""
+    figure, frames, count = animation.figure, animation.frames, animation.frames.n_frames
+    is_even = len(frames.shape_weights) == len(frames.scales) == 1 and frames.present.all()
+    has_more = figure.mesh is not None or figure.require_skeleton().constraints
+    if count <= _PART or has_more or not is_even or np.ptp(frames.figure_scales):
+        return SampledParts(lambda: iter([animation]), count, True)
 
-    animation: SampledAnimation
-    figure: Figure  # has a single root
-    body: Body
-    ends: dict[int, Floats]
-    space: Space
-    options: ExportOptions
+    def parts() -> Iterator[SampledAnimation]:
+        for start in range(0, count, _PART):
+            part = frames_between(frames, slice(start, start + _PART))
+            yield replace(animation, frames=part, first_frame=animation.first_frame + start)
+
+    is_inner = figure.require_skeleton().parents >= 0
+    return SampledParts(parts, count, bool(np.ptp(frames.translations[:, is_inner], axis=0).any()))
+
+
+class _Writer:
+    """The skeleton of a motion in the file's form, and the conversion of its frames."""
+
+    def __init__(self, motion: SampledParts, options: ExportOptions) -> None:
+        self.motion, self.options = motion, options
+        self.first = first = next(motion.parts())
+        self.reference = int(first.frames.present.argmax())
+        self._kept: tuple[SampledAnimation, Floats, Floats] | None = None
+        self.figure, rigged = _one_root(first.figure, self._filled(first), self.reference)
+        self.space = _space_of(self.figure, options)
+        order = options.rotation_order
+        with np.errstate(invalid="ignore", over="ignore"):
+            self._conversion = Conversion(self.figure, rigged, self.reference, order, self.space)
+            self._measure()
+        self.offsets, self.moves = self._conversion.bones()
+        self.check_finite(self.offsets)
+        self.ends = _ends_of(first, self.figure, self.space, self.reference)
+
+    def _measure(self) -> None:
+        """Convert the frames that determine which joints are translated."""
+        done = 0
+        for part in self.motion.parts():
+            with self.reporting(part, done, "finding joints that move"):
+                self.check_finite(*self.channels(part))
+            done += part.frames.n_frames
+            if not self.motion.may_move_inner_joints:
+                return
+
+    def channels(self, part: SampledAnimation) -> tuple[Floats, Floats]:
+        """Return angles and positions of a part's frames, (F, J, 3) each; the last is kept."""
+        if self._kept is None or self._kept[0] is not part:
+            frames = _one_root(part.figure, self._filled(part), self.reference)[1]
+            angles, positions = np.empty((2, *frames.rotations.shape[:2], 3))
+            for start in range(0, frames.n_frames, BLOCK):
+                report(start, frames.n_frames, "frames", "converting")
+                block = slice(start, start + BLOCK)
+                found = self._conversion.channels(frames_between(frames, block))
+                angles[block], positions[block] = found
+            self._kept = part, angles, positions
+        return self._kept[1:]
+
+    @contextmanager
+    def reporting(self, part: SampledAnimation, done: int, what: str) -> Iterator[None]:
+        """Report the progress through a long motion, instead of that within its part."""
+        if part.frames.n_frames == self.motion.n_frames:
+            yield
+            return
+        report(done, self.motion.n_frames, "frames", what)
+        with silent():
+            yield
+
+    def _filled(self, part: SampledAnimation) -> Frames:
+        return filled(part.frames, self.options.closing == "interpolate")
+
+    def check_finite(self, *numbers: Floats) -> None:
+        """Raise RigError if a number of the file would be infinite or NaN."""
+        if not all(np.isfinite(each).all() for each in numbers):
+            raise RigError(f"{self.first.name}: expected finite numbers in every frame")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -196,71 +249,92 @@ class Writer:
     def order(self) -> Ints:
         """Place of each joint of the animation's figure among the joints of the file: (J,)."""
         place = np.argsort(depth_first(self.parents)).astype(np.int32)
-        return place[-self.animation.figure.require_skeleton().n_joints :]
+        return place[-self.first.figure.require_skeleton().n_joints :]
 
     @property
     def parents(self) -> Ints:
         """Parent indices of the joints."""
         return self.figure.require_skeleton().parents
 
-    def text(self, start: int, stop: int) -> bytes:
-        """Return the file contents for a range of frames."""
-        angles = unrolled(self.body.angles[start:stop], self.options.rotation_order)
-        positions = self.body.positions[start:stop]
-        if self.options.rest_frame:
-            still = self.body.offsets[None]
-            positions = np.concatenate([still, positions])
-            angles = np.concatenate([np.zeros_like(still), angles])
-        head = self.head(len(angles))
-        digits = self.options.digits
-        frames = frame_texts(self.parents, self.body.moves, positions, angles, digits)
-        return b"".join([head, *frames])
-
-    def head(self, n_frames: int) -> bytes:
-        """Return the file contents before the frames."""
-        return head_text(
-            self.names,
-            self.parents,
-            self.body.offsets,
-            self.ends,
-            self.body.moves,
-            self.options.rotation_order,
-            self.animation.frame_rate,
-            n_frames,
-            self.options.digits,
+    def lines(self, positions: Floats, angles: Floats) -> bytes:
+        """Return the text of frames."""
+        return b"".join(
+            frame_texts(self.parents, self.moves, positions, angles, self.options.digits)
         )
 
-    def losses(
-        self, path: Path, text: bytes, reference: int, span: tuple[int, int]
-    ) -> list[Diagnostic]:
-        """Read a file's text back, and return notes about its differences from the motion."""
-        animation, how = self.animation, self.options.skinning
-        ahead = int(self.options.rest_frame) - span[0]
-        file = BvhFile(bvh.read(Source(path, text)), self.order, self.space, reference, ahead)
-        written = read_back(file, animation.figure, animation.frames, how)
-        shape = shape_at(animation.frames, reference)[0]
-        return driven_losses(path, animation, written, how, span, shape)
 
-    def summary(self, path: Path, start: int, stop: int) -> Diagnostic:
-        """Return a note about the contents of a file."""
-        is_known = self.figure.unit in METRES
+class _File:
+    """A range of frames of a motion, in one file; ``n_present``: how many of them are present."""
+
+    def __init__(self, writer: _Writer, path: Path, span: tuple[int, int], n_present: int) -> None:
+        self.path, self._writer, self._span = path, writer, span
+        self._n_frames = span[1] - span[0]
+        options, still = writer.options, writer.offsets[None]
+        self._head = head_text(
+            writer.names,
+            writer.parents,
+            writer.offsets,
+            writer.ends,
+            writer.moves,
+            options.rotation_order,
+            writer.first.frame_rate,
+            self._n_frames + options.rest_frame,
+            options.digits,
+        )
+        if options.rest_frame:
+            self._head += writer.lines(still, np.zeros_like(still))
+        self.losses = FileLosses(
+            self._head,
+            writer.order,
+            writer.space,
+            shape_at(writer.first.frames, writer.reference)[0],
+            float(writer.first.frames.figure_scales[writer.reference]),
+            options.skinning,
+            n_present,
+        )
+
+    def texts(self) -> Iterator[bytes]:
+        """Yield the text of the file; each part of it is read back and compared."""
+        writer, (start, stop) = self._writer, self._span
+        yield self._head
+        unroller, done = Unroller(writer.options.rotation_order), 0
+        for part in writer.motion.parts():
+            with writer.reporting(part, done, "converting"):
+                with np.errstate(invalid="ignore", over="ignore"):
+                    angles, positions = writer.channels(part)
+                writer.check_finite(angles, positions)
+                rows = slice(max(start - done, 0), max(stop - done, 0))
+                text = writer.lines(positions[rows], unroller.following(angles[rows]))
+                own = replace(
+                    part,
+                    frames=frames_between(part.frames, rows),
+                    first_frame=part.first_frame + rows.start,
+                )
+                self.losses.look(self.path, text, own)
+            done += part.frames.n_frames
+            yield text
+
+    def summary(self) -> Diagnostic:
+        """Return a note about the contents of the file."""
+        writer, options = self._writer, self._writer.options
+        is_known = writer.figure.unit in METRES
         values = {
-            "joints": len(self.names),
-            "rest": Phrase("rest-pose") if self.options.rest_frame else "",
-            "frames": frames_phrase(self.animation.first_frame + start, stop - start),
-            "rate": self.animation.frame_rate,
-            "unit": UNIT_NAMES[self.options.unit or _DEFAULT_UNIT]
+            "joints": len(writer.names),
+            "rest": Phrase("rest-pose") if options.rest_frame else "",
+            "frames": frames_phrase(writer.first.first_frame + self._span[0], self._n_frames),
+            "rate": writer.first.frame_rate,
+            "unit": UNIT_NAMES[options.unit or _DEFAULT_UNIT]
             if is_known
             else Phrase("figure-unit"),
-            "up": self.options.up or "y",
-            "order": self.options.rotation_order.upper(),
+            "up": options.up or "y",
+            "order": options.rotation_order.upper(),
         }
-        return Diagnostic("X001.bvh", path, values=values)
+        return Diagnostic("X001.bvh", self.path, values=values)
 
 
-def remarks(writer: Writer, reference: int) -> list[Diagnostic]:
+def _remarks(writer: _Writer) -> list[Diagnostic]:
     """Return notes about changed or omitted data."""
-    animation, figure, options = writer.animation, writer.figure, writer.options
+    animation, figure, options = writer.first, writer.figure, writer.options
     frames, notes = animation.frames, list[Diagnostic]()
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:
@@ -269,12 +343,12 @@ def remarks(writer: Writer, reference: int) -> list[Diagnostic]:
     notes += gaps_note(frames.present, animation.first_frame, options.closing)
     if figure.unit not in METRES and options.unit:
         notes.append(Diagnostic("X005.unit-unknown", values={"figure": figure.name}))
-    moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(writer.body.moves)]
+    moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(writer.moves)]
     if moving:
         values = {"n": len(moving), "names": moving}
         notes.append(Diagnostic("X005.position-channels", values=values))
     if shape_changes(frames):
-        first = reference + animation.first_frame
+        first = writer.reference + animation.first_frame
         notes.append(Diagnostic("X005.shape-changes", values={"frame": first}))
     notes += joint_scales_note(frames, animation.figure.require_skeleton(), "X003.bvh-joint-scales")
     scales = frames.figure_scales[frames.present]

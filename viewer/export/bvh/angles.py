@@ -48,12 +48,7 @@ def unrolled(angles: Floats, order: str) -> Floats:
     ``order``: order of the axes.
     Returns (N, ..., 3): radians, not limited to one revolution.
     """
-    result, unroller = np.empty_like(angles), Unroller(order)
-    # Frames are processed in blocks whose arrays fit into the processor's cache.
-    for start in range(0, len(angles), _BLOCK):
-        rows = slice(start, start + _BLOCK)
-        result[rows] = unroller.following(angles[rows])
-    return result
+    return Unroller(order).following(angles)
 
 
 class Unroller:
@@ -73,8 +68,14 @@ class Unroller:
 
     def following(self, angles: Floats) -> Floats:
         """Return the angles (N, ..., 3) of the next frames, unwrapped."""
-        if len(angles) == 0:
-            return angles.copy()
+        result = np.empty_like(angles)
+        # Frames are processed in blocks whose arrays fit into the processor's cache.
+        for start in range(0, len(angles), _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            result[rows] = self._unwrapped(angles[rows])
+        return result
+
+    def _unwrapped(self, angles: Floats) -> Floats:
         if self._first is None:
             self._first = angles[0, ..., 0].copy()
             self._last = self._chosen = angles[0]
@@ -85,13 +86,14 @@ class Unroller:
         before = np.concatenate([self._chosen[None], chosen[:-1]])
         turns = np.cumsum(_revolutions(chosen - before), axis=0)
         turns += self._turns
-        self._chosen, self._turns = chosen[-1], turns[-1]
+        # Copies: views would keep the whole motion in memory.
+        self._chosen, self._turns = chosen[-1].copy(), turns[-1]
         return chosen - _WHOLE * turns
 
     def _nearest_form(self, angles: Floats) -> Floats:
         """Switch to the other form of a rotation where it is nearer to the previous frame."""
         before = np.concatenate([self._last[None], angles[:-1]])
-        self._last = angles[-1]
+        self._last = angles[-1].copy()
         stay = np.abs(_wrapped(angles - before)).sum(axis=-1)
         # The distance to the other form is at least 2 pi - stay.
         if (stay < np.pi).all() and not self._is_other.any():
@@ -113,7 +115,7 @@ class Unroller:
         assert self._first is not None  # set by the caller
         locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
         if not locked.any():
-            self._first = angles[-1, ..., 0]
+            self._first = angles[-1, ..., 0].copy()
             return angles
         frames = np.arange(1, len(angles) + 1).reshape(-1, *[1] * (locked.ndim - 1))
         before = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)

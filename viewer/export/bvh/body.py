@@ -18,12 +18,11 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.export.bvh.angles import euler_angles
-from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import joint_worlds, world_matrices
-from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
+from viewer.rig.motion.evaluation import Frames, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 from viewer.rig.skeleton import Skeleton
 
@@ -43,20 +42,6 @@ class Space:
     """Scale factor from the figure's unit to the file's."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Body:
-    """Contents of a file: J joints in the figure's order, F frames."""
-
-    offsets: Floats
-    """(J, 3): offset at rest from the parent; for roots, from the figure's origin."""
-    angles: Floats
-    """(F, J, 3): radians, in the order of the rotation channels."""
-    positions: Floats
-    """(F, J, 3): relative to the parent, including the offset; for roots, in the file's space."""
-    moves: Bools
-    """(J,): joints whose positions differ from the offset."""
-
-
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
     """Return joint-to-figure matrices with all DOFs at 0, for given rest translations.
 
@@ -68,29 +53,13 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
     return world_matrices(skeleton, pose)
 
 
-def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
-    """Return the contents of a file for a figure's frames.
-
-    ``figure``: figure without its shape applied; the frames contain the shape weights.
-    ``frames``: frames, none of them missing.
-    ``reference``: frame that defines the shape and scale of all bones; root positions follow every
-    frame. ``order``: order of the rotation channels. ``space``: transform to the file's space.
-    """
-    conversion, count = Conversion(figure, frames, reference, order, space), frames.n_frames
-    shape = (count, figure.require_skeleton().n_joints, 3)
-    angles, positions = np.empty(shape), np.empty(shape)
-    for start in range(0, count, BLOCK):
-        report(start, count, "frames", "converting")
-        block = slice(start, min(start + BLOCK, count))
-        angles[block], positions[block] = conversion.channels(frames_between(frames, block))
-    offsets, moves = conversion.bones()
-    return Body(offsets, angles, positions, moves)
-
-
 class Conversion:
     """Conversion of a figure's frames to channels, block by block.
 
-    ``figure``, ``reference``, ``order``, ``space``: as for ``body_of``.
+    ``figure``: figure without its shape applied; the frames contain the shape weights.
+    ``frames``: the first of them at least, none missing. ``reference``: frame that defines the
+    shape and scale of all bones; root positions follow every frame. ``order``: order of the
+    rotation channels. ``space``: transform to the file's space.
     """
 
     def __init__(
@@ -110,7 +79,11 @@ class Conversion:
         self._low, self._high = np.full_like(points, np.inf), np.full_like(points, -np.inf)
 
     def channels(self, frames: Frames) -> tuple[Floats, Floats]:
-        """Return angles and positions of frames, see ``Body``: (F, J, 3), (F, J, 3)."""
+        """Return angles and positions of frames: (F, J, 3), (F, J, 3).
+
+        Angles are in the order of the rotation channels. Positions are relative to the parent,
+        including the offset; those of roots are in the file's space.
+        """
         figure, space = self._figure, self._space
         rotations = _rotations(figure, frames, space)
         angles = euler_angles(rotations, self._order)
@@ -126,7 +99,9 @@ class Conversion:
         return angles, positions
 
     def bones(self) -> tuple[Floats, Bools]:
-        """Return offsets with constant translations, and which joints move: (J, 3), (J,).
+        """Return offsets at rest with constant translations, and which joints move: (J, 3), (J,).
+
+        Offsets are relative to the parent; for roots, to the figure's origin.
 
         Both depend on all frames whose channels have been computed.
         """

@@ -12,11 +12,13 @@ skinned with LBS, with pose correctives from the file's rotations.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
+from viewer.export._losses.lines import PartLosses
 from viewer.export._losses.skinned import (
     Poses,
     Side,
@@ -26,9 +28,12 @@ from viewer.export._losses.skinned import (
     linear_as_opened,
 )
 from viewer.export.bvh.body import Space, rest_matrices
+from viewer.formats import Source, bvh
+from viewer.formats.bvh.hierarchy import read_hierarchy
+from viewer.formats.bvh.motion import table_of
+from viewer.formats.bvh.streaming import Irregular, clip_of, parsed_rows
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
@@ -37,72 +42,94 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
     world_frames,
 )
-from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.shape import joint_shifts
 from viewer.rig.skinning import Skinning
 
 Rows = NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BvhFile:
-    """A written file."""
+class FileLosses:
+    """Errors of a file that is read back while it is written.
 
-    motion: SkeletonMotion
-    """Contents, or some of the frames."""
-    order: Ints
-    """(J,): place of each of the figure's joints among the joints of the file."""
-    space: Space
-    """Transform from the figure's space to the file's."""
-    reference: int
-    """Frame that defines the shape and scale of the file's bones."""
-    ahead: int
-    """Index of the animation's first frame in this motion; negative if the motion begins later."""
-
-
-def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> Side:
-    """Return the contents of a file as poses of a figure.
-
-    ``file``: the written file.
-    ``figure``: original figure without its shape applied.
-    ``frames``: the written frames. They define the placement of the whole figure, which is applied
-      after skinning, without weights.
-    ``how``: skinning; its correctives are applied if enabled.
+    ``head``: text of the file before the frames of the motion. ``order`` (J,): place of each of the
+    figure's joints among the joints of the file. ``space``: transform from the figure's space to
+    the file's. ``still`` (S,), ``scale``: shape and scale of the file's bones. ``how``: skinning of
+    the mesh. ``n_frames``: number of all frames that are compared.
     """
-    space = file.space
-    motion = file.motion
-    clip = motion.clip
-    order = file.order
-    weights = frames.shape_weights
-    still = weights[min(file.reference, len(weights) - 1)]
-    scale = float(frames.figure_scales[file.reference])
-    rest = rest_matrices(figure, rest_translations_of(figure, still[None])[0])[:, :3, :3]
-    own = space.rest @ rest * scale
-    held = replace(frames, shape_weights=still[None])
-    body = figure_side(figure, held, linear_as_opened(how), still).body
-    bound = _bound(figure, still)
 
-    def poses(rows: Rows) -> Poses:
-        times = (rows + file.ahead) / clip.timing.frame_rate
-        read = frames_of(motion.figure, clip, times)
-        if body is None:
-            places = joint_positions(motion.figure, read)[:, order] @ space.world / space.factor
-            return bare_poses(places, frames_between(frames, rows))
-        found = world_frames(motion.figure, read)[:, order]
-        world = affine_matrices(
-            space.world.T @ found[..., :3, :3] @ own,
-            found[..., :3, 3] @ space.world / space.factor,
-        )
-        places = world[..., :3, 3].copy()
-        shifts = frames_between(frames, rows).figure_translations
-        world[..., :3, 3] -= shifts[:, None]
-        corrective_rotations = np.zeros((len(rows), 0))
-        if body.correctives is not None:
-            corrective_rotations = _corrective_rotations(figure, world / scale)
-        palette = anchored(world @ bound, np.full(len(rows), scale))
-        return Poses(places, palette, shifts, np.zeros((1, 0)), corrective_rotations)
+    def __init__(
+        self,
+        head: bytes,
+        order: Ints,
+        space: Space,
+        still: Floats,
+        scale: float,
+        how: Skinning,
+        n_frames: int,
+    ) -> None:
+        source = Source("written.bvh", head)
+        self._head, self._table = head, table_of(source, read_hierarchy(source).joints)
+        self._order, self._space, self._still, self._scale = order, space, still, scale
+        self._figure: Figure | None = None  # the joints that were read back
+        self._first_frame = 0
+        self._losses = PartLosses(how, n_frames)
+        self._how = how
 
-    return Side(body, poses)
+    def look(self, path: Path, text: bytes, part: SampledAnimation) -> None:
+        """Read a part of the text back and compare it with the frames that it was written from."""
+        try:
+            rows = parsed_rows(text, self._table.n_channels)
+            clip = clip_of(self._table, rows, part.name, part.frame_rate)
+            del rows  # as large as the text
+        except Irregular:
+            bvh.read(Source(path, self._head + text))  # raises the error, with its line
+            raise
+        if self._figure is None:
+            self._figure = bvh.skeleton_motion(self._table, clip).figure
+            self._first_frame = part.first_frame
+        written = self._side(self._figure, clip, part.figure, part.frames)
+        self._losses.look(part, written, self._still)
+
+    def notes(self, path: Path, figure: Figure) -> list[Diagnostic]:
+        """Return a note with the largest errors, if there are any."""
+        return self._losses.notes(path, figure, self._first_frame)
+
+    def _side(self, read: Figure, clip: SampledClip, figure: Figure, frames: Frames) -> Side:
+        """Return the contents of a part as poses of a figure.
+
+        ``read``, ``clip``: joints and frames that were read back. ``figure``: original figure
+        without its shape applied. ``frames``: the written frames. They
+        define the placement of the whole figure, which is applied after skinning, without weights.
+        """
+        space, scale, still, order = self._space, self._scale, self._still, self._order
+        rest = rest_matrices(figure, rest_translations_of(figure, still[None])[0])[:, :3, :3]
+        own = space.rest @ rest * scale
+        held = replace(frames, shape_weights=still[None])
+        body = figure_side(figure, held, linear_as_opened(self._how), still).body
+        bound = _bound(figure, still)
+
+        def poses(rows: Rows) -> Poses:
+            again = frames_of(read, clip, rows / clip.timing.frame_rate)
+            if body is None:
+                places = joint_positions(read, again)[:, order] @ space.world / space.factor
+                return bare_poses(places, frames_between(frames, rows))
+            found = world_frames(read, again)[:, order]
+            world = np.zeros(found.shape)
+            world[..., 3, 3] = 1.0
+            world[..., :3, 3] = found[..., :3, 3] @ space.world / space.factor
+            world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
+            places = world[..., :3, 3].copy()
+            shifts = frames_between(frames, rows).figure_translations
+            world[..., :3, 3] -= shifts[:, None]
+            corrective_rotations = np.zeros((len(rows), 0))
+            if body.correctives is not None:
+                corrective_rotations = _corrective_rotations(figure, world / scale)
+            palette = anchored(world @ bound, np.full(len(rows), scale))
+            return Poses(places, palette, shifts, np.zeros((1, 0)), corrective_rotations)
+
+        return Side(body, poses)
 
 
 def _bound(figure: Figure, weights: Floats) -> Floats:
