@@ -17,7 +17,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
-from viewer.formats._pickle.machine import Machine, run
+from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.reading import named_archive
 from viewer.formats._pickle.tensors import Storage, storage_of
 from viewer.formats._pickle.values import Span, noun
@@ -51,7 +51,7 @@ def open_torch(directory: ZipDirectory) -> Archive:
     storages = _Storages(directory.storage, f"{root}data/", members, order)
     machine = Machine(source, directory.archive.read(found[0]))
     machine.persistent = storages.find
-    whole = run(machine)
+    whole = machine.run()
     return named_archive(source, "torch", max(size, directory.storage.size), whole)
 
 
@@ -142,17 +142,17 @@ def read_stream(machine: Machine) -> object:
     Raises ``FormatError`` if the stream is damaged, or a storage is missing or does not have the
     declared size.
     """
-    if run(machine) != _NUMBER:
+    if machine.run() != _NUMBER:
         raise machine.fail(Phrase("torch-magic"))
-    if run(machine) != _PROTOCOL:
+    if machine.run() != _PROTOCOL:
         raise machine.fail(Phrase("torch-protocol", expected=_PROTOCOL))
-    system = run(machine)
+    system = machine.run()
     is_little = not isinstance(system, dict) or system.get("little_endian") is not False
     storages: dict[str, Storage] = {}
     machine.persistent = partial(_declare, storages, "<" if is_little else ">")
-    found = run(machine)
+    found = machine.run()
     machine.persistent = None
-    keys = run(machine)
+    keys = machine.run()
     for key in keys if isinstance(keys, list) else []:
         _take(machine, storages, key)
     if any(storage.load is None for storage in storages.values()):

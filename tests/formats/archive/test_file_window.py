@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.zip import FileWindow, StoredFile
-from viewer.formats._pickle.machine import Machine, run
+from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.reading import named_archive
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
@@ -57,7 +57,7 @@ def test_pickles_are_read_through_a_window(tmp_path: Path) -> None:
     found = window(joblib_file({"v": rows, "t": "text", "n": [1.5, 7]}), tmp_path)
     source = Source.open(tmp_path / "a.pkl")
     machine = Machine(source, found)
-    archive = named_archive(source, "pickle", len(found), run(machine))
+    archive = named_archive(source, "pickle", len(found), machine.run())
     assert_array_equal(archive.array("v").values(), rows)
     assert (archive.get("t"), archive.get("n")) == ("text", [1.5, 7])
 

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import bz2
-import io
 import json
 import lzma
 import re
 import zlib
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import TYPE_CHECKING, Any
 
 from viewer.formats._archive.values import Archive, Value
 from viewer.formats._archive.zip import MAX_RATIO, SMALL, Data, FileWindow
 from viewer.formats._source import Source
 from viewer.formats._text.json_places import MOST_DIGITS, deepest_place, long_number_place
 from viewer.phrases import printable
+
+if TYPE_CHECKING:
+    from viewer.formats._pickle.machine import Machine
 
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
@@ -39,44 +41,16 @@ _KINDS: dict[str, re.Pattern[bytes]] = {
 _UNSUPPORTED = {"lz4": re.compile(rb"\x04\x22\x4d\x18"), "joblib 0.9": re.compile(rb"ZF0x")}
 _LARGE = 32 << 20  # bytes up to which pickles are read as a whole
 _SHORTEST = 12  # minimum size of a compressed pickle, bytes
-_PIECE = 1 << 20  # number of bytes unpacked at a time
 _DAMAGE = (zlib.error, lzma.LZMAError, OSError, EOFError, ValueError)
 
 
-class _Unpacker(Protocol):
-    """Common interface of the decompressors of bz2 and lzma."""
-
-    @property
-    def eof(self) -> bool: ...
-    @property
-    def needs_input(self) -> bool: ...
-    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
-
-
-class _Zlib:
-    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
-
-    def __init__(self, window: int) -> None:
-        self._inner = zlib.decompressobj(window)
-
-    @property
-    def eof(self) -> bool:
-        return self._inner.eof
-
-    @property
-    def needs_input(self) -> bool:
-        return not self._inner.unconsumed_tail
-
-    def decompress(self, data: bytes, max_length: int = -1) -> bytes:
-        return self._inner.decompress(self._inner.unconsumed_tail + data, max(max_length, 0))
-
-
-_UNPACKERS: dict[str, Callable[[], _Unpacker]] = {
-    "zlib": lambda: _Zlib(zlib.MAX_WBITS),
-    "gzip": lambda: _Zlib(16 + zlib.MAX_WBITS),
+# Decompressors, whose ``decompress`` takes the data and the largest length of the result.
+_UNPACKERS: dict[str, Callable[[], Any]] = {
+    "zlib": zlib.decompressobj,
+    "gzip": partial(zlib.decompressobj, 16 + zlib.MAX_WBITS),
     "bz2": bz2.BZ2Decompressor,
-    "xz": lambda: lzma.LZMADecompressor(lzma.FORMAT_XZ),
-    "lzma": lambda: lzma.LZMADecompressor(lzma.FORMAT_ALONE),
+    "xz": partial(lzma.LZMADecompressor, lzma.FORMAT_XZ),
+    "lzma": partial(lzma.LZMADecompressor, lzma.FORMAT_ALONE),
 }
 
 
@@ -171,51 +145,48 @@ def _pickle_data(source: Source) -> Data:
 
 def _open_pickle(source: Source, data: Data) -> Archive:
     """Open a pickle, or a legacy torch file, which begins like one."""
-    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import named_archive, warn_of_rest
-    from viewer.formats._torch import MAGIC, read_bytes, read_stream
+    from viewer.formats._torch import MAGIC, read_stream
 
-    machine = Machine(source, data)
-    machine.load_bytes = read_bytes
-    whole = read_stream(machine) if data[: len(MAGIC)] == MAGIC else run(machine)
+    machine = _machine(source, data)
+    whole = read_stream(machine) if data[: len(MAGIC)] == MAGIC else machine.run()
     warn_of_rest(machine)
     return named_archive(source, "pickle", len(data), whole)
 
 
 def _open_member(source: Source, key: str, data: bytes) -> Archive | None:
     """Open the dict, or list of dicts, in an array of objects of an ``.npz``; None for others."""
-    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import nested_archive
-    from viewer.formats._torch import read_bytes
 
-    machine = Machine(source, data)
-    machine.load_bytes = read_bytes
-    return nested_archive(source, "npz", len(data), run(machine), (key,))
+    return nested_archive(source, "npz", len(data), _machine(source, data).run(), (key,))
 
 
 def _list_member(source: Source, key: str, data: bytes) -> Value:
     """Return the objects in an array of objects of an ``.npz`` as a list; None for others."""
-    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import listed
-    from viewer.formats._torch import read_bytes
 
-    machine = Machine(source, data)
-    machine.load_bytes = read_bytes
-    return listed(source, len(data), key, run(machine))
+    return listed(source, len(data), key, _machine(source, data).run())
 
 
 def _open_objects(source: Source, offset: int) -> Archive | None:
     """Open the dict, or list of dicts, in an array of objects; None for other objects."""
-    from viewer.formats._pickle.machine import Machine, run
     from viewer.formats._pickle.reading import has_names, named_archive, warn_of_rest
-    from viewer.formats._torch import read_bytes
 
     data = _pickle_data(source)
-    machine = Machine(source, data, offset)
-    machine.load_bytes = read_bytes
-    whole = run(machine)
+    machine = _machine(source, data, offset)
+    whole = machine.run()
     warn_of_rest(machine)
     return named_archive(source, "npy", len(data), whole) if has_names(whole) else None
+
+
+def _machine(source: Source, data: Data, start: int = 0) -> Machine:
+    """Return the machine for a pickle that may contain tensors as bytes."""
+    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._torch import read_bytes
+
+    machine = Machine(source, data, start)
+    machine.load_bytes = read_bytes
+    return machine
 
 
 def unpacked(source: Source) -> bytes:
@@ -229,27 +200,18 @@ def unpacked(source: Source) -> bytes:
         if kind.match(head):
             raise source.fault("F002.packed-method", method=name)
     method = next(name for name, kind in _KINDS.items() if kind.match(head))
+    data, unpacker = source.data, _UNPACKERS[method]()
+    most = min(source.max_size, max(SMALL, MAX_RATIO * len(data)))
     try:
-        return _unpacked(source, method, _UNPACKERS[method]())
+        begin = _UNPACKERS[method]().decompress(data, 20)
+        if begin and not _PICKLE_START.match(begin):
+            raise source.fault("F002.packed-kind", method=method, found=begin)
+        found = unpacker.decompress(data, most + 1)
+        if len(found) <= most and not unpacker.eof:
+            raise EOFError("truncated")
     except _DAMAGE as problem:
         reason = printable(problem, 100)
         raise source.fault("F002.packed", method=method, reason=reason) from None
-
-
-def _unpacked(source: Source, method: str, unpacker: _Unpacker) -> bytes:
-    data, result, at = source.data, io.BytesIO(), 0
-    most = min(source.max_size, max(SMALL, MAX_RATIO * len(data)))
-    while not unpacker.eof:
-        piece = b""
-        if unpacker.needs_input:
-            piece = data[at : at + _PIECE]
-            at += len(piece)
-        found = unpacker.decompress(piece, _PIECE)
-        if not piece and not found and at >= len(data):
-            raise EOFError("truncated")
-        if not result.tell() and found and not _PICKLE_START.match(found):
-            raise source.fault("F002.packed-kind", method=method, found=found[:20])
-        if result.tell() + len(found) > most:
-            raise source.fault("F002.packed-size", method=method, most=most, size=len(data))
-        result.write(found)
-    return result.getvalue()
+    if len(found) > most:
+        raise source.fault("F002.packed-size", method=method, most=most, size=len(data))
+    return bytes(found)

@@ -6,7 +6,7 @@ steps that are replaced make strings and bytes (here ranges of the file), import
 functions, build objects, put keys into dicts, or reach outside the file. No length is trusted
 before the bytes are known to exist, and a budget limits time and memory for any opcodes.
 
-``pickle.Unpickler``, in C, cannot be bounded by ``find_class``: 16 bytes with a large memo index
+``pickle.Unpickler``, in C, cannot be bounded by ``find_class``: nine bytes with a large memo index
 allocate 4 GB, and a megabyte of nested tuples as the key of a dict overflows the stack of the
 process. Besides, it reads all arrays of a file, and cannot pause before those of joblib.
 """
@@ -77,12 +77,28 @@ class Machine(pickle._Unpickler):
         self._budget = self._most
         self._step_at = 0
 
-    def begin(self) -> None:
-        """Empty the stack and the memo, for the next pickle of a file."""
+    def run(self) -> object:
+        """Execute all opcodes up to STOP, and return the remaining value.
+
+        Raises ``FormatError`` at the first opcode that is damaged or refused.
+        """
         self.memo: dict[int, object] = {}
         self.metastack: list[list[object]] = []
         self.stack = []
         self.append = self.stack.append
+        try:
+            while (code := self.next_step()) != _STOP:
+                step = _STEPS.get(code)
+                if step is None:
+                    raise self.fail(Phrase("pickle-step", found=bytes([code])))
+                step(self)
+            return self.stack.pop()
+        except UnicodeError:
+            raise self.fail(Phrase("pickle-bytes")) from None
+        except InvalidValueError as problem:
+            raise self.source.fault("F002.pickle", problem=problem.problem) from None
+        except _DAMAGE:
+            raise self.misfit() from None
 
     def next_step(self) -> int:
         """Return the next opcode, and deduct it from the budget."""
@@ -186,27 +202,6 @@ class Machine(pickle._Unpickler):
 
     def _instantiate(self, klass: object, args: list[object]) -> None:
         self.append(names.create(klass, tuple(args)))
-
-
-def run(machine: Machine) -> object:
-    """Execute all opcodes up to STOP, and return the remaining value.
-
-    Raises ``FormatError`` at the first opcode that is damaged or refused.
-    """
-    machine.begin()
-    try:
-        while (code := machine.next_step()) != _STOP:
-            step = _STEPS.get(code)
-            if step is None:
-                raise machine.fail(Phrase("pickle-step", found=bytes([code])))
-            step(machine)
-        return machine.stack.pop()
-    except UnicodeError:
-        raise machine.fail(Phrase("pickle-bytes")) from None
-    except InvalidValueError as problem:
-        raise machine.source.fault("F002.pickle", problem=problem.problem) from None
-    except _DAMAGE:
-        raise machine.misfit() from None
 
 
 _Step = Callable[[Machine], None]
@@ -373,7 +368,7 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
 def _objects(machine: Machine) -> object:
     inner = machine.nested(machine.data, machine.at, machine.end)
     inner.load_bytes = machine.load_bytes
-    found = run(inner)
+    found = inner.run()
     machine.at = inner.at
     machine.rejoin(inner)
     if not isinstance(found, Array):
