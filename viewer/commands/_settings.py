@@ -100,6 +100,11 @@ def stated(kind: type, arguments: argparse.Namespace) -> set[str]:
     }
 
 
+def destinations(kind: type, without: str = "") -> list[str]:
+    """Return the names of the fields' options among the arguments, in the order of the fields."""
+    return [_destination(each) for name, each in _options(kind).items() if name != without]
+
+
 def _options(kind: type) -> dict[str, Field[Any]]:
     """Return the fields that are options, by name."""
     return {each.name: each for each in fields(kind) if each.metadata}

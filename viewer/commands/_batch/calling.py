@@ -19,6 +19,7 @@ from viewer.commands._batch.jobs import JOBS, job_parser
 from viewer.commands._batch.planning import RETRIES, Plan, Request, plan_of
 from viewer.commands._batch.requests import request_of
 from viewer.commands._batch.results import check_results, name_in_shard, save_results
+from viewer.commands._settings import destinations
 from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
@@ -32,10 +33,7 @@ if TYPE_CHECKING:
 
 _Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
-_OWN = (
-    *("files", "output", "force", "report", "resume", "shard", "workers", "cluster", "retries"),
-    *("timeout", "limit_memory", "from_list", "table", "overview"),
-)
+_OWN = ("files", "output", "force", *destinations(Request, without="to"), "table", "overview")
 """Arguments that are parameters of ``batch``; in ``options``, they would have no effect."""
 
 
@@ -194,14 +192,8 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
     if request.to:
         arguments.to = request.to
     found, command = request_of(arguments)
-    added = {
-        name: getattr(found, name)
-        for name in (
-            *("paths", "notes", "to", "identity", "shared", "few", "keeps_folders"),
-            *("table", "overview", "usual_timeout"),
-        )
-    }
-    return command, replace(request, **added)
+    names = "workers", "cluster", "retries", "timeout", "memory", "report"
+    return command, replace(found, **{name: getattr(request, name) for name in names})
 
 
 def _check_options(parser: Parser, job: str, options: Sequence[str]) -> None:
