@@ -1,11 +1,34 @@
-"""Formatting of counts, lists and names in messages."""
+"""Formatting of counts, lists and names in messages.
+
+The functions return :class:`Shown`: text that keeps the value which it shows. So
+``values={"n": counted(n, "vertex")}`` is written as "3 vertices" in a sentence, and is 3 as data.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 _BYTES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
+_LONGEST = 1000  # maximum number of characters of a text in a message
+_NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
+NO_VALUE = object()
+"""Value of a text that is no data: a verb, a remedy."""
+
+
+class Shown(str):
+    """Text of a value in a sentence."""
+
+    value: Any
+    """The value as data, or ``NO_VALUE``."""
+
+    def __new__(cls, text: str, value: Any = NO_VALUE) -> Shown:
+        """Return the text of a value."""
+        shown = super().__new__(cls, text)
+        shown.value = value
+        return shown
 
 
 def printable(text: object, limit: int = 200) -> str:
@@ -23,27 +46,41 @@ def printable(text: object, limit: int = 200) -> str:
     return shown if len(shown) <= limit else shown[: limit - 1] + "…"
 
 
-def quoted(word: bytes | str, limit: int = 40) -> str:
+def quoted(word: bytes | str | None, limit: int = 40) -> Shown:
     r"""Return a word from a file in double quotes, on one line, truncated if it is long.
+
+    None is the end of the file.
 
     >>> quoted(b"up\x00"), quoted("left")
     ('"up\\x00"', '"left"')
     """
+    if word is None:
+        return Shown("the end of the file", word)
+    return Shown(f'"{bare(word, limit)}"', word)
+
+
+def bare(word: bytes | str, limit: int = 40) -> Shown:
+    """Return a word from a file like ``quoted``, without the quotes."""
     text = word[:200].decode("utf-8", "replace") if isinstance(word, bytes) else word
-    return f'"{printable(text, limit)}"'
+    return Shown(printable(text, limit), word)
 
 
-def rounded(value: float, digits: int = 3) -> str:
+def brief(name: str, limit: int = 60) -> Shown:
+    """Return a name in a file on one line, truncated; bytes that are no text become \ufffd."""
+    return Shown(printable(_NO_TEXT.sub("\ufffd", name[: limit + 1]), limit), name)
+
+
+def rounded(value: float, digits: int = 3) -> Shown:
     """Format a number with some digits, or all integer digits of numbers below a million.
 
     >>> rounded(0.012345), rounded(1284.0), rounded(12345.6, 5), rounded(3.2e30)
     ('0.0123', '1,284', '12346', '3.2e+30')
     """
     is_long = 10.0**digits - 0.5 <= abs(value) < 1e6
-    return format(value, ",.0f" if is_long else f".{digits}g")
+    return Shown(format(value, ",.0f" if is_long else f".{digits}g"), value)
 
 
-def file_size(count: int) -> str:
+def file_size(count: int) -> Shown:
     """Return a number of bytes as file managers show it: in powers of 1000.
 
     >>> file_size(958), file_size(1248), file_size(999_999), file_size(3_146_672)
@@ -52,10 +89,10 @@ def file_size(count: int) -> str:
     if count < 1000:
         return counted(count, "byte")
     unit = next((unit for unit, one in _BYTES.items() if count >= 0.9995 * one), "kB")
-    return f"{rounded(count / _BYTES[unit])} {unit}"
+    return Shown(f"{rounded(count / _BYTES[unit])} {unit}", count)
 
 
-def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> str:
+def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> Shown:
     """Return a count with its noun and, if given, the verb that agrees with it.
 
     ``noun``: singular noun, whose last word is changed to the plural: ``"negative weight"``.
@@ -70,24 +107,53 @@ def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None
     plural = f"{head}{space}{_PLURALS.get(last, f'{last}s')}"
     total = "" if of is None else f"of {of} "
     text = f"{count} {total}{noun if (count if of is None else of) == 1 else plural}"
-    return f"{text} {one if count == 1 else many}" if one else text
+    return Shown(f"{text} {one if count == 1 else many}" if one else text, count)
 
 
-def one_of(values: Sequence[object]) -> str:
+def agree(count: int, one: str, many: str) -> Shown:
+    """Return the word that agrees with a count: the first for 1."""
+    return Shown(one if count == 1 else many)
+
+
+def optional(pattern: str, value: Any) -> Shown:
+    """Return ``pattern.format(value)``, or nothing without a value.
+
+    >>> optional(" at {}", "row 3"), optional(" at {}", "")
+    (' at row 3', '')
+    """
+    if not value:
+        return Shown("", value)
+    text = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
+    return Shown(pattern.format(printable(text, _LONGEST)), value)
+
+
+def axes(shape: Sequence[int | str | None]) -> Shown:
+    """Return the axes of an array: ``800 x 3``; letters and None stand for any size."""
+    # Files may declare 32 axes of any size.
+    text = printable(" x ".join("any" if axis is None else str(axis) for axis in shape), 80)
+    return Shown(text or "a single", shape)
+
+
+def one_of(values: Sequence[object]) -> Shown:
     """Return alternatives joined by commas and "or".
 
     >>> one_of([9, 48, 63]), one_of([3])
     ('9, 48 or 63', '3')
     """
-    *others, last = map(str, values)
-    return f"{', '.join(others)} or {last}" if others else last
+    *others, last = map(printable, values)
+    return Shown(f"{', '.join(others)} or {last}" if others else last, values)
 
 
-def listed(names: Sequence[object], limit: int = 6) -> str:
-    """Return names on one line, at most ``limit`` of them.
+def listed(names: Sequence[object], limit: int = 6) -> Shown:
+    """Return names on one line, at most ``limit`` of them; "none" if there are none.
 
     >>> listed(["a", "b", "c"], 2)
     'a, b and 1 more'
     """
     more = f" and {len(names) - limit} more" * (len(names) > limit)
-    return ", ".join(map(str, names[:limit])) + more
+    return Shown((", ".join(map(printable, names[:limit])) + more) or "none", names)
+
+
+def all_of(names: Iterable[object]) -> Shown:
+    """Return all names on one line; "none" if there are none."""
+    return Shown(", ".join(map(printable, names)) or "none", names)

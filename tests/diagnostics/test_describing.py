@@ -8,13 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, described
+from viewer.phrases import counted
 
 
 def test_description_contains_all_data_of_a_diagnostic() -> None:
     values = {"n": np.int64(2), "joint": "hip", "weight": np.float32(-0.5), "vertex": 7}
     places = np.array([3, 7], dtype=np.int32)
     found = Diagnostic(
-        "W002.negative", Path("a.skin"), 4, "weights", places, values, count=2, is_refusal=True
+        "W002.negative: {n} (first: {weight:g} at vertex {vertex} for joint {joint})",
+        Path("a.skin"),
+        4,
+        "weights",
+        places,
+        values | {"n": counted(2, "negative weight")},
+        count=2,
+        is_refusal=True,
     )
     assert described(found) == {
         "code": "W002",
@@ -39,7 +47,7 @@ def test_values_of_every_kind_can_be_written_as_json() -> None:
     values = {
         "found": b"up\xff\n",
         "ratio": float("inf"),
-        "levels": [Phrase("resting-height", height=0.5, seconds=2.0)] * 120,
+        "levels": [Phrase("{height} for {seconds:g} s", height=0.5, seconds=2.0)] * 120,
         "problem": inner,
         "path": Path("a b"),
         "nothing": None,

@@ -118,14 +118,14 @@ def test_material_libraries_round_trip(tmp_path):
     wanted = replace(everything(), alpha_mode="blend", unlit=False, emissive=(0.0, 3.0, 1.5))
     notes = export(textured(wanted), tmp_path / "out.obj")
     (lost,) = (note for note in notes if note.key == "X003.parts")
-    assert (lost.values["format"], [part.key for part in lost.values["parts"]]) == (
+    assert (lost.values["format"], [part.sentence for part in lost.values["parts"]]) == (
         ".obj and .mtl",
         [
-            "part-occlusion",
-            "part-single-sided",
-            "part-second-uvs",
-            "part-texture-rotation",
-            "part-unfiltered",
+            "occlusion maps",
+            "single-sided surfaces",
+            "second texture coordinates",
+            "rotated or mirrored textures",
+            "unfiltered textures",
         ],
     )
     (found,) = obj.read(Source.open(tmp_path / "out.obj")).mesh.materials

@@ -19,7 +19,6 @@ from seamed import (
 )
 
 import viewer
-from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.export import export
 from viewer.rig.figure import Figure
@@ -97,7 +96,7 @@ def test_textures_are_left_out(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     notes = export(seamed_actor(mesh=mesh), tmp_path / "out.ply")
     assert [path.name for path in tmp_path.iterdir()] == ["out.ply"]
-    values = {"format": ".ply", "parts": [Phrase("part-all-materials")]}
+    values = {"format": ".ply", "parts": ["materials and textures"]}
     assert [(note.key, note.values) for note in notes[1:]] == [("X003.parts", values)]
 
 

@@ -9,7 +9,6 @@ from formats.broken_text import OBJ, PLY
 from formats.skin_text import BINDINGS
 from formats.skin_text import GOOD as SKIN
 
-from viewer.diagnostics import Phrase
 from viewer.formats import obj, ply, skin
 
 # (module, name, text, old, new, fault, part, places)
@@ -23,7 +22,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F003.number",
             3,
-            {"item": Phrase("of-vertex", section="positions", index=1), "found": b"nan"},
+            {"item": "positions of vertex 1", "found": b"nan"},
         ),
         "positions",
         [1],
@@ -37,7 +36,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F002.number",
             3,
-            {"item": Phrase("of-vertex", section="positions", index=1), "found": b"0,5"},
+            {"item": "positions of vertex 1", "found": b"0,5"},
         ),
         "positions",
         [1],
@@ -51,7 +50,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F002.width",
             3,
-            {"item": Phrase("of-vertex", section="positions", index=1), "expected": 3, "found": 2},
+            {"item": "positions of vertex 1", "expected": 3, "found": 2},
         ),
         "positions",
         [1],
@@ -103,7 +102,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "W003.number",
             12,
-            {"item": Phrase("of-vertex", section="skinweights", index=0), "found": b"nan"},
+            {"item": "skinweights of vertex 0", "found": b"nan"},
         ),
         "weights",
         [0],
@@ -181,7 +180,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F003.number",
             17,
-            {"item": Phrase("triangle", section="triangles", index=0), "found": b"inf"},
+            {"item": "triangle 0", "found": b"inf"},
         ),
         "triangles",
         [0],
@@ -202,7 +201,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         SKIN,
         "0 1 0\n  0 0 1\n  8",
         "0 -1.#IND 0\n  0 0 1\n  8",
-        ("F003.number", 28, {"item": Phrase("matrix", index=1), "found": b"-1.#IND"}),
+        ("F003.number", 28, {"item": "bindings matrix 1", "found": b"-1.#IND"}),
         "bindings",
         [1],
     ),
@@ -212,7 +211,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         SKIN,
         "8 9 10",
         "8 9",
-        ("F002.width", 26, {"item": Phrase("matrix", index=1), "expected": 12, "found": 11}),
+        ("F002.width", 26, {"item": "bindings matrix 1", "expected": 12, "found": 11}),
         "bindings",
         [1],
     ),
@@ -242,7 +241,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         OBJ,
         "v 1 0 0",
         "v 1 nan 0",
-        ("F003.number", 2, {"item": Phrase("obj-v", index=1), "found": b"nan"}),
+        ("F003.number", 2, {"item": "v of vertex 1", "found": b"nan"}),
         "positions",
         [1],
     ),
@@ -252,7 +251,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         OBJ,
         "v 1 0 0",
         "v 1 0",
-        ("F002.width", 2, {"item": Phrase("obj-v", index=1), "expected": 3, "found": 2}),
+        ("F002.width", 2, {"item": "v of vertex 1", "expected": 3, "found": 2}),
         "positions",
         [1],
     ),
@@ -262,7 +261,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         OBJ,
         "vn 0 0 1",
         "vn 0 inf 1",
-        ("F003.number", 5, {"item": Phrase("obj-vn", index=0), "found": b"inf"}),
+        ("F003.number", 5, {"item": "vn 0", "found": b"inf"}),
         "",
         [0],
     ),
@@ -304,7 +303,7 @@ MESH_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         PLY,
         "1 0 0",
         "1 nan 0",
-        ("F003.number", 11, {"item": Phrase("ply-row", element="vertex", row=1), "found": b"nan"}),
+        ("F003.number", 11, {"item": "vertex 1", "found": b"nan"}),
         "positions",
         [1],
     ),

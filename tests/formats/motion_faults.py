@@ -9,7 +9,6 @@ from formats.broken_text import ANIM
 from formats.bvh_text import GOOD as BVH
 from formats.skel_text import GOOD as SKEL
 
-from viewer.diagnostics import Phrase
 from viewer.formats import anim, bvh, skel
 
 # (module, name, text, old, new, fault, part, places)
@@ -24,7 +23,7 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
             "F003.number",
             10,
             {
-                "item": Phrase("of", item="offset", owner=Phrase("joint", name="arm")),
+                "item": "offset of joint arm",
                 "found": b"nan",
             },
         ),
@@ -41,7 +40,7 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
             "F002.width",
             10,
             {
-                "item": Phrase("of", item="offset", owner=Phrase("joint", name="arm")),
+                "item": "offset of joint arm",
                 "expected": 3,
                 "found": 2,
             },
@@ -58,7 +57,7 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F002.number",
             8,
-            {"item": Phrase("of", item="pose", owner=Phrase("joint", name="root")), "found": b"up"},
+            {"item": "pose of joint root", "found": b"up"},
         ),
         "items",
         [0],
@@ -73,7 +72,7 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
             "F003.number",
             8,
             {
-                "item": Phrase("of", item="OFFSET", owner=Phrase("joint", name="LeftUpLeg")),
+                "item": "OFFSET of joint LeftUpLeg",
                 "found": b"nan",
             },
         ),
@@ -90,12 +89,10 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
             "F003.number",
             6,
             {
-                "where": Phrase("anim-key", channel=0, index=1),
+                "where": "channel 0, key 1",
                 "found": b"nan",
                 "begins": None,
-                "item": Phrase(
-                    "anim-item", where=Phrase("anim-key", channel=0, index=1), item="value"
-                ),
+                "item": "channel 0, key 1: value",
             },
         ),
         "channels",
@@ -110,7 +107,7 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F002.anim-keys",
             4,
-            {"where": Phrase("anim-channel", channel=0), "found": 3, "begins": None, "expected": 4},
+            {"where": "channel 0", "found": 3, "begins": None, "expected": 4},
         ),
         "channels",
         [0],
@@ -124,7 +121,7 @@ MOTION_FAULTS: list[tuple[Any, str, str, str, str, Fault, str, list[int]]] = [
         (
             "F002.anim-channels",
             3,
-            {"where": Phrase("animation"), "found": 1, "begins": None, "expected": 2},
+            {"where": "animation", "found": 1, "begins": None, "expected": 2},
         ),
         "",
         [],

@@ -9,7 +9,6 @@ from faults import NAN, fault_of, warnings_of
 from formats.capture_files import waves
 from numpy.testing import assert_allclose, assert_array_equal
 
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, amass, detect, read
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
@@ -420,7 +419,7 @@ def test_invalid_soft_tissue_loses_no_frame(tmp_path):
          72, 156, 165], "found": 155})),
         ({"poses": np.zeros((0, 156))}, ("F002.motion-no-frames", None, {"item": "poses"})),
         ({"poses": np.array(["a"])}, ("F002.value", None, {"item": "poses",
-         "expected": Phrase("wanted-numbers-any"), "found": Phrase("found-texts", shape=(1,))})),
+         "expected": "an array of numbers", "found": "1 strings"})),
         ({"mocap_framerate": np.array(0.0)}, ("F002.motion-rate", None,
          {"item": "mocap_framerate", "low": 1e-06, "high": 1000000.0, "found": 0.0})),
         ({"mocap_framerate": np.array(1e-320)}, ("F002.motion-rate", None,
@@ -432,7 +431,7 @@ def test_invalid_soft_tissue_loses_no_frame(tmp_path):
         ({"mocap_framerate": np.array([30.0, 60.0])}, ("F002.motion-single", None,
          {"item": "mocap_framerate", "found": 2})),
         ({"mocap_framerate": np.array(np.nan)}, ("F003.finite", None, {"item": "mocap_framerate",
-         "found": NAN, "at": Phrase("element", indices=[0])})),
+         "found": NAN, "at": "0"})),
         ({"present": np.ones(3)}, ("F002.motion-present", None, {"item": "present", "expected": 4,
          "other": "poses", "found": 3})),
         ({"smpl_scaling": np.zeros(1)}, ("F002.motion-scale", None, {"item": "smpl_scaling",

@@ -5,7 +5,6 @@ import pytest
 from faults import Fault, refusal_of
 from formats.anim_text import GOOD, parse
 
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 
 
@@ -29,7 +28,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-word",
                 1,
                 {
-                    "where": Phrase("animation"),
+                    "where": "animation",
                     "found": b"balloon",
                     "begins": None,
                     "expected": "animation",
@@ -43,7 +42,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-tangent",
                 2,
                 {
-                    "where": Phrase("anim-key", channel=0, index=0),
+                    "where": "channel 0, key 0",
                     "found": b"steep",
                     "begins": None,
                     "rules": ("flat", "linear", "smooth"),
@@ -56,7 +55,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-mode",
                 1,
                 {
-                    "where": Phrase("anim-channel", channel=0),
+                    "where": "channel 0",
                     "found": b"jump",
                     "begins": None,
                     "modes": ("constant", "linear", "cycle", "cycle_offset", "bounce"),
@@ -69,12 +68,10 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F003.number",
                 1,
                 {
-                    "where": Phrase("anim-key", channel=0, index=0),
+                    "where": "channel 0, key 0",
                     "found": b"nan",
                     "begins": None,
-                    "item": Phrase(
-                        "anim-item", where=Phrase("anim-key", channel=0, index=0), item="value"
-                    ),
+                    "item": "channel 0, key 0: value",
                 },
             ),
         ),
@@ -84,7 +81,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-keys",
                 1,
                 {
-                    "where": Phrase("anim-channel", channel=0),
+                    "where": "channel 0",
                     "found": 2,
                     "begins": None,
                     "expected": 3,
@@ -97,12 +94,10 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-count",
                 1,
                 {
-                    "where": Phrase("anim-channel", channel=0),
+                    "where": "channel 0",
                     "found": b"2000000000",
                     "begins": None,
-                    "item": Phrase(
-                        "anim-item", where=Phrase("anim-channel", channel=0), item="keys"
-                    ),
+                    "item": "channel 0: keys",
                     "left": len(GOOD.split("keys 2")[1]),
                 },
             ),
@@ -112,7 +107,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
             (
                 "F002.anim-channels",
                 1,
-                {"where": Phrase("animation"), "found": 1, "begins": None, "expected": 2},
+                {"where": "animation", "found": 1, "begins": None, "expected": 2},
             ),
         ),
         (
@@ -121,11 +116,9 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-word",
                 1,
                 {
-                    "where": Phrase("anim-channel", channel=0),
+                    "where": "channel 0",
                     "found": None,
-                    "begins": Phrase(
-                        "anim-begins", where=Phrase("anim-channel", channel=0), line=1
-                    ),
+                    "begins": "channel 0 begins on line 1",
                     "expected": "}",
                     "looks": None,
                 },
@@ -137,11 +130,9 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-tangent",
                 2,
                 {
-                    "where": Phrase("anim-key", channel=0, index=1),
+                    "where": "channel 0, key 1",
                     "found": None,
-                    "begins": Phrase(
-                        "anim-begins", where=Phrase("anim-channel", channel=0), line=2
-                    ),
+                    "begins": "channel 0 begins on line 2",
                     "rules": ("flat", "linear", "smooth"),
                 },
             ),
@@ -151,7 +142,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
             (
                 "F002.anim-keys-again",
                 1,
-                {"where": Phrase("anim-channel", channel=0), "found": b"keys", "begins": None},
+                {"where": "channel 0", "found": b"keys", "begins": None},
             ),
         ),
         (
@@ -159,7 +150,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
             (
                 "F002.anim-item",
                 1,
-                {"where": Phrase("animation"), "found": b"chanel", "begins": None},
+                {"where": "animation", "found": b"chanel", "begins": None},
             ),
         ),
         (
@@ -168,10 +159,10 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-count",
                 1,
                 {
-                    "where": Phrase("animation"),
+                    "where": "animation",
                     "found": b"-1",
                     "begins": None,
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="numchannels"),
+                    "item": "animation: numchannels",
                     "left": len(GOOD.split("numchannels 1")[1]),
                 },
             ),
@@ -182,10 +173,10 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-count",
                 1,
                 {
-                    "where": Phrase("animation"),
+                    "where": "animation",
                     "found": b"1.5",
                     "begins": None,
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="numchannels"),
+                    "item": "animation: numchannels",
                     "left": len(GOOD.split("numchannels 1")[1]),
                 },
             ),
@@ -196,10 +187,10 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.number",
                 1,
                 {
-                    "where": Phrase("animation"),
+                    "where": "animation",
                     "found": b"up",
                     "begins": None,
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="range"),
+                    "item": "animation: range",
                 },
             ),
         ),
@@ -210,7 +201,7 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-channel-item",
                 1,
                 {
-                    "where": Phrase("anim-channel", channel=0),
+                    "where": "channel 0",
                     "found": b"extrapolates",
                     "begins": None,
                 },
@@ -222,16 +213,16 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
                 "F002.anim-end",
                 2,
                 {
-                    "where": Phrase("animation"),
+                    "where": "animation",
                     "found": None,
-                    "begins": Phrase("anim-begins", where=Phrase("animation"), line=1),
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="range"),
+                    "begins": "animation begins on line 1",
+                    "item": "animation: range",
                 },
             ),
         ),
         (
             GOOD.replace("numchannels 1 ", ""),
-            ("F002.anim-no-count", 1, {"where": Phrase("animation"), "found": 1, "begins": None}),
+            ("F002.anim-no-count", 1, {"where": "animation", "found": 1, "begins": None}),
         ),
     ],
 )

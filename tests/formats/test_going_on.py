@@ -59,7 +59,10 @@ def test_invalid_normals_are_computed() -> None:
 
 def test_several_errors_of_one_block_are_reported_once_per_code() -> None:
     text = SKIN.replace("0 0 0\n  2 0 0", "nan inf 0\n  up 0 0")
-    first, second = (Phrase("of-vertex", section="positions", index=vertex) for vertex in (0, 1))
+    first, second = (
+        Phrase("{section} of vertex {index}", section="positions", index=vertex)
+        for vertex in (0, 1)
+    )
     assert [fault[0::2] for fault in gone_on(skin, text, "a.skin")[1]] == [
         (("F003.number", 2, {"item": first, "found": b"nan"}), "positions"),
         (("F002.number", 3, {"item": second, "found": b"up"}), "positions"),

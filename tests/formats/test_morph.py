@@ -3,7 +3,6 @@
 import pytest
 from faults import refusal_of, warnings_of
 
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
 from viewer.rig.morph_target import MorphTarget
@@ -74,7 +73,7 @@ def test_empty_target_is_reported_as_a_warning():
             (
                 "F002.number",
                 3,
-                {"item": Phrase("entry", section="positions", index=1), "found": b"up"},
+                {"item": "positions, entry 1", "found": b"up"},
             ),
         ),
         (
@@ -82,7 +81,7 @@ def test_empty_target_is_reported_as_a_warning():
             (
                 "F003.number",
                 3,
-                {"item": Phrase("entry", section="positions", index=1), "found": b"nan"},
+                {"item": "positions, entry 1", "found": b"nan"},
             ),
         ),
         (
@@ -122,7 +121,7 @@ def test_empty_target_is_reported_as_a_warning():
             (
                 "F002.width",
                 2,
-                {"item": Phrase("entry", section="positions", index=0), "expected": 4, "found": 3},
+                {"item": "positions, entry 0", "expected": 4, "found": 3},
             ),
         ),
         (

@@ -10,7 +10,6 @@ from formats.skin_text import BINDINGS, NORMALS, POSITIONS, TRIANGLES, WEIGHTS
 from PIL import Image
 
 import viewer
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, read, referenced_path
 from viewer.formats.rig import NamedFiles
@@ -107,7 +106,11 @@ def test_texture_outside_the_folder_is_not_read(folder, kind, name):
     source = Source.open(path)
     (material,) = read(source).mesh.materials
     assert (material.texture, material.image) == (name, None)
-    reason = Phrase("absolute-path") if name.startswith("/") else Phrase("outside-folder")
+    reason = (
+        "is an absolute path: not read"
+        if name.startswith("/")
+        else "is outside the folder: not read"
+    )
     (warning,) = source.diagnostics
     fault = ("F005.texture-refused", line, {"name": name, "reason": reason})
     assert (warning.path, fault_of(warning)) == (named, fault)
@@ -119,7 +122,7 @@ def test_absolute_path_is_reported_even_within_the_folder(folder, kind):
     source = Source.open(path)
     assert read(source).mesh.materials[0].image is None
     (warning,) = source.diagnostics
-    values = {"name": f"{folder}/in.png", "reason": Phrase("absolute-path")}
+    values = {"name": f"{folder}/in.png", "reason": "is an absolute path: not read"}
     assert (warning.path, fault_of(warning)) == (named, ("F005.texture-refused", line, values))
 
 

@@ -14,7 +14,6 @@ from formats.round_trips import (
     skeleton,
 )
 
-from viewer.diagnostics import Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats import Source, skel, skin, write
 from viewer.rig.figure import Figure
@@ -294,8 +293,12 @@ def test_properties_of_materials_that_skin_omits_are_reported(tmp_path):
     more = {"other_uvs": (np.ones((3, 2)),), "colors": np.ones((3, 4)), "parts": ("hat",)}
     shape = replace(figure.mesh, materials=(tinted,), **more)
     (note,) = write(Figure("a", shape), tmp_path / "a.skin")
-    names = "part-materials", "part-second-uvs", "part-vertex-colors", "part-mesh-parts"
-    parts = [Phrase(name) for name in names]
+    parts = [
+        "material properties except one texture each",
+        "second texture coordinates",
+        "vertex colours",
+        "names of its parts",
+    ]
     assert (note.key, note.values) == ("X003.parts", {"format": ".skin", "parts": parts})
 
 

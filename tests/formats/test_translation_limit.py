@@ -10,6 +10,7 @@ from viewer.errors import FormatError
 from viewer.formats import Source, amass, anim
 from viewer.formats import bvh as bvh_reader
 from viewer.formats._translation_limit import is_beyond
+from viewer.phrases import rounded
 
 TOO_FAR = [2e9, -1e20, 1e38]
 
@@ -63,7 +64,9 @@ def test_far_person_is_a_gap(tmp_path, far):
     folder = write_frames(tmp_path / "smpl", {0: bad, 1: good, 2: bad, 3: good})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [1, 3]
-    problem = Phrase("beyond-limit", limit=1e9, found=far)
+    problem = Phrase(
+        "expected numbers within ±{limit}, found {found:g}", limit=rounded(1e9, 2), found=far
+    )
     fault = ("F003.record", None, {"item": "person 0: Th", "problem": problem})
     warnings = [found for part in parts for found in part.warnings]
     assert [(found.path, *fault_of(found)) for found in warnings] == [
@@ -95,7 +98,7 @@ Frame Time: 0.1
 def test_far_position_is_refused_with_its_line(tmp_path, far):
     path = tmp_path / "a.bvh"
     path.write_text(BVH.format(offset=0, far=far))
-    item = Phrase("bvh-position", frame=1, axis="Z", joint="hip")
+    item = "frame 1: Zposition of joint hip"
     values = {"item": item, "most": 1e9, "found": pytest.approx(far)}
     error = refusal(bvh_reader.read, path)
     assert fault_of(error.diagnostic) == ("F003.beyond", 15, values)

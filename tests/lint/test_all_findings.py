@@ -10,7 +10,6 @@ from faults import told
 from formats import bvh_text, skel_text, skin_text, synthetic_smpl
 from lint.sound import column
 
-from viewer.diagnostics.diagnostic import Phrase
 from viewer.formats import write
 from viewer.lint import Finding, lint_files
 from viewer.rig.figure import Figure
@@ -78,7 +77,7 @@ def test_findings_of_one_code_have_a_count_and_locations(tmp_path: Path) -> None
     for vertex in (3, 8, 9):
         lines[positions + vertex] = "inf 1 nan"
     found = next(f for f in linted(tmp_path, lines) if f.code == "F003")
-    item = Phrase("of-vertex", section="positions", index=3)
+    item = "positions of vertex 3"
     assert told([found.diagnostic]) == [("F003.number", {"item": item, "found": b"inf"})]
     assert found.diagnostic.count == 6
     assert found.vertices.tolist() == [3, 8, 9] and found.line == positions + 4

@@ -11,7 +11,6 @@ from lint.sound import column, legs, scene_of, standing
 from rig.animated import channel, clip_of, leg
 
 from viewer.app.core.clock import Clock
-from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
@@ -85,9 +84,7 @@ def test_curves_beyond_limits_report_frame_and_degrees() -> None:
     scene = scene_of(figure, Clip("keys", (channel,), 0.0, 1.0))
     (found,) = [f for f in lint_scene(scene) if f.code == "C006"]
     # The value is 4 radians at the end, with a limit of 3.
-    when = Phrase("in-frame", frame=30, time=1.0)
-    ends = {"low": "-171.9°", "high": "171.9°"}
-    dof = Phrase("beyond-limits", dof="knee.y", value="229.2°", when=when, **ends)
+    dof = "knee.y is 229.2° in frame 30 at 1.000 s; its limits are -171.9° and 171.9°"
     assert told([found.diagnostic]) == [("C006.curves", {"n": 1, "dof": dof})]
     assert found.seek == pytest.approx(1.0)
 

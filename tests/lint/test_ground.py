@@ -10,7 +10,6 @@ import pytest
 from faults import told
 from lint.sound import FRAMES, RATE, legs, scene_of, standing
 
-from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.feet.ground import Ground, ground_of
 from viewer.rig.motion.timing import Timing
@@ -55,10 +54,7 @@ def test_sinking_for_half_of_the_motion_elsewhere_is_ambiguous(depth: float) -> 
     (note,) = found(np.where(_K >= 30, -depth, 0.0), 0.8)
     # The ankles of the legs are 0.1 above the floor of the root.
     assert (note.code, note.severity) == ("C013", "note")
-    levels = [
-        Phrase("resting-height", height=pytest.approx(height), seconds=1.0)
-        for height in (0.9, 0.9 - depth)
-    ]
+    levels = [f"{height:.3g} for 1 s" for height in (0.9, 0.9 - depth)]
     assert told([note.diagnostic]) == [("C013.heights", {"n": 2, "levels": levels})]
 
 

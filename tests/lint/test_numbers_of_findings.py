@@ -17,7 +17,6 @@ from lint.sound import (
     scene_of,
 )
 
-from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import lint_scene
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -51,11 +50,10 @@ def test_mesh_and_gap_findings_have_the_expected_values() -> None:
     assert values["M006.edges"] == {"n": 1, "most": 3, "vertex": 0, "other": 1}
     assert (values["M005.edges"]["n"], values["M005.edges"]["vertex"]) == (3, 0)
     assert values["M009.normals"] == {"n": 1, "all": 20, "vertex": 3}
-    gaps = [Phrase("frame-range", first=110, last=112), Phrase("one-frame", frame=130)]
+    gaps = ["frames 110 to 112", "frame 130"]
     assert values["C005.gaps"] == {"n": 4, "all": 60, "n_gaps": 2, "gaps": gaps}
     # The values are 4 and 3 radians.
-    ends = {"low": "-171.9°", "high": "171.9°"}
-    dof = Phrase("beyond-limits", dof="knee.y", value="229.2°", when="", **ends)
+    dof = "knee.y is 229.2°; its limits are -171.9° and 171.9°"
     assert values["S004.pose"] == {"n": 1, "dof": dof}
 
 
@@ -82,7 +80,7 @@ def test_long_absences_are_counted_as_absences() -> None:
     rows[20:] = rows[5] = rows[6] = -1
     timing = Timing(RATE, rows, first_frame=100, holds=False)
     (gap,) = lint_scene(moving(lambda root, turns: None, timing))
-    gaps = [Phrase("frame-range", first=105, last=106)]
+    gaps = ["frames 105 to 106"]
     values = {"n": 2, "all": 20, "n_gaps": 1, "gaps": gaps}
     assert told([gap.diagnostic]) == [("C005.gaps", values)]
 
@@ -117,8 +115,11 @@ def test_influence_limit_error_is_the_vertex_displacement() -> None:
     (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
     # With all influences the displacement is 0.05 of 2 m. The limit drops e, an error of 100 mm in
     # the current pose and 0 at rest.
-    costs = {"limit": 4, "most": "100 mm", "vertex": 8, "mean": "100 mm", "poses": 6}
-    values = {"n": 1, "most": 5, "cost": Phrase("cut-cost", **costs, left_out="")}
+    cost = (
+        "pruning to 4 moves the mesh by up to 100 mm (vertex 8), 100 mm on average over these "
+        "vertices, in 6 poses"
+    )
+    values = {"n": 1, "most": 5, "cost": cost}
     assert told([found.diagnostic]) == [("W007.influences", values)]
 
 

@@ -10,7 +10,6 @@ import pytest
 from faults import told
 from formats import bvh_text, capture_files, pig_text, skel_text, skin_text, synthetic_smpl
 
-from viewer.diagnostics.diagnostic import Phrase
 from viewer.lint import CODES, Finding, LintOptions, lint_files
 
 STILL = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
@@ -222,7 +221,7 @@ def test_gaps_and_low_confidence_in_captures_are_found(tmp_path: Path) -> None:
     found = lint_files([folder], LintOptions(confidence=0.7))[1]
     (gap,) = [f for f in found if f.code == "C005"]
     assert gap.frames.tolist() == [7, 8]
-    gaps = [Phrase("frame-range", first=7, last=8)]
+    gaps = ["frames 7 to 8"]
     values = {"n": 2, "all": 20, "n_gaps": 1, "gaps": gaps}
     assert told([gap.diagnostic]) == [("C005.gaps", values)]
     # The confidence of all 25 points in all 18 frames is 0.7 + 0.5 * waves.

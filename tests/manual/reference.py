@@ -10,17 +10,15 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from string import Formatter
 
 import viewer
 from viewer.app.features import KEYS, MOUSE
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
-from viewer.diagnostics import CODES, MESSAGES
+from viewer.diagnostics import CODES
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
 from viewer.media.video_kinds import VIDEOS
-from viewer.phrases import counted
 from viewer.rendering.gpu.program import SHADING
 from viewer.rig.scalars import SCALARS
 from viewer.rig.skinning import METHODS
@@ -50,53 +48,8 @@ def mouse() -> str:
 
 
 def codes() -> str:
-    rows = [
-        (name, code.severity, code.title, template(code.remedy)) for name, code in CODES.items()
-    ]
+    rows = [(name, code.severity, code.title, code.hint) for name, code in CODES.items()]
     return table(("code", "severity", "finding", "remedy"), rows)
-
-
-def messages() -> str:
-    """Return a table of the templates of each code, with value names in braces."""
-    rows = [(f"`{key}`", code_span(template(text))) for key, text in sorted_messages()]
-    return table(("key", "message"), rows)
-
-
-def code_span(text: str) -> str:
-    """Return text as Markdown code, which may itself contain backticks."""
-    return f"`` {text} ``" if "`" in text else f"`{text}`"
-
-
-def sorted_messages() -> list[tuple[str, str]]:
-    """Return keys and templates in the order of the codes, then by name."""
-    place = {code: index for index, code in enumerate(CODES)}
-    return sorted(MESSAGES.items(), key=lambda item: (place[item[0].partition(".")[0]], item[0]))
-
-
-def template(text: str) -> str:
-    """Return a message as users see it, with each value as its name in braces."""
-    shown = ""
-    for literal, name, spec, _ in Formatter().parse(text):
-        shown += literal
-        if name is None:
-            continue
-        kind, rest = (spec or "")[:1], (spec or "")[1:]
-        value = f"{{{name}}}"
-        if kind == "#":
-            noun, _, many = rest.partition("|")
-            noun, _, total = noun.partition("/")
-            total = total and f" of {total}"
-            verb = many.rpartition("|")[2]
-            shown += " ".join(
-                filter(None, (value + total, counted(2, noun).removeprefix("2 "), verb))
-            )
-        elif kind == "?":
-            shown += rest.partition("|")[2]
-        elif kind == "+" and "{}" in rest:
-            shown += f"[{rest.replace('{}', value)}]"
-        else:
-            shown += value
-    return shown
 
 
 def readers() -> str:
@@ -203,7 +156,6 @@ TABLES = {
     "codes": codes,
     "commands": commands,
     "keys": keys,
-    "messages": messages,
     "methods": methods,
     "mouse": mouse,
     "options": options,

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.autorig.transfer.joint_transfer import outside
 from viewer.diagnostics import Diagnostic
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
@@ -66,14 +67,45 @@ def check_lines(
         assert skeleton is not None  # only joints of a skeleton are listed
         names = [joint_label(skeleton, joint) for joint in out]
         joints = np.array(out, dtype=np.int32)
-        lines.append(Diagnostic("R009.joints", None, None, "joints", joints, {"names": names}))
+        lines.append(
+            Diagnostic(
+                "R009.joints: joints outside the mesh: {names}",
+                None,
+                None,
+                "joints",
+                joints,
+                {"names": listed(names, 8)},
+            )
+        )
     vertices = np.flatnonzero(guarded).astype(np.int32)
     if len(vertices):
-        values = {"n": len(vertices), "vertices": vertices.tolist()}
-        lines.append(Diagnostic("R010.vertices", None, None, "positions", vertices, values))
-    lines.append(Diagnostic("R011.residual", values={"residual": residual}))
+        values = {"n": counted(len(vertices), "vertex"), "vertices": listed(vertices.tolist(), 8)}
+        lines.append(
+            Diagnostic(
+                "R010.vertices: {n} bent too far for exact inverse skinning, so smoothed: "
+                "{vertices}",
+                None,
+                None,
+                "positions",
+                vertices,
+                values,
+            )
+        )
+    lines.append(
+        Diagnostic(
+            "R011.residual: after posing, the mesh differs from the target by at most "
+            "{residual:.3%} of its size",
+            values={"residual": residual},
+        )
+    )
     if residual > _EXACT and not len(vertices):
-        lines.append(Diagnostic("R012.residual", values={"limit": _EXACT}))
+        lines.append(
+            Diagnostic(
+                "R012.residual: after posing, the mesh differs from the target by more than "
+                "{limit:.2%} of its size",
+                values={"limit": _EXACT},
+            )
+        )
     return lines
 
 

@@ -31,6 +31,7 @@ from viewer.autorig.weights.result import WeightTransfer
 from viewer.autorig.weights.weight_transfer import transferred_weights
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.phrases import counted, listed
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
@@ -149,7 +150,7 @@ def _transferred_skeleton(
     joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
     if how.joints == "alignment":
         rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
-        return rest, None, [Diagnostic("R008.aligned")]
+        return rest, None, [Diagnostic("R008.aligned: joints: aligned with the template")]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(aligned, mesh.triangles)
     ways, matched = surface_shifts(aligned, normals, target.positions, target.triangles, reach)
@@ -172,11 +173,24 @@ def _transferred_skeleton(
     values = {
         "n": int(found.transferred.sum()),
         "all": skeleton.n_joints,
-        "by": Phrase("by-joint-regressor" if regressor else "by-boundaries"),
-        "missed": Phrase("joints-missed", names=labels) if labels else "",
-        "without": Phrase("joints-without-boundary", n=without) if without else "",
+        "by": Phrase("the joint regressor" if regressor else "the boundaries of their regions"),
+        "missed": Phrase("; too few target vertices around {names}", names=listed(labels, 8))
+        if labels
+        else "",
+        "without": Phrase("; {n} without such a boundary moved with their parents", n=without)
+        if without
+        else "",
     }
-    return rest, found.transferred, [Diagnostic("R008.transferred", values=values)]
+    return (
+        rest,
+        found.transferred,
+        [
+            Diagnostic(
+                "R008.transferred: joints: {n} of {all} transferred using {by}{missed}{without}",
+                values=values,
+            )
+        ],
+    )
 
 
 def _at_rest(
@@ -232,12 +246,23 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[D
     lines = []
     n_reversed = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if n_reversed:
-        lines.append(Diagnostic("R014.wound", values={"n": n_reversed}))
+        lines.append(
+            Diagnostic(
+                "R014.wound: {n} wound inside out: reversed in the result",
+                values={"n": counted(n_reversed, "triangle")},
+            )
+        )
     if template.unit in UNIT_NAMES:
         lines.append(
-            Diagnostic("R014.unit", values={"unit": UNIT_NAMES[figure.unit]})
+            Diagnostic(
+                "R014.unit: unit estimated from the size: {unit}",
+                values={"unit": UNIT_NAMES[figure.unit]},
+            )
             if figure.unit in UNIT_NAMES
-            else Diagnostic("R014.unit-unknown")
+            else Diagnostic(
+                "R014.unit-unknown: unit unknown, because the target is much larger or smaller "
+                "than the template"
+            )
         )
     return lines
 
@@ -246,9 +271,19 @@ def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> l
     """Return messages about template data that is missing in the new figure."""
     lines = []
     if template.blend_shapes is not None:
-        lines.append(Diagnostic("R013.shapes", values={"n": template.n_shapes}))
+        lines.append(
+            Diagnostic(
+                "R013.shapes: {n} of the template not transferred",
+                values={"n": counted(template.n_shapes, "blend shape")},
+            )
+        )
     if template.correctives is not None and figure.correctives is None:
-        key = "R013.correctives-too-large" if how.correctives else "R013.correctives"
+        key = (
+            "R013.correctives-too-large: pose correctives of the template omitted: too large "
+            "for this many vertices"
+            if how.correctives
+            else "R013.correctives: pose correctives of the template omitted"
+        )
         lines.append(Diagnostic(key))
     return lines
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from viewer.autorig.transfer.inverse_skinning import invert_skinning
 from viewer.autorig.weights.weight_transfer import nearest_weights
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import rounded
 from viewer.progress import report_fraction
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -49,16 +51,24 @@ def nearest(template: Figure, pose: Pose, target: Mesh, name: str) -> Rigged:
     back = np.asarray(np.linalg.inv(box), dtype=np.float64)
     residual = residual_of(figure, pose, back, target)
     out = newly_outside(template, pose, posed, replace(target, positions=aligned))
-    factors = dict(zip("xyz", np.diag(box)[:3].tolist(), strict=True))
+    scales = map(partial(rounded, digits=4), np.diag(box)[:3].tolist())
+    factors = dict(zip("xyz", scales, strict=True))
     matched = {
         "n": int(weights.matched.sum()),
         "all": len(weights.matched),
         "ratio": float(weights.matched.mean()),
     }
     lines = (
-        Diagnostic("R001.boxes", values=factors),
-        Diagnostic("R005.all-nearest", values=matched),
-        Diagnostic("R008.copied"),
+        Diagnostic(
+            "R001.boxes: alignment: bounding boxes; target scaled along x, y, z by {x}, {y}, {z}",
+            values=factors,
+        ),
+        Diagnostic(
+            "R005.all-nearest: matched {n} of {all} vertices ({ratio:.1%}); all take the "
+            "weights of the nearest vertex",
+            values=matched,
+        ),
+        Diagnostic("R008.copied: joints: copied from the template"),
         *check_lines(figure, found.guarded, out, residual),
     )
     return Rigged(

@@ -22,12 +22,13 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES, Source
 from viewer.formats._archive.zip import DAMAGE, MAX_RATIO, SMALL, StoredFile
 from viewer.media.unfinished import new_prefix
-from viewer.phrases import printable
+from viewer.phrases import counted, listed, printable
+from viewer.phrases import listed as listed_text
 
 _DEEPEST = 3  # maximum number of levels of nested archives
 _COMPANIONS = {  # suffixes of files that models refer to
@@ -52,12 +53,13 @@ _QUOTED = re.compile(r"""'.*'|".*\"""", re.DOTALL)  # names in messages
 
 # Parts of the messages of zipfile and zlib, and what they mean.
 _REASONS = {
-    "not a zip file": "zip-end",
-    "truncated": "zip-short",
-    "crc": "zip-checksum",
-    "magic number": "zip-header",
-    "differ": "zip-header",
-    "overlap": "zip-overlap",
+    "not a zip file": "its table of contents at the end is missing: incomplete, or not a zip "
+    "archive",
+    "truncated": "its data ends too early",
+    "crc": "a file in it differs from its checksum",
+    "magic number": wording.ZIP_HEADER,
+    "differ": wording.ZIP_HEADER,
+    "overlap": "files in it overlap",
 }
 
 
@@ -98,7 +100,13 @@ def opened(
         path /= inner
     elif path.exists() and _suffix_of(path.name) != ".zip":
         values = {"suffix": path.suffix or "different"}
-        raise FormatError(Diagnostic("F002.submission-kind", path, values=values))
+        raise FormatError(
+            Diagnostic(
+                "F002.submission-kind: expected a folder or a zip archive, found a {suffix} file",
+                path,
+                values=values,
+            )
+        )
     place = _existing(temporary) or Path(tempfile.gettempdir())
     prefix = new_prefix(place, "viewer-submission")
     with tempfile.TemporaryDirectory(prefix=prefix, dir=place) as name:
@@ -118,7 +126,7 @@ def _names_in(folder: Path) -> list[str]:
 
     def fail(problem: OSError) -> None:
         values = {"reason": problem.strerror or str(problem)}
-        raise FormatError(Diagnostic("F001.submission", folder, values=values))
+        raise FormatError(Diagnostic("F001.submission: {reason}", folder, values=values))
 
     for place, folders, files in os.walk(folder, onerror=fail):
         inside = Path(place).relative_to(folder)
@@ -150,7 +158,13 @@ def _unpack(
             chosen = choose([*archive.members], expected, alike, shown)
             archive.unpack(_needed(archive, chosen), base)
             return chosen, base
-    raise FormatError(Diagnostic("F002.submission-nested", shown, values={"depth": _DEEPEST}))
+    raise FormatError(
+        Diagnostic(
+            "F002.submission-nested: expected files to compare, found archives nested {depth} deep",
+            shown,
+            values={"depth": _DEEPEST},
+        )
+    )
 
 
 def _lone_archive(names: Sequence[str]) -> str | None:
@@ -271,10 +285,19 @@ def choose(
     for pattern, count in Counter(expected or alike).items():
         matching = _nearest([name for name in names if _matches(name, pattern)])
         if len(matching) != count:
-            key = "several" if len(matching) > count else "missing"
-            listed = matching or _offered(names)
-            values = {"expected": count, "pattern": pattern, "names": listed}
-            raise FormatError(Diagnostic(f"F002.submission-{key}", path, values=values))
+            key = "F002.submission-missing: expected {expected} matching {pattern}, found {names}"
+            if len(matching) > count:
+                key = (
+                    "F002.submission-several: expected {expected} matching {pattern}, found "
+                    "{names}; "
+                    "--expect names the files to use"
+                )
+            values = {
+                "expected": counted(count, "file"),
+                "pattern": pattern,
+                "names": listed(matching or _offered(names)),
+            }
+            raise FormatError(Diagnostic(key, path, values=values))
         found += matching
     return tuple(dict.fromkeys(found))
 
@@ -312,9 +335,20 @@ def _readable_folder(names: Sequence[str], path: Path) -> str:
             return folders[0]
         if folders:
             raise FormatError(
-                Diagnostic("F002.submission-folders", path, values={"names": folders})
+                Diagnostic(
+                    "F002.submission-folders: expected one folder with files to compare, found "
+                    "{names}; --expect names the files to use",
+                    path,
+                    values={"names": listed_text(folders)},
+                )
             )
-    raise FormatError(Diagnostic("F002.submission-empty", path, values={"names": sorted(names)}))
+    raise FormatError(
+        Diagnostic(
+            "F002.submission-empty: expected files to compare, found {names}",
+            path,
+            values={"names": listed_text(sorted(names))},
+        )
+    )
 
 
 def _folders(names: Sequence[str], is_wanted: Callable[[str], bool]) -> list[str]:
@@ -348,27 +382,54 @@ class _Archive:
         except _DAMAGE as problem:
             if _is_full(problem):
                 raise
-            raise self._fault("F002.submission-zip", reason=_reason(problem)) from None
+            raise self._fault(wording.SUBMISSION_ZIP, reason=_reason(problem)) from None
         return sum(member.file_size for member in members.values())
 
     def _check(self, members: dict[str, zipfile.ZipInfo]) -> None:
         for name, member in members.items():
             item = printable(name, 80)
             if member.flag_bits & _ENCRYPTED:
-                raise self._fault("F002.submission-encrypted", item=item)
+                raise self._fault(
+                    "F002.submission-encrypted: {item}: expected an unencrypted file, found an "
+                    "encrypted one",
+                    item=item,
+                )
             if stat.S_ISLNK(member.external_attr >> 16):
-                raise self._fault("F002.submission-link", item=item)
+                raise self._fault(
+                    "F002.submission-link: {item}: expected a file, found a symbolic link",
+                    item=item,
+                )
             if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 method = member.compress_type
-                raise self._fault("F002.submission-method", item=item, method=method)
+                raise self._fault(
+                    "F002.submission-method: {item}: expected a stored or deflated file, found "
+                    "compression method {method}",
+                    item=item,
+                    method=method,
+                )
         # zipfile never returns more bytes of a member than the central directory states.
         total = sum(member.file_size for member in members.values())
         if len(members) > MOST_FILES:
-            raise self._fault("F001.submission-count", most=MOST_FILES, found=len(members))
+            raise self._fault(
+                "F001.submission-count: expected at most {most}, found {found}",
+                most=counted(MOST_FILES, "file"),
+                found=len(members),
+            )
         if total > MOST_BYTES:
-            raise self._fault("F001.submission-size", most=MOST_BYTES, found=total)
+            raise self._fault(
+                "F001.submission-size: expected at most {most:,.0f} bytes of files, found "
+                "{found:,.0f}",
+                most=MOST_BYTES,
+                found=total,
+            )
         if total > max(SMALL, MAX_RATIO * self.size):
-            raise self._fault("F002.submission-ratio", most=MAX_RATIO, found=total, size=self.size)
+            raise self._fault(
+                "F002.submission-ratio: expected a compression ratio of at most {most}, found "
+                "{found} bytes in {size}",
+                most=MAX_RATIO,
+                found=total,
+                size=self.size,
+            )
 
     def _fault(self, key: str, **values: Any) -> FormatError:
         return FormatError(Diagnostic(key, self.shown, values=values))
@@ -389,13 +450,20 @@ def _open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> It
             for name, count in Counter(name for name, _ in pairs).items():
                 if count > 1:
                     values = {"item": printable(name, 80), "found": count}
-                    raise FormatError(Diagnostic("F002.submission-twice", shown, values=values))
+                    raise FormatError(
+                        Diagnostic(
+                            "F002.submission-twice: {item}: expected a single file with this "
+                            "path, found {found}",
+                            shown,
+                            values=values,
+                        )
+                    )
             yield _Archive(shown, storage.size, archive, dict(pairs))
     except _DAMAGE as problem:
         if _is_full(problem):
             raise
         values = {"reason": _reason(problem)}
-        raise FormatError(Diagnostic("F002.submission-zip", shown, values=values)) from None
+        raise FormatError(Diagnostic(wording.SUBMISSION_ZIP, shown, values=values)) from None
 
 
 def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
@@ -407,7 +475,14 @@ def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
     windows = PureWindowsPath(info.filename)
     if not parts or parts[0] == "/" or ".." in parts or windows.drive or windows.root:
         values = {"item": printable(info.filename, 80)}
-        raise FormatError(Diagnostic("F002.submission-outside", shown, values=values))
+        raise FormatError(
+            Diagnostic(
+                "F002.submission-outside: {item}: expected a path inside the archive, found one "
+                "that leads outside",
+                shown,
+                values=values,
+            )
+        )
     return "/".join(parts)
 
 
@@ -421,6 +496,11 @@ def _reason(problem: Exception) -> str | Phrase:
     if isinstance(problem, OSError) and problem.strerror:
         return printable(problem.strerror, 100)
     if isinstance(problem, EOFError):  # it has no message
-        return Phrase("zip-short")
+        return Phrase("its data ends too early")
     text = _QUOTED.sub("", str(problem)).lower()
-    return Phrase(next((key for part, key in _REASONS.items() if part in text), "zip-data"))
+    return Phrase(
+        next(
+            (key for part, key in _REASONS.items() if part in text),
+            "its compressed data is invalid",
+        )
+    )

@@ -160,7 +160,7 @@ def _transform_lines(head: str, clip: dict[str, Any]) -> list[str]:
 
 
 def _rows_text(clip: dict[str, Any]) -> str:
-    frames, first = counted(clip["frames"], "frame"), clip["first_frame"]
+    frames, first = str(counted(clip["frames"], "frame")), clip["first_frame"]
     if first:
         last = first + clip["frames"] - 1
         frames += f" ({first} to {last})" if last > first else f" ({first})"

@@ -7,6 +7,7 @@ from pathlib import Path
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import FORMATS, Source, detect
+from viewer.phrases import all_of
 
 
 def input_files(text: str) -> list[Path]:
@@ -29,7 +30,13 @@ def input_files(text: str) -> list[Path]:
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
     if not files:
         known = list(dict.fromkeys(suffixes))
-        raise FormatError(Diagnostic("F002.no-rig", path, values={"suffixes": known}))
+        raise FormatError(
+            Diagnostic(
+                "F002.no-rig: expected a folder with rig files ({suffixes}), found none",
+                path,
+                values={"suffixes": all_of(known)},
+            )
+        )
     return files
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.commands._frames import Frames, numbering_of
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, ExportOptions, Part
 from viewer.rig.motion.evaluation import JointMotion
@@ -57,12 +57,17 @@ def part_of_pose(
 def pose_note(frames: Frames, scene: Scene) -> Diagnostic:
     """Return the note that explains why there is only one frame."""
     if not _moving(scene):
-        return Diagnostic("X001.current-pose")
+        return Diagnostic(wording.CURRENT_POSE)
     if frames.frame is not None:
-        return Diagnostic("X001.pose-at-frame", values={"frame": frames.frame})
+        return Diagnostic(
+            "X001.pose-at-frame: one frame: the pose at frame {frame}",
+            values={"frame": frames.frame},
+        )
     if frames.time is not None:
-        return Diagnostic("X001.pose-at-time", values={"time": frames.time})
-    return Diagnostic("X001.current-pose")
+        return Diagnostic(
+            "X001.pose-at-time: one frame: the pose at {time:zg} s", values={"time": frames.time}
+        )
+    return Diagnostic(wording.CURRENT_POSE)
 
 
 def _moving(scene: Scene) -> list[Actor]:

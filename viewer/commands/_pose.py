@@ -128,7 +128,7 @@ def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     is_list = not source.is_folder and detect(source) == "easymocap"
     record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):
-        raise source.fault("F002.no-pose")
+        raise source.fault("F002.no-pose: --pose: expected a pose, found a figure or motion")
     return record, source
 
 

@@ -27,7 +27,7 @@ from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.settings import CleanUp
 from viewer.models import named_files, resolve
-from viewer.phrases import printable
+from viewer.phrases import all_of, printable
 from viewer.progress import report
 from viewer.rig.scene import Scene
 from viewer.streams import summary_stream
@@ -297,8 +297,12 @@ def _with_models(problem: FormatError, files: Sequence[str | Path]) -> ViewerErr
         return problem
     models = [*known_models(folder)]
     near = did_you_mean(str(problem.path), models) if len(models) > _MOST_MODELS else ""
-    values = {"folder": folder, "near": near, "names": models[:_MOST_MODELS]}
-    key = "F001.no-model-near" if near else "F001.no-model"
+    values = {"folder": folder, "near": near, "names": all_of(models[:_MOST_MODELS])}
+    key = (
+        "F001.no-model-near: no such file or model in {folder}; {near}"
+        if near
+        else "F001.no-model: no such file or model in {folder}; available models: {names}"
+    )
     return FormatError(Diagnostic(key, problem.path, values=values))
 
 

@@ -31,7 +31,7 @@ from viewer.diagnostics.record import is_recorded, note_values
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
-from viewer.phrases import printable, rounded
+from viewer.phrases import brief, printable, rounded
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.annotations import VertexField
 from viewer.rig.comparison import Difference, Measure, compare
@@ -217,7 +217,9 @@ def _compared(
         with shown_progress(f"comparing {Path(name).name}"):
             difference = compare(posed, second, skinning, n_poses, frames)
         if is_choice and first.figure.name != second.figure.name:
-            note = Diagnostic("D002.partner", values={"name": second.name})
+            note = Diagnostic(
+                "D002.partner: compared with {name}", values={"name": brief(second.name)}
+            )
             difference = replace(difference, notes=(note, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
@@ -227,9 +229,9 @@ def _compared(
 
 def _lone(name: str, pairing: _Pairing) -> tuple[Diagnostic, ...]:
     """Return messages about actors and motions that are present in only one of the scenes."""
-    sides = ((Phrase("the-reference"), pairing.first), (name, pairing.second))
+    sides = ((Phrase("the reference"), pairing.first), (name, pairing.second))
     return tuple(
-        Diagnostic("D001.actor", values={"side": side, "actor": one})
+        Diagnostic("D001.actor: only in {side}: {actor}", values={"side": side, "actor": one})
         for side, lone in sides
         for one in lone
     )
@@ -321,12 +323,12 @@ def _kind(actor: Actor) -> tuple[bool, bool, bool]:
 def _lone_actors(actors: Sequence[Actor], clips: Sequence[Clip]) -> tuple[Phrase, ...]:
     """Return labels of unpaired clips and actors, by kind unless they have mesh and skeleton."""
     kinds = {
-        (True, False, False): "lone-skeleton",
-        (False, True, False): "lone-mesh",
-        (False, False, True): "lone-points",
+        (True, False, False): "{name} (a skeleton)",
+        (False, True, False): "{name} (a mesh)",
+        (False, False, True): "{name} (captured points)",
     }
-    figures = (Phrase(kinds.get(_kind(one), "lone-figure"), name=one.name) for one in actors)
-    return (*figures, *(Phrase("lone-motion", name=clip.name) for clip in clips))
+    figures = (Phrase(kinds.get(_kind(one), "{name}"), name=brief(one.name)) for one in actors)
+    return (*figures, *(Phrase("motion {name}", name=brief(clip.name)) for clip in clips))
 
 
 def _with_clips(

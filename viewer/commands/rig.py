@@ -54,7 +54,7 @@ from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import named_files, resolve
 from viewer.models.bundled import BUNDLED
 from viewer.near_names import did_you_mean, name_hint
-from viewer.phrases import printable
+from viewer.phrases import printable, rounded
 from viewer.progress import part_of_work
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -264,7 +264,9 @@ def _template_files(name: str) -> list[Path]:
     path, *others = named_files(name)
     near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, [*BUNDLED])
     if near:
-        raise FormatError(Diagnostic("F001.no-template", path, values={"near": near}))
+        raise FormatError(
+            Diagnostic("F001.no-template: no such file; {near}", path, values={"near": near})
+        )
     return [path, *others]
 
 
@@ -324,7 +326,15 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         values = _floats(words if len(words) == 6 else words[-3:])
         if values is None or len(words) < 4 or (len(words) != 6 and _floats(words) is not None):
             found = {"found": printable(line.strip(), 60)}
-            raise FormatError(Diagnostic("F002.landmark", source.path, line_number, values=found))
+            raise FormatError(
+                Diagnostic(
+                    "F002.landmark: expected six numbers, or a joint and three numbers, found "
+                    '"{found}"',
+                    source.path,
+                    line_number,
+                    values=found,
+                )
+            )
         if len(values) == 6:
             pairs.append([values[:3], values[3:]])
             continue
@@ -335,19 +345,41 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     last = max(len(source.data.splitlines()), 1)
     if len(pairs) < 3:
         count = {"found": len(pairs)}
-        raise FormatError(Diagnostic("F002.landmarks", source.path, last, values=count))
+        raise FormatError(
+            Diagnostic(
+                "F002.landmarks: expected at least 3 pairs of points, found {found}",
+                source.path,
+                last,
+                values=count,
+            )
+        )
     points = np.array(pairs, dtype=np.float64)
     own, other = np.ptp(points, axis=0).max(axis=1).tolist()
     if not (own < _LARGEST_SCALE * other and other < _LARGEST_SCALE * own):
-        extents = {"own": own, "other": other}
-        raise FormatError(Diagnostic("F002.landmark-extents", source.path, last, values=extents))
+        extents = {"own": rounded(own), "other": rounded(other)}
+        raise FormatError(
+            Diagnostic(
+                "F002.landmark-extents: expected points that differ in scale by less than 1e9, "
+                "found extents of {own} in the template and {other} in the target",
+                source.path,
+                last,
+                values=extents,
+            )
+        )
     return points
 
 
 def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> FormatError:
     names = () if template.skeleton is None else template.skeleton.names
     values = {"figure": printable(template.name, 60), "found": name, "near": name_hint(name, names)}
-    return FormatError(Diagnostic("F002.landmark-joint", source.path, line, values=values))
+    return FormatError(
+        Diagnostic(
+            'F002.landmark-joint: expected a joint of {figure}, found "{found}"; {near}',
+            source.path,
+            line,
+            values=values,
+        )
+    )
 
 
 def _floats(words: list[str]) -> list[float] | None:

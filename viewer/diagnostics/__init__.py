@@ -1,8 +1,9 @@
 """Errors, warnings and notes as data: message key, location and values.
 
-A :class:`Diagnostic` refers to its message by a key, ``"W004.vertices"``: the stable code, a dot,
-and the name of one of the code's messages. ``wording/`` holds the severity, title and remedy
-of each code, and the template of each message. No code parses meaning from text.
+A :class:`Diagnostic` names its message by a key, ``"W004.vertices"``: the stable code, a dot, and
+the name of one of the code's messages. The call writes key and sentence in one string, with names
+of values in braces; ``wording.py`` has the sentences that several calls share, ``codes.py`` the
+severity, title and remedy of each code. No code parses meaning from text.
 """
 
 from __future__ import annotations
@@ -19,12 +20,10 @@ from viewer.diagnostics.diagnostic import (
 )
 
 if TYPE_CHECKING:
-    from viewer.diagnostics.codes import SEVERITIES, Code
-    from viewer.diagnostics.wording import CODES, MESSAGES
+    from viewer.diagnostics.codes import CODES, SEVERITIES, Code
 
 __all__ = [
     "CODES",
-    "MESSAGES",
     "SEVERITIES",
     "Code",
     "Collector",
@@ -37,9 +36,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import the wording when it is first used: most runs have no message to print."""
-    if name not in ("CODES", "MESSAGES", "SEVERITIES", "Code"):
+    """Import the codes when they are first used: most runs have no message to print."""
+    if name not in ("CODES", "SEVERITIES", "Code"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from viewer.diagnostics import codes, wording
+    from viewer.diagnostics import codes
 
-    return getattr(codes if hasattr(codes, name) else wording, name)
+    return getattr(codes, name)

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.phrases import listed, printable
+from viewer.diagnostics.remedy import Remedy, as_data
+from viewer.phrases import NO_VALUE, Shown, listed, printable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,6 +38,18 @@ Part = Literal[
 _MOST = 100
 # Maximum number of indices and names per diagnostic; the total is always included.
 _LISTED = 100
+_LONGEST = 1000  # maximum number of characters of a text in a sentence
+
+NOUNS: dict[Part, str] = {
+    "positions": "vertices",
+    "weights": "vertices",
+    "triangles": "triangles",
+    "bindings": "joints",
+    "joints": "joints",
+    "items": "joints",
+    "frames": "frames",
+}
+"""Plural noun for the elements of a part."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +57,8 @@ class Diagnostic:
     """An error, warning or note from a reader, check or operation."""
 
     key: str
-    """A key of ``MESSAGES``: code, dot, name of the message, as in ``"W004.vertices"``."""
+    """Code, dot and name of the message: ``"W004.vertices"``. The call adds a colon and the
+    sentence, with the names of values in braces: ``"W006.joints: {n} no influence: {names}"``."""
     path: Path | None = None
     """The file that the message is about."""
     line: int | None = None
@@ -56,7 +70,7 @@ class Diagnostic:
     """(N,): indices, ascending: vertices (positions, weights), triangles, joints (bindings, joints,
     and items: boxes, limits and poses), channels of a clip, or rows of frames."""
     values: Mapping[str, Any] = field(default_factory=dict)
-    """Values for the template."""
+    """Values in the sentence, as data. In the call they may be ``Shown`` as text."""
     count: int = 1
     """Number of errors that it represents; 0 if it only adds indices to an error reported by
     another diagnostic."""
@@ -68,6 +82,20 @@ class Diagnostic:
     """Whether parsing of the file stopped there."""
     pointer: str = ""
     """JSON pointer (RFC 6901) to the element of that file, as in ``"/skins/0/joints/3"``."""
+    sentence: str = ""
+    """The message, with names of values in braces."""
+    texts: Mapping[str, Shown | Remedy] = field(default_factory=dict)
+    """Text of the values that are not written as they are."""
+
+    def __post_init__(self) -> None:
+        """Separate key and sentence, and data and text of the values."""
+        key, _, sentence = self.key.partition(": ")
+        values, texts = _apart(self.values)
+        put = object.__setattr__
+        put(self, "key", key)
+        put(self, "sentence", sentence or self.sentence)
+        put(self, "values", values)
+        put(self, "texts", {**self.texts, **texts})
 
     @property
     def code(self) -> str:
@@ -77,31 +105,27 @@ class Diagnostic:
     @property
     def severity(self) -> str:
         """One of ``SEVERITIES``; a refusal is an error unless ``level`` differs."""
-        from viewer.diagnostics.wording import CODES
+        from viewer.diagnostics.codes import CODES
 
         return self.level or ("error" if self.is_refusal else CODES[self.code].severity)
 
     @property
     def message(self) -> str:
         """The message on one line, without the location."""
-        from viewer.diagnostics.template import rendered
-        from viewer.diagnostics.wording import MESSAGES
-
-        return rendered(MESSAGES[self.key], self.values)
+        return _filled(self.sentence, self.values, self.texts)
 
     @property
     def full_message(self) -> str:
         """The message with the number of errors, and whether it stopped parsing."""
-        from viewer.diagnostics.wording import FURTHER, NOTHING_ELSE, PLACES
-
         text = self.message
         if self.count > 1:
-            text += FURTHER.format(self.count)
-            noun = PLACES.get(self.part)
+            text += f"; first of {self.count}"
+            noun = NOUNS.get(self.part)
             if self.places is not None and len(self.places) > 1 and noun is not None:
                 text += f" ({noun} {listed(self.places.tolist())})"
         # Nothing could be checked in a file that cannot be read at all.
-        return text + NOTHING_ELSE * (self.is_final and self.code != "F001")
+        is_cut = self.is_final and self.code != "F001"
+        return text + "; the rest of the file was not checked" * is_cut
 
     @property
     def place(self) -> str:
@@ -124,34 +148,52 @@ class Diagnostic:
 
 
 class Phrase:
-    """A message value that is itself a template with values.
+    """Part of a sentence with values of its own; equal to its text."""
 
-    ``key``: a key of ``PHRASES``.
-    """
+    __slots__ = ("_texts", "sentence", "values")
 
-    __slots__ = ("key", "values")
-
-    def __init__(self, key: str, **values: Any) -> None:
-        self.key = key
-        self.values = values
+    def __init__(self, sentence: str, **values: Any) -> None:
+        self.sentence = sentence
+        self.values, self._texts = _apart(values)
 
     def __str__(self) -> str:
-        """Return the rendered template."""
-        from viewer.diagnostics.template import rendered
-        from viewer.diagnostics.wording import PHRASES
-
-        return rendered(PHRASES[self.key], self.values)
+        """Return the text."""
+        return _filled(self.sentence, self.values, self._texts)
 
     def __repr__(self) -> str:
         """Return the call that creates the phrase."""
         values = "".join(f", {name}={value!r}" for name, value in self.values.items())
-        return f"Phrase({self.key!r}{values})"
+        return f"Phrase({self.sentence!r}{values})"
 
     def __eq__(self, other: object) -> bool:
-        """Return whether two phrases have the same key and values."""
-        return isinstance(other, Phrase) and (self.key, self.values) == (other.key, other.values)
+        """Return whether the other phrase or text reads the same."""
+        return isinstance(other, Phrase | str) and str(self) == str(other)
 
-    __hash__ = None  # type: ignore[assignment]
+    def __hash__(self) -> int:
+        """Return the hash of the text."""
+        return hash(str(self))
+
+
+def _apart(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], dict[str, Shown | Remedy]]:
+    """Return values as data, and the texts of those that have one."""
+    texts = {name: value for name, value in values.items() if isinstance(value, Shown | Remedy)}
+    if not texts:
+        return values, texts
+    data = {
+        name: value.value if isinstance(value, Shown) else value
+        for name, value in values.items()
+        if not isinstance(value, Remedy) and getattr(value, "value", None) is not NO_VALUE
+    }
+    return data, texts
+
+
+def _filled(sentence: str, values: Mapping[str, Any], texts: Mapping[str, Shown | Remedy]) -> str:
+    """Return a sentence with its values filled in; names and texts come from files."""
+    shown = {
+        name: printable(value, _LONGEST) if isinstance(value, str | bytes | Path) else value
+        for name, value in values.items()
+    }
+    return sentence.format_map({**shown, **texts})
 
 
 def frame_range(first: int, last: int) -> Phrase:
@@ -161,8 +203,8 @@ def frame_range(first: int, last: int) -> Phrase:
     ('frame 3', 'frames 3 to 5')
     """
     if first == last:
-        return Phrase("one-frame", frame=first)
-    return Phrase("frame-range", first=first, last=last)
+        return Phrase("frame {frame}", frame=first)
+    return Phrase("frames {first} to {last}", first=first, last=last)
 
 
 class Collector:
@@ -196,7 +238,7 @@ class Collector:
             return
         self._warned.add(message)
         if len(self._warned) > _MOST:
-            found = Diagnostic("F007.further-warnings", found.path)
+            found = Diagnostic("F007.further-warnings: further warnings omitted", found.path)
         self._found.append(found)
 
     @property
@@ -227,7 +269,8 @@ def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
 def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
     for name, value in sorted(values.items()):
         if isinstance(value, Phrase | Diagnostic):
-            yield (name, value.key, *_names(value.values))
+            kind = value.key if isinstance(value, Diagnostic) else value.sentence
+            yield (name, kind, *_names(value.values))
         elif isinstance(value, str):
             yield name, value
 
@@ -246,8 +289,6 @@ def described(found: Diagnostic) -> dict[str, Any]:
     Returns code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
     returned by ``plain``, the first 100 indices, and the number of indices.
     """
-    from viewer.diagnostics.template import as_data  # most runs have no message
-
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     with as_data():
         return {

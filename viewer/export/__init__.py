@@ -17,7 +17,8 @@ from viewer.export._left_out import motion_notes
 from viewer.export._motion_paths import files_at, is_together, part_files, part_paths
 from viewer.export._options import ExportOptions, VrmMeta
 from viewer.formats import all_or_none
-from viewer.phrases import printable
+from viewer.phrases import all_of, printable
+from viewer.phrases import counted as counted_text
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
@@ -425,8 +426,14 @@ def _span(part: Part) -> Phrase:
 
 def _absent_note(part: Part) -> Diagnostic:
     if part.frames is None or isinstance(part.frames, SampledParts):
-        return Diagnostic("X003.absent-now", values={"figure": part.actor.name})
-    return Diagnostic("X003.absent", values={"figure": part.frames.name, "frames": _span(part)})
+        return Diagnostic(
+            "X003.absent-now: {figure}: absent at that time, not written",
+            values={"figure": part.actor.name},
+        )
+    return Diagnostic(
+        "X003.absent: {figure}: absent in {frames}, not written",
+        values={"figure": part.frames.name, "frames": _span(part)},
+    )
 
 
 def _untracked_note(plan: _Plan) -> list[Diagnostic]:
@@ -443,12 +450,30 @@ def _untracked_note(plan: _Plan) -> list[Diagnostic]:
                 names.append(person_label(person))
             else:
                 names.append(printable(path.name if len(each.parts) == 1 else part.frames.name))
-    return [Diagnostic("X005.untracked", values={"names": names})] if names else []
+    return (
+        [
+            Diagnostic(
+                "X005.untracked: {names}: not tracked, possibly a different person in each frame",
+                values={"names": all_of(names)},
+            )
+        ]
+        if names
+        else []
+    )
 
 
 def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
     count = sum(len(actor.hidden_parts) for actor in actors)
-    return [Diagnostic("X005.hidden-parts", values={"n": count})] if count else []
+    return (
+        [
+            Diagnostic(
+                "X005.hidden-parts: {n} also written",
+                values={"n": counted_text(count, "hidden part", "is", "are")},
+            )
+        ]
+        if count
+        else []
+    )
 
 
 class _CallableModule(ModuleType):

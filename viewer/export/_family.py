@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.template import rendered
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
 from viewer.export._options import ExportOptions
+from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.figure import Figure
@@ -82,7 +83,7 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
     if figure.unit not in METRES:
         raise RigError(
             f"{figure.name} cannot be written as {what}, which is in metres: its unit is unknown"
-            + rendered("{window:?| (for a BVH, --unit sets it)}", {})
+            + str(Remedy("", " (for a BVH, --unit sets it)"))
         )
     return member
 
@@ -158,7 +159,14 @@ def family_frames(
     if not space.shares_coefficients(figure.shape_space):
         if any(rows.any() for rows in coefficients.values()):
             values = {"own": figure.shape_space.model, "other": space.model}
-            notes.append(Diagnostic("X003.other-shape-space", values=values))
+            notes.append(
+                Diagnostic(
+                    "X003.other-shape-space: the shape coefficients of {own} do not apply to "
+                    "{other} "
+                    "and are written as 0",
+                    values=values,
+                )
+            )
         coefficients = {kind: np.zeros((1, rows.shape[1])) for kind, rows in coefficients.items()}
     present = animation.frames.present
     found = FamilyFrames(
@@ -193,7 +201,18 @@ def _own_shapes(figure: Figure) -> list[Diagnostic]:
     """Return a note if the figure is the bundled body, which is not an SMPL model."""
     if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
         return []
-    return [Diagnostic("X005.own-shape", values={"figure": figure.name})]
+    return [
+        Diagnostic(
+            "X005.own-shape: shape and translation are those of {figure}, which is not an SMPL "
+            "model: other models appear with another shape, and offset ({remedy})",
+            values={
+                "figure": figure.name,
+                "remedy": Remedy(
+                    "open another model before the motion", "--model selects the model"
+                ),
+            },
+        )
+    ]
 
 
 def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
@@ -201,10 +220,20 @@ def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
     notes = []
     if figure.unit != "m":
         unit = UNIT_NAMES[figure.unit]
-        notes.append(Diagnostic("X005.unit-converted", values={"unit": unit}))
+        notes.append(Diagnostic(wording.UNIT_CONVERTED, values={"unit": unit}))
     if figure.mesh is None:
+        remedy = Remedy(
+            "translations are exact if that model is opened first",
+            "--model makes translations exact",
+        )
         place = dict(zip("xyz", root.tolist(), strict=True))
-        notes.append(Diagnostic("X005.own-root", values=place))
+        notes.append(
+            Diagnostic(
+                "X005.own-root: translations are relative to the root at rest, ({x:z.4g}, "
+                "{y:z.4g}, {z:z.4g}) m: a model whose root is elsewhere is offset ({remedy})",
+                values={**place, "remedy": remedy},
+            )
+        )
     return notes
 
 
@@ -213,12 +242,25 @@ def _losses(frames: Frames, skeleton: Skeleton, moved: Floats) -> list[Diagnosti
     present = frames.present
     farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
     if farthest > _NEGLIGIBLE:
-        notes.append(Diagnostic("X003.body-translations", values={"distance": float(farthest)}))
+        notes.append(
+            Diagnostic(
+                "X003.body-translations: translations of joints are omitted (up to {distance} m)",
+                values={"distance": rounded(float(farthest))},
+            )
+        )
     scales = frames.figure_scales[present]
     if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
-        values = {"low": float(scales.min()), "high": float(scales.max())}
-        notes.append(Diagnostic("X003.body-scale", values=values))
-    notes += joint_scales_note(frames, skeleton, "X003.body-joint-scales")
+        values = {"low": rounded(float(scales.min()), 6), "high": rounded(float(scales.max()), 6)}
+        notes.append(
+            Diagnostic(
+                "X003.body-scale: the figure's scale is omitted ({low} to {high})", values=values
+            )
+        )
+    notes += joint_scales_note(
+        frames,
+        skeleton,
+        "X003.body-joint-scales: animated scales of joints are omitted ({low} to {high})",
+    )
     return notes
 
 

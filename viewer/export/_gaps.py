@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._options import GAPS
+from viewer.phrases import agree, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.motion.evaluation import Frames
 
 Indices = NDArray[np.intp]
 
-_CLOSED = {"hold": "pose-held", "interpolate": "interpolated-and-held", "split": "file-per-run"}
+_CLOSED = {
+    "hold": "{poses}",
+    "interpolate": "interpolated, held at both ends",
+    "split": "one file for each run of frames",
+}
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:
@@ -36,31 +41,50 @@ def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> lis
     if present.all():
         return []
     is_early, is_late = not present[0], not present[int(present.argmax()) :].all()
-    held = "held-both" if is_early and is_late else "held-first" if is_early else "held-last"
+    held = (
+        "the last pose is held, or the first one at the start"
+        if is_early and is_late
+        else "the first pose is held"
+        if is_early
+        else "the last pose is held"
+    )
     done = Phrase({**_CLOSED, **how}[closing], poses=Phrase(held))
-    return [Diagnostic("X004.closed", values={**_gaps(present, first_frame), "how": done})]
+    return [
+        Diagnostic(
+            "X004.closed: missing {noun} {gaps}: {how}",
+            values={**_gaps(present, first_frame), "how": done},
+        )
+    ]
 
 
 def frames_phrase(first: int, count: int) -> Phrase:
     """Return the numbers of consecutive frames."""
     if count == 1:
-        return Phrase("written-frame", first=first)
-    return Phrase("written-frames", n=count, first=first, last=first + count - 1)
+        return Phrase("1 frame ({first})", first=first)
+    return Phrase("{n} frames ({first} to {last})", n=count, first=first, last=first + count - 1)
 
 
 def kept_note(present: Bools, first_frame: int) -> list[Diagnostic]:
     """Return a note about frames that are also missing in the file, if there are any."""
-    return [] if present.all() else [Diagnostic("X004.kept", values=_gaps(present, first_frame))]
+    if present.all():
+        return []
+    return [
+        Diagnostic(
+            "X004.kept: {noun} {gaps} missing, as in the original motion",
+            values=_gaps(present, first_frame),
+        )
+    ]
 
 
 def _gaps(present: Bools, first_frame: int) -> dict[str, object]:
     found = [
-        Phrase("missing-frame", frame=start)
+        Phrase("{frame}", frame=start)
         if stop == start + 1
-        else Phrase("missing-frames", first=start, last=stop - 1)
+        else Phrase("{first} to {last}", first=start, last=stop - 1)
         for start, stop in (np.array(runs(~present)) + first_frame).tolist()
     ]
-    return {"n": int((~present).sum()), "gaps": found}
+    n = int((~present).sum())
+    return {"n": n, "gaps": listed(found), "noun": agree(n, "frame", "frames")}
 
 
 def filled(frames: Frames, interpolate: bool) -> Frames:

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.phrases import all_of, counted, rounded
+from viewer.phrases import listed as listed_text
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.animation_choice import animation_labels
@@ -21,11 +23,11 @@ _NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
 def extra_parts(figure: Figure) -> list[Phrase]:
     """Return the parts of a figure other than mesh, skeleton, skin and shapes."""
     extras = {
-        "part-body-parts": figure.body_parts,
-        "part-keypoints": figure.keypoints,
-        "part-symmetry": figure.symmetry,
-        "part-reduced": figure.reduced,
-        "part-regressor": figure.joint_regressor,
+        "body parts": figure.body_parts,
+        "keypoints": figure.keypoints,
+        "the symmetry map": figure.symmetry,
+        "the reduced mesh": figure.reduced,
+        "the joint regressor": figure.joint_regressor,
     }
     return [Phrase(name) for name, part in extras.items() if part is not None]
 
@@ -36,9 +38,9 @@ def surface_parts(mesh: Mesh, has_colors: bool = False, has_parts: bool = False)
     ``has_colors``, ``has_parts``: whether the format holds vertex colours, and names of parts.
     """
     extras = {
-        "part-second-uvs": bool(mesh.other_uvs),
-        "part-vertex-colors": mesh.colors is not None and not has_colors,
-        "part-mesh-parts": bool(mesh.parts) and not has_parts,
+        "second texture coordinates": bool(mesh.other_uvs),
+        "vertex colours": mesh.colors is not None and not has_colors,
+        "names of its parts": bool(mesh.parts) and not has_parts,
     }
     return [Phrase(name) for name, is_lost in extras.items() if is_lost]
 
@@ -48,19 +50,23 @@ def joint_scales_note(frames: Frames, skeleton: Skeleton, key: str) -> list[Diag
 
     ``frames``: the motion.
     ``skeleton``: its skeleton.
-    ``key``: key of the message.
+    ``key``: key and sentence of the message.
     """
     scales = frames.scales if len(frames.scales) == 1 else frames.scales[frames.present]
     changed = scales[np.abs(scales - skeleton.rest_scales) > _NEGLIGIBLE]
     if not len(changed):
         return []
-    values = {"low": float(changed.min()), "high": float(changed.max())}
+    values = {"low": rounded(float(changed.min()), 6), "high": rounded(float(changed.max()), 6)}
     return [Diagnostic(key, values=values)]
 
 
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:
     """Return a note that lists the parts that a format cannot store, if there are any."""
-    return [Diagnostic("X003.parts", values={"format": kind, "parts": parts})] if parts else []
+    return (
+        [Diagnostic(wording.PARTS, values={"format": kind, "parts": all_of(parts)})]
+        if parts
+        else []
+    )
 
 
 def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnostic]:
@@ -76,7 +82,15 @@ def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnosti
     names = [label for label, is_played in labels if not is_played]
     if not names:
         return []
-    return [Diagnostic("X003.other-animations", values={"names": names, "n": len(names)})]
+    return [
+        Diagnostic(
+            "X003.other-animations: {n} not written: {names}",
+            values={
+                "names": listed_text(names, 8),
+                "n": counted(len(names), "other animation", "is", "are"),
+            },
+        )
+    ]
 
 
 def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
@@ -84,7 +98,13 @@ def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
     motion, rate = animation.motion, animation.frame_rate
     if not isinstance(motion, TransformClip) or is_regular(motion) or rate != motion.frame_rate:
         return []
-    return [Diagnostic("X005.irregular-keys", values={"rate": rate})]
+    return [
+        Diagnostic(
+            "X005.irregular-keys: the keys are at irregular times, so the motion is sampled at "
+            "{rate:g} frames per second",
+            values={"rate": rate},
+        )
+    ]
 
 
 def motion_notes(animation: SampledAnimation) -> list[Diagnostic]:

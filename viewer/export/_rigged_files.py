@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.autorig.rigged import Rigged
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import UnsupportedFormatError
 from viewer.export import VrmMeta, export, files_written
 from viewer.export._losses.posed import PoseLosses
 from viewer.export.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
+from viewer.phrases import counted
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import Pose
@@ -72,23 +73,35 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
             again = read(Source(output, saved[output]))
             joints = joint_matrices(again, pose.copy())[:, :3, 3]
             losses.look(pose, deform(again, pose.copy())[0], joints)
-        return [Diagnostic("X001.rigged", output), *losses.notes(output)]
+        return [
+            Diagnostic(
+                "X001.rigged: the figure with its rig, the target's pose and the confidence", output
+            ),
+            *losses.notes(output),
+        ]
     figure = without_correctives(rigged)
     notes: list[Diagnostic] = []
     if output.suffix.lower() in _NODES:
         notes += export(Actor(figure, figure_pose(figure)), output, meta=meta)
-        notes.append(Diagnostic("X003.rigged-pose"))
+        notes.append(
+            Diagnostic(
+                "X003.rigged-pose: the figure is at rest: .npz and .skel also store the target's "
+                "pose"
+            )
+        )
         if rigged.figure.correctives is not None:
-            notes.append(Diagnostic("X003.rigged-correctives"))
+            notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
         return notes
     skel, _, obj, json = files
     with all_or_none(files):
         notes += export(Actor(figure, figure_pose(figure)), skel)
         notes += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
         written, *lost = export(Actor(*_posed_skeleton(figure, rigged.pose)), json)
-    notes += [replace(written, key="X001.target-pose"), *lost]
+    message = "X001.target-pose: {n}, the target's pose"
+    values = {"n": counted(written.values["n"], "DOF")}
+    notes += [replace(written, key=message, values=values), *lost]
     if rigged.figure.correctives is not None:
-        notes.append(Diagnostic("X003.rigged-correctives"))
+        notes.append(Diagnostic(wording.RIGGED_CORRECTIVES))
     return notes
 
 

@@ -36,6 +36,7 @@ from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
@@ -44,9 +45,9 @@ Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
 """Returns the arrays of a range of rows, given the frame rate and the up axis."""
 _FEWEST = 16  # minimum number of shape coefficients, as readers of AMASS require
 _CLOSED = {
-    "hold": "pose-held-and-marked",
-    "interpolate": "interpolated-and-marked",
-    "split": "omitted-between-files",
+    "hold": "{poses}, and the frames are marked in present",
+    "interpolate": "interpolated along the shorter arc, and marked in present",
+    "split": "omitted between the files",
 }
 _TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
 
@@ -63,7 +64,12 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     animation = selection.part.animation
     notes = write_layout(animation, path, options, "AMASS", _arrays)
     if len(animation.frames.shape_weights) > 1:
-        notes.append(Diagnostic("X005.shape-rows"))
+        notes.append(
+            Diagnostic(
+                "X005.shape-rows: the shape changes: betas has one row per frame, which few "
+                "programs support"
+            )
+        )
     return notes
 
 
@@ -102,12 +108,16 @@ def write_layout(
                 arrays["present"] = present
             save_arrays(file, arrays)
             values = {
-                "n": stop - start,
+                "n": counted(stop - start, "frame"),
                 "model": member.title if title == "AMASS" else title,
                 "rate": animation.frame_rate,
                 "up": up,
             }
-            written.append(Diagnostic("X001.amass", file, values=values))
+            written.append(
+                Diagnostic(
+                    "X001.amass: {n} of {model} at {rate:g} fps, {up} up", file, values=values
+                )
+            )
     lost = []
     for file, span in zip(paths, spans, strict=True):
         again = read_frames(read(Source(file, saved[file])), animation, options)

@@ -18,6 +18,7 @@ from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ExportOptions
 from viewer.export.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
+from viewer.phrases import counted, optional
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -58,10 +59,16 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         with keeping_written() as saved:
             write(animation.motion, path)
         has_keys = animation.motion.end > animation.motion.start
-        notes = [_summary(path, animation.motion, Phrase("own-keys") if has_keys else "")]
+        notes = [_summary(path, animation.motion, Phrase("the clip's own") if has_keys else "")]
         notes += _losses(animation, Source(path, saved[path]), (0, frames.n_frames), options)
         if frames.figure_translations.any():
-            notes.append(Diagnostic("X003.clip-placement"))
+            notes.append(
+                Diagnostic(
+                    "X003.clip-placement: the placement of the whole figure is not part of its "
+                    "clip "
+                    "and is omitted"
+                )
+            )
         return notes + _left_out(figure, frames)
     return _export_frames(animation, skeleton, path, options)
 
@@ -100,7 +107,7 @@ def _export_frames(
         for file, clip in zip(paths, clips, strict=True):
             write(clip, file)
     notes = [
-        _summary(file, clip, Phrase("tangents", rule=rule))
+        _summary(file, clip, Phrase("{rule} tangents", rule=rule))
         for file, clip, rule in zip(paths, clips, rules, strict=True)
     ]
     for file, span in zip(paths, spans, strict=True):
@@ -188,13 +195,15 @@ def _distance(animation: SampledAnimation, clip: Clip, times: Floats) -> float:
 
 def _summary(path: Path, clip: Clip, how: Phrase | str) -> Diagnostic:
     values = {
-        "channels": len(clip.channels),
-        "keys": sum(len(channel.times) for channel in clip.channels),
+        "channels": counted(len(clip.channels), "channel"),
+        "keys": counted(sum(len(channel.times) for channel in clip.channels), "key"),
         "start": float(clip.start),
         "end": float(clip.end),
-        "how": how,
+        "how": optional(", {}", how),
     }
-    return Diagnostic("X001.anim", path, values=values)
+    return Diagnostic(
+        "X001.anim: {channels} with {keys}, {start:zg} to {end:zg} s{how}", path, values=values
+    )
 
 
 def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
@@ -202,13 +211,34 @@ def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
     notes, there = [], frames.present
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:
-        notes.append(Diagnostic("X003.clip-scale", values={"scale": float(scales.max())}))
-    notes += joint_scales_note(frames, figure.require_skeleton(), "X003.clip-joint-scales")
+        notes.append(
+            Diagnostic(
+                "X003.clip-scale: .anim cannot store the figure's scale of {scale:g}, which is "
+                "omitted",
+                values={"scale": float(scales.max())},
+            )
+        )
+    notes += joint_scales_note(
+        frames,
+        figure.require_skeleton(),
+        "X003.clip-joint-scales: .anim cannot animate scales of joints ({low:g} to "
+        "{high:g}), which are omitted",
+    )
     moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
     if moved > _SAME:
         length = length_text(figure, float(moved))
         values = {"length": length, "distance": float(moved), "unit": figure.unit}
-        notes.append(Diagnostic("X003.clip-translations", values=values))
+        notes.append(
+            Diagnostic(
+                "X003.clip-translations: .anim translates only the root: translations of other "
+                "joints, up to {length}, are omitted",
+                values=values,
+            )
+        )
     if frames.shape_weights.any():
-        notes.append(Diagnostic("X003.clip-shape"))
+        notes.append(
+            Diagnostic(
+                "X003.clip-shape: .anim cannot store a shape: blend shape weights are omitted"
+            )
+        )
     return notes

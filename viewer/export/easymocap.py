@@ -27,6 +27,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_output
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import OutputError, RigError
 from viewer.export._exporter import Selection
 from viewer.export._family import (
@@ -45,7 +46,7 @@ from viewer.export._options import ExportOptions
 from viewer.formats._text.number_text import fixed_texts
 from viewer.interrupts import hold, poll
 from viewer.media.unfinished import new_prefix
-from viewer.phrases import printable
+from viewer.phrases import Shown, counted, printable
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import Member
@@ -96,7 +97,17 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         body, losses = family_frames(animation, frames, member, options)
         people.append(_Person(taken, animation, _Records(person, body), _ReadRecords(member)))
         if body.gender != "neutral":
-            losses.append(Diagnostic("X003.gender", values={"gender": body.gender}))
+            losses.append(
+                Diagnostic(
+                    "X003.gender: EasyMocap cannot store the gender: open the folder {remedy}",
+                    values={
+                        "gender": body.gender,
+                        "remedy": Remedy(
+                            f"after the {body.gender} model", f"with --gender {body.gender}"
+                        ),
+                    },
+                )
+            )
         own = [*losses, *filling, *kept_note(frames.present, taken.first_frame)]
         notes += own if len(animations) == 1 else [_of_person(person, note) for note in own]
     first = min(animation.first_frame for animation in animations)
@@ -111,13 +122,20 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         # Within the block: parts of the figure may be read now, and the file may be damaged.
         errors = [line for person in people for line in person.losses(path / _FOLDER, options)]
     values = {
-        "n": stop - first,
-        "people": len(animations),
+        "n": counted(stop - first, "frame"),
+        "people": Shown(
+            "1 person" if len(animations) == 1 else f"{len(animations)} people", len(animations)
+        ),
         "up": up_axis(options),
         "rate": animations[0].frame_rate,
     }
     return [
-        Diagnostic("X001.easymocap", path / _FOLDER, values=values),
+        Diagnostic(
+            "X001.easymocap: {n} of {people}, {up} up; EasyMocap does not store the frame rate of "
+            "{rate:g} fps",
+            path / _FOLDER,
+            values=values,
+        ),
         *errors,
         *notes,
     ]
@@ -130,7 +148,7 @@ def require(figure: Figure) -> None:
 
 def _of_person(person: int, note: Diagnostic) -> Diagnostic:
     values = {"person": person_label(person), "remark": note}
-    return Diagnostic(f"{note.code}.of-person", values=values)
+    return Diagnostic(f"{note.code}.of-person: {{person}}: {{remark}}", values=values)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

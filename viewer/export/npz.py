@@ -35,6 +35,7 @@ from viewer.export._options import QUATERNIONS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
+from viewer.phrases import all_of, counted, optional
 from viewer.rig.arrays import Bools, Deferred, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
@@ -85,7 +86,10 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         losses = PoseLosses(figure, skinning)
         losses.look(pose, _read(again, "vertices"), _read(again, "joints"))
     notes = losses.notes(path)
-    return [Diagnostic("X001.arrays", path, values={"names": [*arrays]}), *notes]
+    return [
+        Diagnostic("X001.arrays: arrays {names}", path, values={"names": all_of([*arrays])}),
+        *notes,
+    ]
 
 
 def _export_frames(
@@ -133,8 +137,11 @@ def _export_frames(
     with keeping_written() as saved, all_or_none([path]):
         save_arrays(path, arrays)
         errors = _motion_losses(animation, open_archive(Source(path, saved[path])), path, options)
-    values = {**_counts(frames.present, animation.frame_rate), "names": [*arrays]}
-    return [Diagnostic("X001.motion-arrays", path, values=values), *filling, *errors]
+    values = {**_counts(frames.present, animation.frame_rate), "names": all_of([*arrays])}
+    note = Diagnostic(
+        "X001.motion-arrays: {n} at {rate:g} fps{missing}: {names}", path, values=values
+    )
+    return [note, *filling, *errors]
 
 
 def _motion_losses(
@@ -189,9 +196,13 @@ def _export_points(
     values = {
         **_counts(animation.present, animation.frame_rate),
         "up": up,
-        "names": [*arrays],
+        "names": all_of([*arrays]),
     }
-    return [Diagnostic("X001.point-arrays", path, values=values)]
+    return [
+        Diagnostic(
+            "X001.point-arrays: {n} at {rate:g} fps{missing}, {up} up: {names}", path, values=values
+        )
+    ]
 
 
 def _turn(up: str) -> Floats:
@@ -226,4 +237,9 @@ def _point_arrays(
 
 
 def _counts(present: Bools, rate: float) -> dict[str, object]:
-    return {"n": len(present), "rate": rate, "missing": int((~present).sum())}
+    missing = int((~present).sum())
+    return {
+        "n": counted(len(present), "frame"),
+        "rate": rate,
+        "missing": optional("; {} of them missing, NaN", missing),
+    }

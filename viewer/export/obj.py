@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Selection, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
@@ -22,7 +22,7 @@ from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, free_path, save_bytes, save_parts
 from viewer.formats._text.number_text import row_texts
 from viewer.media.png import encode_png
-from viewer.phrases import printable
+from viewer.phrases import Shown, agree, counted, listed, printable
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
@@ -56,8 +56,11 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     losses = PoseLosses(actor.figure, skinning)
     odd, textures = _write(actor, path, skinning, losses)
     figure, mesh = actor.figure, actor.figure.require_mesh()
-    counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
-    notes = [Diagnostic("X001.mesh", path, values=counts), *textures, *odd, *losses.notes(path)]
+    counts = {
+        "vertices": counted(mesh.n_vertices, "vertex"),
+        "triangles": counted(mesh.n_triangles, "triangle"),
+    }
+    notes = [Diagnostic(wording.MESH, path, values=counts), *textures, *odd, *losses.notes(path)]
     return notes + _changed(figure)
 
 
@@ -79,17 +82,31 @@ def _export_frames(
             actor = Actor(figure, pose_of(figure, poses, frame))
             odd += _write(actor, file, options.skinning, losses, frame)[0]
     if not files:
-        return [Diagnostic("X001.no-meshes", path)]
+        return [
+            Diagnostic(
+                "X001.no-meshes: no person is present in these frames: nothing was written", path
+            )
+        ]
     values = {
         "n": len(files),
         "first": files[0].name,
         "last": files[-1].name,
-        "missing": poses.n_frames - len(files),
+        "missing": _missing(poses.n_frames - len(files)),
     }
-    key = "X001.meshes" if len(files) > 1 else "X001.one-mesh"
+    key = (
+        "X001.meshes: {n} files, {first} to {last}{missing}"
+        if len(files) > 1
+        else "X001.one-mesh: 1 file, {first}{missing}"
+    )
     errors = losses.notes(path, animation.first_frame)
     written = Diagnostic(key, path, values=values)
     return [written, *filling, *odd[:1], *errors, *_changed(figure)]
+
+
+def _missing(n: int) -> Shown:
+    """Return the end of a sentence about frames without a file."""
+    frames, have = counted(n, "frame", "is", "are"), agree(n, "has", "have")
+    return Shown(f"; {frames} missing in the motion and {have} no file" if n else "", n)
 
 
 def _write(
@@ -123,7 +140,9 @@ def _write(
             save_bytes(file, beside[file])
         n_lines = 2 * mesh.n_vertices + n_uvs + mesh.n_triangles
         save_parts(path, [first, library.encode(), text], n_lines)
-    return odd, [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
+    return odd, [
+        Diagnostic("X001.texture: its texture", file) for file in beside if file.suffix == ".png"
+    ]
 
 
 def _changed(figure: Figure) -> list[Diagnostic]:
@@ -131,7 +150,13 @@ def _changed(figure: Figure) -> list[Diagnostic]:
     mesh, notes = figure.require_mesh(), list[Diagnostic]()
     polygons = dict(figure.facts).get("polygons")
     if polygons is not None:
-        notes.append(Diagnostic("X005.polygons", values={"polygons": polygons}))
+        notes.append(
+            Diagnostic(
+                "X005.polygons: polygons of the original file are written as triangles "
+                "({polygons})",
+                values={"polygons": polygons},
+            )
+        )
     renamed = [
         material.name
         for material, name in zip(mesh.materials, _material_names(mesh), strict=True)
@@ -139,7 +164,14 @@ def _changed(figure: Figure) -> list[Diagnostic]:
     ]
     if renamed:
         notes.append(
-            Diagnostic("X005.material-names", values={"n": len(renamed), "names": renamed})
+            Diagnostic(
+                "X005.material-names: {n} another name in the file, because names must be unique: "
+                "{names}",
+                values={
+                    "n": counted(len(renamed), "material", "has", "have"),
+                    "names": listed(renamed, 8),
+                },
+            )
         )
     lost = _library_losses(mesh)
     extra = surface_parts(mesh, has_colors=True, has_parts=True)
@@ -319,15 +351,15 @@ def _library_losses(mesh: Mesh) -> list[Phrase]:
     materials = mesh.materials
     placed = [texture for material in materials for texture in material.textures.values()]
     lost = {
-        "part-occlusion": any(material.occlusion_texture is not None for material in materials),
-        "part-alpha-cutoff": any(material.alpha_mode == "mask" for material in materials),
-        "part-unlit": any(material.unlit for material in materials),
-        "part-single-sided": any(not material.double_sided for material in materials),
-        "part-second-uvs": any(texture.uv_set for texture in placed),
-        "part-texture-rotation": any(
+        "occlusion maps": any(material.occlusion_texture is not None for material in materials),
+        "alpha cutoffs": any(material.alpha_mode == "mask" for material in materials),
+        "unlit surfaces": any(material.unlit for material in materials),
+        "single-sided surfaces": any(not material.double_sided for material in materials),
+        "second texture coordinates": any(texture.uv_set for texture in placed),
+        "rotated or mirrored textures": any(
             "mirror" in texture.wrap or texture.matrix[0, 1] or texture.matrix[1, 0]
             for texture in placed
         ),
-        "part-unfiltered": any(not texture.is_smooth for texture in placed),
+        "unfiltered textures": any(not texture.is_smooth for texture in placed),
     }
     return [Phrase(key) for key, is_lost in lost.items() if is_lost]

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Selection, require_mesh
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._losses.posed import mesh_losses
 from viewer.export._options import ExportOptions
 from viewer.formats import Source, save_bytes
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.skinning import deform
@@ -57,12 +57,21 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     data = text + vertices.tobytes() + faces.tobytes()
     errors = mesh_losses(actor, skinning, Source(path, data))
     save_bytes(path, data)
-    counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
-    lost = [Phrase("part-all-materials")] if mesh.materials else []
+    counts = {
+        "vertices": counted(mesh.n_vertices, "vertex"),
+        "triangles": counted(mesh.n_triangles, "triangle"),
+    }
+    lost = [Phrase("materials and textures")] if mesh.materials else []
     lost += surface_parts(mesh, has_colors=True)
-    notes = [Diagnostic("X001.mesh", path, values=counts), *errors]
+    notes = [Diagnostic(wording.MESH, path, values=counts), *errors]
     if kind == "double":
-        notes.append(Diagnostic("X005.double-positions", path))
+        notes.append(
+            Diagnostic(
+                "X005.double-positions: positions are written in double precision: single "
+                "precision would move vertices by more than a millionth of the size",
+                path,
+            )
+        )
     return notes + not_held_note(".ply", lost)
 
 

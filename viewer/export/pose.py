@@ -14,6 +14,7 @@ from viewer.export._losses.posed import PoseLosses
 from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, write
 from viewer.formats.pose import read
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.posing.pose_record import apply_record, record_of
@@ -44,11 +45,13 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     losses, how = PoseLosses(figure, skinning.unreduced()), skinning.unreduced()
     vertices = None if figure.mesh is None else deform(figure, again, how)[0]
     losses.look(pose, vertices, joint_matrices(figure, again)[:, :3, 3])
-    notes = [Diagnostic("X001.pose", path, values={"n": figure.skeleton.n_dofs})]
+    notes = [
+        Diagnostic("X001.pose: {n}", path, values={"n": counted(figure.skeleton.n_dofs, "DOF")})
+    ]
     notes += losses.notes(path)
     lost = _lost(figure.skeleton, pose, again)
     if stored.shape_space != record.shape_space:
-        lost.append(Phrase("part-pose-space", space=record.shape_space.title))
+        lost.append(Phrase("the body's model and gender ({space})", space=record.shape_space.title))
     return notes + not_held_note(path.suffix.lower(), lost)
 
 
@@ -60,12 +63,12 @@ def _lost(skeleton: Skeleton, pose: Pose, again: Pose) -> list[Phrase]:
     shapes[1, : len(again.shape_weights)] = again.shape_weights
     turned = np.abs(joint_rotations(skeleton, pose) - joint_rotations(skeleton, again))
     lost = {
-        "part-pose-rotations": bool((turned > _TURNED).any()),
-        "part-pose-shape": _differ(*shapes),
-        "part-pose-translations": _differ(pose.translations, again.translations),
-        "part-pose-scales": _differ(pose.scales, again.scales),
-        "part-pose-placement": _differ(pose.figure_translation, again.figure_translation),
-        "part-pose-size": abs(pose.figure_scale - again.figure_scale) > _SAME,
+        "rotations of joints that their DOFs cannot express": bool((turned > _TURNED).any()),
+        "shape and expression": _differ(*shapes),
+        "translations of joints": _differ(pose.translations, again.translations),
+        "scales of joints": _differ(pose.scales, again.scales),
+        "the figure's position": _differ(pose.figure_translation, again.figure_translation),
+        "the figure's scale": abs(pose.figure_scale - again.figure_scale) > _SAME,
     }
     return [Phrase(key) for key, is_lost in lost.items() if is_lost]
 

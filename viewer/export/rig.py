@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._left_out import extra_parts, not_held_note
@@ -21,6 +21,7 @@ from viewer.formats.skel import KEYWORDS
 from viewer.formats.skin import lost_parts
 from viewer.media.png import encode_png
 from viewer.media.saving import as_words
+from viewer.phrases import Shown, agree, counted, listed
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
@@ -55,7 +56,9 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     course, rig, sources = _as_rig(actor, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
     rig = _with_picture_names(rig, skin)
-    notes = [Diagnostic("X001.skel", skel, values={"n": figure.skeleton.n_joints})]
+    notes = [
+        Diagnostic("X001.skel: {n}", skel, values={"n": counted(figure.skeleton.n_joints, "joint")})
+    ]
     with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
         write(rig, skel)
         if rig.mesh is not None:
@@ -63,10 +66,12 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         files = [Source(file, saved[file]) for file in (skel, skin) if file in saved]
         error = _error(actor, files, sources, skinning)
     if rig.mesh is not None:
-        notes.append(Diagnostic("X001.skin", skin, values={"n": rig.mesh.n_vertices}))
+        notes.append(
+            Diagnostic("X001.skin: {n}", skin, values={"n": counted(rig.mesh.n_vertices, "vertex")})
+        )
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
             counts = {"before": figure.mesh.n_vertices, "after": rig.mesh.n_vertices}
-            notes.append(Diagnostic("X005.seams", values=counts))
+            notes.append(Diagnostic(wording.SEAMS, values=counts))
     return notes + _changed(actor, course) + _lost(figure) + error
 
 
@@ -150,15 +155,47 @@ def _scaling_bindings(actor: Actor, course: _CourseSkeleton) -> Floats:
 def _changed(actor: Actor, course: _CourseSkeleton) -> list[Diagnostic]:
     """Return notes about data in another form."""
     skeleton, notes = actor.figure.require_skeleton(), list[Diagnostic]()
-    for key, joints in (("turned", course.turned), ("unlimited", course.unlimited)):
+    for key, joints in (
+        (
+            "X005.skel-turned: {n} a rest rotation, a constraint or another order of rotations: "
+            "the "
+            "pose in the file contains {their} whole rotation ({names})",
+            course.turned,
+        ),
+        (
+            "X005.skel-unlimited: limits of {joints} are omitted, because {their} angles in the "
+            "file are defined differently: {names}",
+            course.unlimited,
+        ),
+    ):
         if joints:
-            names = [joint_label(skeleton, joint) for joint in joints]
-            notes.append(Diagnostic(f"X005.skel-{key}", values={"n": len(names), "names": names}))
+            n = len(joints)
+            values = {
+                "n": counted(n, "joint", "has", "have"),
+                "joints": Shown(counted(n, "joint")),
+                "names": listed([joint_label(skeleton, joint) for joint in joints], 8),
+                "their": agree(n, "its", "their"),
+            }
+            notes.append(Diagnostic(key, values=values))
     if (np.abs(actor.require_pose().scales - 1.0) > _ROUNDED).any():
-        notes.append(Diagnostic("X005.skel-scaled"))
+        notes.append(
+            Diagnostic(
+                "X005.skel-scaled: joints are scaled, which .skel cannot store: the bindings of "
+                "the .skin scale the vertices, and bones keep their lengths when the file is posed"
+            )
+        )
     if course.renamed:
-        values = {"n": len(course.renamed), "names": course.renamed}
-        notes.append(Diagnostic("X005.skel-names", values=values))
+        values = {
+            "n": counted(len(course.renamed), "joint name", "is", "are"),
+            "names": listed(course.renamed, 8),
+        }
+        notes.append(
+            Diagnostic(
+                "X005.skel-names: {n} changed, because .skel has no braces or keywords in names: "
+                "{names}",
+                values=values,
+            )
+        )
     return notes
 
 
@@ -184,13 +221,15 @@ def _lost(figure: Figure) -> list[Diagnostic]:
     """Return a note that lists the data that the formats cannot store."""
     lost = []
     if figure.blend_shapes is not None:
-        lost.append(Phrase("part-current-shape", n=figure.n_shapes))
+        lost.append(
+            Phrase("{n} (the current shape is kept)", n=counted(figure.n_shapes, "blend shape"))
+        )
     if figure.correctives is not None:
-        lost.append(Phrase("part-correctives"))
+        lost.append(Phrase("pose correctives"))
     if figure.mesh is not None:
         lost += lost_parts(figure.mesh)
     if figure.up != "y":
-        lost.append(Phrase("part-up", up=figure.up))
+        lost.append(Phrase("the up axis {up}", up=figure.up))
     return not_held_note(".skel and .skin", [*lost, *extra_parts(figure)])
 
 

@@ -22,10 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.remedy import Remedy
 from viewer.export._exporter import Selection
 from viewer.export._family import FamilyFrames, member_of_figure
 from viewer.export._options import ExportOptions
 from viewer.export.amass import padded, write_layout
+from viewer.phrases import counted
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 
@@ -52,9 +54,23 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     notes = write_layout(animation, path, wanted, "SMPL-X", _arrays)
     if len(animation.frames.shape_weights) > 1:
         n_present = int(animation.frames.present.sum())
-        notes.append(Diagnostic("X005.shape-averaged", values={"n": n_present}))
+        notes.append(
+            Diagnostic(
+                "X005.shape-averaged: the shape changes: betas are its average over {n}",
+                values={"n": counted(n_present, "frame")},
+            )
+        )
     if len(animation.figure.require_skeleton().names) != len(_MEMBER.names):
-        notes.append(Diagnostic("X005.as-smplx", values={"figure": animation.figure.name}))
+        notes.append(
+            Diagnostic(
+                "X005.as-smplx: {figure} is not SMPL-X: translations are exact only with an SMPL-X "
+                "model{remedy}",
+                values={
+                    "figure": animation.figure.name,
+                    "remedy": Remedy(", opened before the motion", " (--model)"),
+                },
+            )
+        )
     return notes
 
 

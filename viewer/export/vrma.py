@@ -26,6 +26,7 @@ from viewer.export.vrm.humanoid import bone_above, human_bones
 from viewer.export.vrm.made import PRESETS
 from viewer.export.vrm.standing import in_t_pose, standing, unit_rotation, vrm_axes
 from viewer.formats import Source, read, save_bytes
+from viewer.phrases import agree, counted, file_size
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs
@@ -60,17 +61,29 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     errors = _losses(Source(path, data), animation, frames, options.world_up, bones)
     save_bytes(path, data)
     values = {
-        "bones": len(bones),
-        "expressions": sum(len(group) for group in weights.values()),
+        "bones": counted(len(bones), "human bone"),
+        "expressions": counted(sum(len(group) for group in weights.values()), "expression"),
         "frames": frames_phrase(animation.first_frame, frames.n_frames),
         "rate": animation.frame_rate,
-        "size": len(data),
+        "size": file_size(len(data)),
     }
-    notes = [Diagnostic("X001.vrma", path, values=values), *errors]
+    notes = [
+        Diagnostic(
+            "X001.vrma: {bones}, {expressions}, {frames} at {rate:g} fps, {size}",
+            path,
+            values=values,
+        ),
+        *errors,
+    ]
     notes += gaps_note(animation.frames.present, animation.first_frame, options.closing)
     others = animation.figure.require_skeleton().n_joints - len(bones)
     if others:
-        notes.append(Diagnostic("X003.vrma-joints", values={"n": others}))
+        notes.append(
+            Diagnostic(
+                "X003.vrma-joints: {n} without a human bone {are} omitted",
+                values={"n": counted(others, "joint"), "are": agree(others, "is", "are")},
+            )
+        )
     return notes
 
 

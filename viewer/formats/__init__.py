@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._file_bytes import MAX_SIZE, unreadable
 from viewer.formats._source import Source
+from viewer.phrases import listed
 
 if TYPE_CHECKING:
     from viewer.formats._mesh.texture import read_picture
@@ -259,7 +261,11 @@ def detect(source: Source) -> str:
         # Bare numbers are a pose only if the suffix belongs to no other format.
         if re.search(kind.signature, head) and not (by_suffix and key == "pose"):
             if by_suffix:
-                source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
+                source.warn(
+                    "F007.suffix: {found} file with the suffix {suffix}",
+                    found=kind.suffixes[0],
+                    suffix=suffix,
+                )
             return _of_json(source, head, key)
     if suffix in _ARCHIVES:
         # Opening the archive again raises an error that states its kind.
@@ -269,8 +275,12 @@ def detect(source: Source) -> str:
         return by_suffix  # its reader reports what is missing
     wanted = claimed if by_suffix else KNOWN
     if looks is None:
-        raise source.fault("F002.unknown-kind", wanted=wanted)
-    raise source.fault("F002.kind", wanted=wanted, looks=looks)
+        raise source.fault(
+            "F002.unknown-kind: expected a {wanted} file, found an unknown format", wanted=wanted
+        )
+    raise source.fault(
+        "F002.kind: expected a {wanted} file, found {looks}", wanted=wanted, looks=looks
+    )
 
 
 def _of_json(source: Source, head: bytes, key: str) -> str:
@@ -317,8 +327,14 @@ def _detect_folder(source: Source) -> str:
 
     models = published_names(source.path)
     if models:
-        raise source.fault("F002.model-folder", names=models)
-    raise source.fault("F002.unknown-folder")
+        raise source.fault(
+            wording.MODEL_FOLDER,
+            names=listed(models, 12),
+            remedy=Remedy(
+                "choose it with File > Models > Choose model folder", "name it with --model-path"
+            ),
+        )
+    raise source.fault(wording.UNKNOWN_FOLDER)
 
 
 def _is_archive(source: Source) -> bool:
@@ -381,5 +397,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
             notes: list[Diagnostic] = import_module(f"{__name__}.{key}").write(content, path)
             return notes
     known = list(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
-    values = {"suffix": suffix, "known": known}
-    raise UnsupportedFormatError(Diagnostic("F002.no-writer", values=values))
+    values = {"suffix": suffix, "known": listed(known, 12)}
+    raise UnsupportedFormatError(
+        Diagnostic('F002.no-writer: no writer for "{suffix}"; supported: {known}', values=values)
+    )

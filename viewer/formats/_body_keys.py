@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
 from viewer.phrases import printable
@@ -47,9 +48,15 @@ def scale_in(archive: Archive, key: str) -> float:
     """
     values = archive.array(key).values().ravel()
     if len(values) != 1:
-        raise archive.fault("F002.motion-single", item=key, found=len(values))
+        raise archive.fault(wording.MOTION_SINGLE, item=key, found=len(values))
     scale = float(finite(archive, key, values)[0])
     low, high = 1.0 / _MOST_SCALED, _MOST_SCALED
     if not low <= scale <= high:
-        raise archive.fault("F002.motion-scale", item=key, low=low, high=high, found=scale)
+        raise archive.fault(
+            "F002.motion-scale: {item}: expected {low:g} to {high:g}, found {found:g}",
+            item=key,
+            low=low,
+            high=high,
+            found=scale,
+        )
     return scale

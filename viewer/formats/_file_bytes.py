@@ -7,9 +7,11 @@ import stat
 from itertools import islice
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.interrupts import raising
+from viewer.phrases import optional
 
 MAX_SIZE = 2 << 30
 """Default size limit for files, bytes."""
@@ -53,8 +55,12 @@ def kind_of(path: Path, max_size: int) -> str | None:
     if not stat.S_ISREG(status.st_mode):
         return _KINDS.get(stat.S_IFMT(status.st_mode), "an unknown kind of file")
     if status.st_size > max_size:
-        values = {"most": max_size, "size": status.st_size}
-        raise FormatError(Diagnostic("F001.too-large", path, values=values))
+        values = {
+            "most": max_size,
+            "size": status.st_size,
+            "remedy": Remedy("", " (see --max-size)"),
+        }
+        raise FormatError(Diagnostic(wording.TOO_LARGE, path, values=values))
     return None
 
 
@@ -83,8 +89,15 @@ def read_pipe(path: Path, max_size: int) -> bytes | None:
                     parts.append(part)
                     size += len(part)
                     if size > max_size:
-                        values = {"most": max_size}
-                        raise FormatError(Diagnostic("F001.pipe-too-large", path, values=values))
+                        values = {"most": max_size, "remedy": Remedy("", " (see --max-size)")}
+                        raise FormatError(
+                            Diagnostic(
+                                "F001.pipe-too-large: expected at most {most:,.0f} bytes, found "
+                                "more{remedy}",
+                                path,
+                                values=values,
+                            )
+                        )
         except OSError as problem:
             raise _unreadable(path, problem) from None
         _piped[key] = b"".join(parts)
@@ -130,12 +143,18 @@ def _unreadable(path: Path, problem: Exception) -> FormatError:
 def unreadable(path: Path, reason: object, near: str = "") -> FormatError:
     """Return the error for a file that cannot be read."""
     return FormatError(
-        Diagnostic("F001.unreadable", path, values={"reason": str(reason), "near": near})
+        Diagnostic(
+            "F001.unreadable: cannot be read: {reason}{near}",
+            path,
+            values={"reason": str(reason), "near": optional("; {}", near)},
+        )
     )
 
 
 def no_file(path: Path, kind: str) -> FormatError:
-    return FormatError(Diagnostic("F001.no-file", path, values={"found": kind}))
+    return FormatError(
+        Diagnostic("F001.no-file: expected a file, found {found}", path, values={"found": kind})
+    )
 
 
 def _near_files(path: Path) -> str:

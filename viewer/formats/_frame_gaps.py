@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import FormatError
 from viewer.formats._source import Source
+from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import person_label
 
@@ -41,20 +42,40 @@ def gap_notes(source: Source, lost: Mapping[int | None, NDArray[np.integer]]) ->
     (N,), numbers of the lost frames, ascending; the person is None if there is only one.
     """
     frames = [
-        Phrase("frames-of", person="" if person is None else person_label(person), frames=span)
+        Phrase(
+            "{person}{frames}",
+            person=optional("{}, ", "" if person is None else person_label(person)),
+            frames=span,
+        )
         for person, numbers in lost.items()
         for span in frame_spans(numbers)
     ]
     if not frames:
         return []
     count = sum(map(len, lost.values()))
-    values = {"n": count, "frames": frames, "problem": _problem(source)}
-    return [Diagnostic("F007.frames-lost", source.path, values=values)]
+    values = {
+        "n": counted(count, "frame"),
+        "frames": listed(frames),
+        "problem": _problem(source),
+        "are": agree(count, "is a gap", "are gaps"),
+    }
+    return [
+        Diagnostic(
+            "F007.frames-lost: {n} with invalid numbers {are}: {frames}; first error: {problem}",
+            source.path,
+            values=values,
+        )
+    ]
 
 
 def no_frames(source: Source, count: int) -> FormatError:
     """Return the error for a motion in which no frame is valid."""
-    return source.fault("F003.frames-lost", n=count, problem=_problem(source))
+    return source.fault(
+        "F003.frames-lost: expected at least one valid frame, found none in {n}; first "
+        "error: {problem}",
+        n=counted(count, "frame"),
+        problem=_problem(source),
+    )
 
 
 def _problem(source: Source) -> Any:

@@ -21,7 +21,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.media.saving import save_text
-from viewer.phrases import printable
+from viewer.phrases import printable, quoted
 from viewer.rig.retargeting.joint_map import JointMap
 
 _NAME = r'"(?:\\.|[^"\\])*"|[^\s="#](?:(?!\s#)[^="])*?'
@@ -46,12 +46,25 @@ def read_joint_map(source: Source) -> JointMap:
         found = _LINE.fullmatch(line) if len(line) <= _LONGEST else None
         names = None if found is None else (_name(found[1]), _name(found[2] or ""))
         if names is None or names[0] is None or names[1] is None:
-            values = {"found": printable(line.strip(), 60)}
-            raise FormatError(Diagnostic("F002.joint-map", source.path, number, values=values))
+            values = {"found": quoted(printable(line.strip(), 60))}
+            raise FormatError(
+                Diagnostic(
+                    'F002.joint-map: expected "figure joint = motion joint", found {found}',
+                    source.path,
+                    number,
+                    values=values,
+                )
+            )
         pairs.append((names[0], names[1]))
         lines.append(number)
     if not pairs:
-        raise FormatError(Diagnostic("F002.joint-map-empty", source.path, number))
+        raise FormatError(
+            Diagnostic(
+                'F002.joint-map-empty: expected a line "figure joint = motion joint", found none',
+                source.path,
+                number,
+            )
+        )
     return JointMap(tuple(pairs), source.path, tuple(lines))
 
 

@@ -42,7 +42,11 @@ def refused_text(name: str) -> Phrase:
     ('is outside the folder: not read', 'is an absolute path: not read')
     """
     is_absolute = _is_absolute(name.replace("\\", "/"))
-    return Phrase("absolute-path") if is_absolute else Phrase("outside-folder")
+    return (
+        Phrase("is an absolute path: not read")
+        if is_absolute
+        else Phrase("is outside the folder: not read")
+    )
 
 
 def _is_absolute(written: str) -> bool:

@@ -13,7 +13,8 @@ import zipfile
 from functools import partial
 from typing import Literal
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
@@ -22,7 +23,7 @@ from viewer.formats._pickle.reading import named_archive
 from viewer.formats._pickle.tensors import Storage, storage_of
 from viewer.formats._pickle.values import Span, noun
 from viewer.formats._source import InvalidValueError
-from viewer.phrases import printable
+from viewer.phrases import counted, printable, quoted
 
 _PICKLE = "/data.pkl"
 _LARGEST_PICKLE = 64 << 20  # maximum bytes of the pickle, which does not contain the arrays
@@ -41,10 +42,18 @@ def open_torch(directory: ZipDirectory) -> Archive:
     found = [name for name in members if name.endswith(_PICKLE)]
     root = found[0].removesuffix("data.pkl")
     if len(found) > 1 or f"{root}constants.pkl" in members:
-        raise source.fault("F002.torch-kind")
+        raise source.fault(
+            "F002.torch-kind: expected a torch file of tensors, found a compiled module "
+            "(`torch.jit.save`), which is a program"
+        )
     size = members[found[0]].file_size
     if size > _LARGEST_PICKLE:
-        raise source.fault("F001.too-large", most=_LARGEST_PICKLE, size=size)
+        raise source.fault(
+            wording.TOO_LARGE,
+            most=_LARGEST_PICKLE,
+            size=size,
+            remedy=Remedy("", " (see --max-size)"),
+        )
     order: Literal["<", ">"] = "<"
     if f"{root}byteorder" in members:
         order = ">" if directory.archive.read(f"{root}byteorder") == b"big" else "<"
@@ -72,17 +81,19 @@ class _Storages:
         """Return the storage of a persistent id, after comparing its size with the archive's."""
         found = storage_of(persistent)
         if found is None:
-            raise InvalidValueError(Phrase("tensor-persistent"))
+            raise InvalidValueError(Phrase(wording.TENSOR_PERSISTENT))
         key, storage = found
         member = self._members.get(self._folder + key)
         if member is None:
-            raise InvalidValueError(Phrase("tensor-key", item=key))
+            raise InvalidValueError(Phrase(wording.TENSOR_KEY, item=quoted(key)))
         if member.file_size != storage.size:
-            values = {"item": key, "expected": storage.size, "found": member.file_size}
-            raise InvalidValueError(Phrase("tensor-member", **values))
+            values = {"item": quoted(key), "expected": storage.size, "found": member.file_size}
+            raise InvalidValueError(
+                Phrase("expected a storage {item} of {expected} bytes, found {found}", **values)
+            )
         known = self._known.setdefault(key, storage)
         if (known.code, known.count) != (storage.code, storage.count):
-            raise InvalidValueError(Phrase("tensor-storages", item=key))
+            raise InvalidValueError(Phrase(wording.TENSOR_STORAGES, item=quoted(key)))
         known.order, known.load = self._order, partial(_read_member, self._file, member)
         return known
 
@@ -108,7 +119,7 @@ def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
 
 
 def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
-    return storage.fault(key, Phrase("npy-damaged", reason=printable(problem, 100)))
+    return storage.fault(key, Phrase(wording.NPY_DAMAGED, reason=printable(problem, 100)))
 
 
 # Legacy streams of torch: files before version 1.6, and storages inside other pickles.
@@ -132,7 +143,9 @@ def read_bytes(outer: Machine, data: Span) -> object:
     found = read_stream(inner)
     outer.rejoin(inner)
     if not isinstance(found, Storage):
-        raise outer.fail(Phrase("torch-bytes", found=noun(found)))
+        raise outer.fail(
+            Phrase("expected a storage saved by torch, found {found}", found=noun(found))
+        )
     return found
 
 
@@ -143,9 +156,11 @@ def read_stream(machine: Machine) -> object:
     declared size.
     """
     if machine.run() != _NUMBER:
-        raise machine.fail(Phrase("torch-magic"))
+        raise machine.fail(Phrase("expected a torch file, found a pickle of a different kind"))
     if machine.run() != _PROTOCOL:
-        raise machine.fail(Phrase("torch-protocol", expected=_PROTOCOL))
+        raise machine.fail(
+            Phrase("expected torch protocol {expected}, found a different one", expected=_PROTOCOL)
+        )
     system = machine.run()
     is_little = not isinstance(system, dict) or system.get("little_endian") is not False
     storages: dict[str, Storage] = {}
@@ -156,7 +171,7 @@ def read_stream(machine: Machine) -> object:
     for key in keys if isinstance(keys, list) else []:
         _take(machine, storages, key)
     if any(storage.load is None for storage in storages.values()):
-        raise machine.fail(Phrase("tensor-no-storage"))
+        raise machine.fail(Phrase(wording.TENSOR_NO_STORAGE))
     return found
 
 
@@ -164,12 +179,12 @@ def _declare(storages: dict[str, Storage], order: Literal["<", ">"], persistent:
     """Return the storage of a persistent id, the same one for the same key."""
     found = storage_of(persistent)
     if found is None:
-        raise InvalidValueError(Phrase("tensor-persistent"))
+        raise InvalidValueError(Phrase(wording.TENSOR_PERSISTENT))
     key, storage = found
     storage.order = order
     known = storages.setdefault(key, storage)
     if (known.code, known.count) != (storage.code, storage.count):
-        raise InvalidValueError(Phrase("tensor-storages", item=key))
+        raise InvalidValueError(Phrase(wording.TENSOR_STORAGES, item=quoted(key)))
     return known
 
 
@@ -178,10 +193,16 @@ def _take(machine: Machine, storages: dict[str, Storage], key: object) -> None:
     name = key.text() if isinstance(key, Span) and key.coding is not None else ""
     storage = storages.get(name)
     if storage is None or storage.load is not None:
-        raise machine.fail(Phrase("tensor-key", item=name))
+        raise machine.fail(Phrase(wording.TENSOR_KEY, item=quoted(name)))
     count = machine.number(8, is_signed=True)
     if count != storage.count:
-        values = {"item": name, "expected": storage.count, "found": count}
-        raise machine.fail(Phrase("tensor-count", **values))
+        values = {
+            "item": quoted(name),
+            "expected": counted(storage.count, "element"),
+            "found": count,
+        }
+        raise machine.fail(
+            Phrase("expected {expected} in the storage {item}, found {found}", **values)
+        )
     start = machine.skip(storage.size)
     storage.load = Span(machine.data, start, machine.at).view

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
+from viewer.phrases import rounded
 from viewer.rig.arrays import Bools
 
 FARTHEST = 1e9
@@ -38,5 +39,9 @@ def within_text(found: float, limit: float = FARTHEST) -> Phrase:
     ('expected numbers within ±1e+09, found 1e+20', 'expected finite numbers, found inf')
     """
     if not np.isfinite(found):
-        return Phrase("not-finite", found=float(found))
-    return Phrase("beyond-limit", limit=limit, found=float(found))
+        return Phrase("expected finite numbers, found {found:g}", found=float(found))
+    return Phrase(
+        "expected numbers within ±{limit}, found {found:g}",
+        limit=rounded(limit, 2),
+        found=float(found),
+    )

@@ -54,7 +54,16 @@ class VideoImages:
         length = video.n_frames / video.rate
         if video.n_frames and length + 0.5 / video.rate < self._end:
             values = {"seconds": length, "end": self._end}
-            notes.append(str(Diagnostic("F007.video-short", video.path, values=values)))
+            notes.append(
+                str(
+                    Diagnostic(
+                        "F007.video-short: the video ends at {seconds:.2f} s, the capture at "
+                        "{end:.2f} s",
+                        video.path,
+                        values=values,
+                    )
+                )
+            )
         return notes
 
 

@@ -19,6 +19,8 @@ import math
 
 import numpy as np
 
+from viewer.diagnostics import wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive
@@ -26,6 +28,7 @@ from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_i
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
+from viewer.phrases import counted, listed, one_of
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 from viewer.rig.motion.body_motion import BodyMotion
@@ -141,12 +144,25 @@ def _held(table: Floats | None, bad: Bools) -> Floats | None:
 def _refusal(source: Source, archive: Archive) -> FormatError:
     keys = list(archive.keys)
     if archive.has("markers_latent") or "stagei." in source.path.name:
-        return source.fault("F002.motion-stage")
+        return source.fault(
+            "F002.motion-stage: expected a motion, found the first stage of a marker fit, "
+            "which has no poses: open the *_stageii.npz files instead"
+        )
     if not keys:
-        return source.fault("F002.motion-no-keys")
+        return source.fault(
+            "F002.motion-no-keys: expected a motion (poses, or root_orient and pose_body), "
+            "found no keys"
+        )
     if set(keys) <= {"betas", *_BESIDES.split(), *GENDERS, *MODELS, *RATES}:
-        return source.fault("F002.motion-shape", keys=keys)
-    return source.fault("F002.motion", keys=keys)
+        return source.fault(
+            "F002.motion-shape: expected a motion, found a subject's shape (keys {keys}): open "
+            "the *_poses.npz files instead",
+            keys=listed(keys, 8),
+        )
+    return source.fault(
+        "F002.motion: expected a motion (poses, or root_orient and pose_body), found keys {keys}",
+        keys=listed(keys, 8),
+    )
 
 
 def _rows(archive: Archive, key: str, count: int | None = None, first: str = "") -> Floats:
@@ -155,10 +171,14 @@ def _rows(archive: Archive, key: str, count: int | None = None, first: str = "")
     shape = array.shape if len(array.shape) > 1 else (1, *array.shape)
     if count is not None and shape[0] != count:
         raise archive.fault(
-            "F002.motion-frames", item=key, expected=count, other=first, found=shape[0]
+            "F002.motion-frames: {item}: expected {expected} as in {other}, found {found}",
+            item=key,
+            expected=counted(count, "frame"),
+            other=first,
+            found=shape[0],
         )
     if not shape[0]:
-        raise archive.fault("F002.motion-no-frames", item=key)
+        raise archive.fault("F002.motion-no-frames: {item}: expected frames, found none", item=key)
     values = array.values().reshape(shape[0], math.prod(shape[1:]))
     return (finite_or_nan if shape[0] > 1 else finite)(archive, key, values)
 
@@ -167,7 +187,7 @@ def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
     rows, known = _rows(archive, key), members_by_numbers()
     if rows.shape[1] not in known:
         raise archive.fault(
-            "F002.motion-width", item=key, expected=sorted(known), found=rows.shape[1]
+            wording.MOTION_WIDTH, item=key, expected=one_of(sorted(known)), found=rows.shape[1]
         )
     return known[rows.shape[1]], rows.reshape(len(rows), -1, 3)
 
@@ -177,7 +197,7 @@ def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str |
     there = [key for key in keys if archive.has(key)]
     for key in there[1:]:
         if not _are_same(_numbers(archive, there[0]), _numbers(archive, key)):
-            source.warn("F007.motion-differ", first=there[0], others=[key])
+            source.warn(wording.MOTION_DIFFER, first=there[0], others=listed([key], 12))
     return there[0] if there else None
 
 
@@ -215,7 +235,7 @@ def _compare_parts(
         if not _are_same(vectors[:, columns].ravel(), numbers):
             odd.append(part)
     if odd:
-        source.warn("F007.motion-differ", first=key, others=odd)
+        source.warn(wording.MOTION_DIFFER, first=key, others=listed(odd, 12))
 
 
 def _split_poses(
@@ -236,9 +256,14 @@ def _split_poses(
             hands[_HANDS[key]] = rows
             continue
         if columns not in joints:
-            raise archive.fault("F002.motion-width", item=key, expected=list(joints), found=columns)
+            raise archive.fault(
+                wording.MOTION_WIDTH, item=key, expected=one_of(list(joints)), found=columns
+            )
         if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
-            source.warn("F007.motion-angles", item=key)
+            source.warn(
+                "F007.motion-angles: {item}: angles used as stored, without the mean hand pose",
+                item=key,
+            )
         if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one eye
             _compare_again(source, key, joints[columns], rows, names, parts)
             continue
@@ -260,7 +285,10 @@ def _compare_again(
     vectors = np.concatenate(parts, axis=1).reshape(len(rows), -1, 3)
     columns = [names.index(name) for name in joints]
     if not _are_same(vectors[:, columns].ravel(), rows.ravel()):
-        source.warn("F007.motion-again", item=key)
+        source.warn(
+            "F007.motion-again: {item} omitted: an earlier array has other values for these joints",
+            item=key,
+        )
 
 
 def _flag(archive: Archive, key: str) -> bool:
@@ -270,11 +298,13 @@ def _flag(archive: Archive, key: str) -> bool:
 def _translations(source: Source, archive: Archive, count: int, first: str) -> Floats:
     key = _first_key(source, archive, _TRANSLATIONS)
     if key is None:
-        source.warn("F007.motion-place")
+        source.warn(wording.MOTION_PLACE)
         return np.zeros((count, 3))
     rows = _rows(archive, key, count, first)
     if rows.shape[1] != 3:
-        raise archive.fault("F002.motion-width", item=key, expected=[3], found=rows.shape[1])
+        raise archive.fault(
+            wording.MOTION_WIDTH, item=key, expected=one_of([3]), found=rows.shape[1]
+        )
     scale = scale_in(archive, "smpl_scaling") if archive.has("smpl_scaling") else 1.0
     return within_reach(archive, key, finite_or_nan(archive, key, rows / scale))
 
@@ -295,7 +325,7 @@ def _coefficients(
 def _single(archive: Archive, key: str) -> float:
     values = archive.array(key).values().ravel()
     if len(values) != 1:
-        raise archive.fault("F002.motion-single", item=key, found=len(values))
+        raise archive.fault(wording.MOTION_SINGLE, item=key, found=len(values))
     return float(finite(archive, key, values)[0])
 
 
@@ -303,16 +333,32 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
     rates = {key: _single(archive, key) for key in RATES if archive.has(key)}
     for key, rate in rates.items():
         if not is_rate(rate):
-            raise archive.fault("F002.motion-rate", item=key, low=SLOWEST, high=FASTEST, found=rate)
+            raise archive.fault(
+                "F002.motion-rate: {item}: expected {low:g} to {high:,.0f} frames per second, "
+                "found {found:g}",
+                item=key,
+                low=SLOWEST,
+                high=FASTEST,
+                found=rate,
+            )
     if len(set(rates.values())) > 1:
-        source.warn("F007.motion-rates", rates=[f"{key} {rate:g}" for key, rate in rates.items()])
+        source.warn(
+            wording.MOTION_RATES, rates=listed([f"{key} {rate:g}" for key, rate in rates.items()])
+        )
     if rates:
         return next(iter(rates.values()))
     if is_aist:
-        source.warn("F007.motion-aist-rate", rate=_RATE_OF_AIST)
+        source.warn(
+            "F007.motion-aist-rate: no frame rate: {rate:g} fps assumed, as in AIST++",
+            rate=_RATE_OF_AIST,
+        )
         return _RATE_OF_AIST
     if not source.options.get("fps"):  # a requested rate replaces the assumed one
-        source.warn("F007.no-rate", rate=_RATE)
+        source.warn(
+            wording.NO_RATE,
+            rate=_RATE,
+            remedy=Remedy("Frames per second in the Timeline sets it", "--fps sets it"),
+        )
     return _RATE
 
 
@@ -323,7 +369,7 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
         present = finite(archive, "present", archive.array("present").values().ravel())
         if len(present) != count:
             raise archive.fault(
-                "F002.motion-present",
+                "F002.motion-present: {item}: expected {expected} as in {other}, found {found}",
                 item="present",
                 expected=count,
                 other=first,
@@ -348,10 +394,12 @@ def _notice(source: Source, archive: Archive) -> None:
     if archive.has("dmpls"):
         moved = int(np.nan_to_num(_rows(archive, "dmpls")).any(axis=1).sum())
         if moved:
-            source.warn("F007.motion-tissue", n=moved)
+            source.warn(
+                "F007.motion-tissue: dmpls (soft tissue) of {n} omitted", n=counted(moved, "frame")
+            )
     odd = [key for key in archive.keys if key not in _KNOWN]
     if odd:
-        source.warn("F007.motion-keys", keys=odd)
+        source.warn("F007.motion-keys: ignored unknown keys: {keys}", keys=listed(odd, 12))
 
 
 def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> ShapeSpace:
@@ -359,6 +407,10 @@ def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> Sh
     said = [archive.objects(key) for key in GENDERS if archive.has(key)]
     gender, odd = gender_in(said[0] if said else None)
     if odd:
-        source.warn("F007.motion-gender", found=odd)
+        source.warn(
+            wording.MOTION_GENDER,
+            found=odd,
+            remedy=Remedy("open the model of the right gender first", "--gender sets it"),
+        )
     title = model_in(archive.objects(key) for key in MODELS if archive.has(key))
     return ShapeSpace(title or model_of_joints(names), gender)

@@ -21,13 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Part, Phrase
+from viewer.diagnostics import Diagnostic, Part, Phrase, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
 from viewer.formats._translation_limit import FARTHEST
 from viewer.media.saving import save_text
+from viewer.phrases import counted, listed, optional, quoted, rounded
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (
     EXTRAPOLATIONS,
@@ -87,7 +88,7 @@ class _Parser:
             elif text == b"channel":
                 channels.append(self._channel(len(channels)))
             else:
-                raise self._fault("F002.anim-item")
+                raise self._fault("F002.anim-item: {where}: expected a channel, found {found}")
         self._finish(count, stated, len(channels))
         self.source.remember("channels", self.starts.__getitem__)
         return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
@@ -97,27 +98,49 @@ class _Parser:
         if start > end:
             where = None if word is None else word.start()
             low, high = number_text(end), number_text(start)
-            self.source.warn("F007.anim-reversed", where, start=low, end=high)
+            self.source.warn(
+                "F007.anim-reversed: reversed range: read as {start} to {end}",
+                where,
+                start=low,
+                end=high,
+            )
         return min(start, end), max(start, end)
 
     def _key_span(self, channels: list[Channel]) -> tuple[float, float]:
         times = np.concatenate([np.zeros(0), *(channel.times for channel in channels)])
         span = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
         start, end = map(number_text, span)
-        self.source.warn("F007.anim-no-range", start=start, end=end)
+        self.source.warn(
+            "F007.anim-no-range: missing range: the range of the keys is used, {start} to {end}",
+            start=start,
+            end=end,
+        )
         return span
 
     def _finish(self, count: int | None, stated: Word | None, found: int) -> None:
         self.channel = None
         if self.word is None:
-            self.source.warn("F006.closing")
+            self.source.warn(wording.CLOSING)
         if count is None:
-            self._refuse("F002.anim-no-count", found=found)
+            self._refuse(
+                "F002.anim-no-count: {where}: expected numchannels, found {found}{begins}",
+                found=found,
+            )
         elif count != found:
-            self._refuse("F002.anim-channels", stated, expected=count, found=found)
+            self._refuse(
+                "F002.anim-channels: {where}: expected {expected} as declared by numchannels, "
+                "found {found}",
+                stated,
+                expected=counted(count, "channel"),
+                found=found,
+            )
         self._advance()
         if self.word is not None:
-            self.source.warn("F006.anim-after", self.word.start(), found=self.word.group())
+            self.source.warn(
+                "F006.anim-after: ignored data after the animation, starting with {found}",
+                self.word.start(),
+                found=quoted(self.word.group()),
+            )
 
     def _channel(self, index: int) -> Channel:
         self.channel = index
@@ -136,11 +159,16 @@ class _Parser:
                 extrapolation = (self._mode(), self._mode())
             elif text == b"keys":
                 if rows is not None:
-                    raise self._fault("F002.anim-keys-again")
+                    raise self._fault(
+                        "F002.anim-keys-again: {where}: expected a single list of keys, found a "
+                        "second one"
+                    )
                 self._advance()
                 rows = self._keys()
             else:
-                raise self._fault("F002.anim-channel-item")
+                raise self._fault(
+                    "F002.anim-channel-item: {where}: expected extrapolate or keys, found {found}"
+                )
         self._expect(b"}")
         return self._make_channel(index, rows or [], extrapolation)
 
@@ -152,11 +180,17 @@ class _Parser:
     ) -> Channel:
         times = [row[0] for row in rows]
         if not rows:
-            self.source.warn("C010.anim-no-keys", part="channels", places=[index], channel=index)
+            self.source.warn(
+                "C010.anim-no-keys: channel {channel} has no keys: value 0 used",
+                part="channels",
+                places=[index],
+                channel=index,
+            )
         if times != sorted(times):
             late = next(i for i in range(1, len(times)) if times[i] < times[i - 1])
             self.source.warn(
-                "C001.anim-sorted",
+                "C001.anim-sorted: channel {channel}: key {late} is earlier than key {before}; "
+                "keys sorted",
                 rows[late][4],
                 part="channels",
                 places=[index],
@@ -190,7 +224,12 @@ class _Parser:
         self.key = None
         found = len(rows) + lost
         if found != count:
-            self._refuse("F002.anim-keys", stated, expected=count, found=found)
+            self._refuse(
+                "F002.anim-keys: {where}: expected {expected}, found {found}",
+                stated,
+                expected=counted(count, "key"),
+                found=found,
+            )
         self._expect(b"}")
         return rows
 
@@ -202,23 +241,26 @@ class _Parser:
         if self.channel is None:
             return Phrase("animation")
         if self.key is None:
-            return Phrase("anim-channel", channel=self.channel)
-        return Phrase("anim-key", channel=self.channel, index=self.key)
+            return Phrase("channel {channel}", channel=self.channel)
+        return Phrase("channel {channel}, key {index}", channel=self.channel, index=self.key)
 
     def _begins(self) -> Phrase | None:
         """Return the location of the last channel if the file ends inside it, or None."""
         if self.word is not None:
             return None
         if self.channel is None:
-            return Phrase("anim-begins", where=Phrase("animation"), line=self.source.line(0))
-        channel = Phrase("anim-channel", channel=self.channel)
+            return Phrase(
+                "{where} begins on line {line}", where=Phrase("animation"), line=self.source.line(0)
+            )
+        channel = Phrase("channel {channel}", channel=self.channel)
         line = self.source.line(self.starts[self.channel])
-        return Phrase("anim-begins", where=channel, line=line)
+        return Phrase("{where} begins on line {line}", where=channel, line=line)
 
     def _values(self, own: dict[str, Any]) -> dict[str, Any]:
         """Return the values that all messages about the current word have in common."""
-        found = None if self.word is None else self.word.group()
-        return {"where": self._where(), "found": found, "begins": self._begins(), **own}
+        found = quoted(None if self.word is None else self.word.group())
+        begins = optional(" ({})", self._begins())
+        return {"where": self._where(), "found": found, "begins": begins, **own}
 
     def _fault(self, key: str, **values: Any) -> FormatError:
         """Return the exception for an error at the current word that stops parsing."""
@@ -236,13 +278,20 @@ class _Parser:
     def _expect(self, text: bytes) -> None:
         if self.word is None or self.word.group() != text:
             looks = self.source.looks_like() if text == b"animation" else None
-            raise self._fault("F002.anim-word", expected=text.decode(), looks=looks)
+            raise self._fault(
+                'F002.anim-word: {where}: expected "{expected}", found {found}{looks}{begins}',
+                expected=text.decode(),
+                looks=optional(" ({})", looks),
+            )
         self._advance()
 
     def _number(self, item: str, of_key: bool = False) -> float:
         """Read a number; NaN if it belongs to a key and is invalid."""
         if self.word is None:
-            raise self._fault("F002.anim-end", item=self._item(item))
+            raise self._fault(
+                "F002.anim-end: {item}: expected a number, found the end of the file{begins}",
+                item=self._item(item),
+            )
         word = self.word.group()
         value = to_number(word)
         if value is None:
@@ -251,26 +300,37 @@ class _Parser:
             self._refuse(number_key(word), item=self._item(item))
             value = math.nan
         elif item == "value" and abs(value) > FARTHEST:
-            self._refuse("F003.beyond", item=self._item(item), most=FARTHEST, found=value)
+            self._refuse(
+                wording.BEYOND, item=self._item(item), most=rounded(FARTHEST, 2), found=value
+            )
             value = math.nan
         self._advance()
         return value
 
     def _item(self, item: str) -> Phrase:
-        return Phrase("anim-item", where=self._where(), item=item)
+        return Phrase("{where}: {item}", where=self._where(), item=item)
 
     def _count(self, item: str) -> int:
         word, value = self.word, self._number(item)
         left = len(self.source.data) - (word.end() if word else 0)
         if value != int(value) or value < 0 or value * _WORDS_PER_KEY > left:
             self.word = word
-            raise self._fault("F002.anim-count", item=self._item(item), left=left)
+            raise self._fault(
+                "F002.anim-count: {item}: expected a count that fits the file, found {found} with "
+                "{left} bytes left",
+                item=self._item(item),
+                left=left,
+            )
         return int(value)
 
     def _mode(self) -> Extrapolation:
         mode = _MODES.get(self.word.group()) if self.word else None
         if mode is None:
-            raise self._fault("F002.anim-mode", modes=EXTRAPOLATIONS)
+            raise self._fault(
+                "F002.anim-mode: {where}: extrapolate: expected one of {modes}, found "
+                "{found}{begins}",
+                modes=listed(EXTRAPOLATIONS),
+            )
         self._advance()
         return mode
 
@@ -278,9 +338,13 @@ class _Parser:
         text = self.word.group() if self.word else b""
         tangent = _RULES.get(text, to_number(text))
         if tangent is None:
+            message = (
+                "F002.anim-tangent: {where}: tangent: expected {rules} or a number, found "
+                "{found}{begins}"
+            )
             if self.word is None or text in (b"{", b"}"):
-                raise self._fault("F002.anim-tangent", rules=TANGENT_RULES)
-            self._refuse("F002.anim-tangent", rules=TANGENT_RULES)
+                raise self._fault(message, rules=listed(TANGENT_RULES))
+            self._refuse(message, rules=listed(TANGENT_RULES))
             tangent = "smooth"
         self._advance()
         return tangent
@@ -294,9 +358,13 @@ def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     ``OutputError`` if the file cannot be written.
     """
     if not isinstance(clip, Clip):
-        raise UnsupportedFormatError(Diagnostic("F002.anim-figure"))
+        raise UnsupportedFormatError(
+            Diagnostic("F002.anim-figure: .anim stores a clip, not a figure")
+        )
     if [channel.target for channel in clip.channels] != list(range(len(clip.channels))):
-        raise UnsupportedFormatError(Diagnostic("F002.anim-order"))
+        raise UnsupportedFormatError(
+            Diagnostic("F002.anim-order: .anim needs one channel per DOF, in the order of the DOFs")
+        )
     head = f"animation {{\n\trange {clip.start!r} {clip.end!r}\n"
     head += f"\tnumchannels {len(clip.channels)}\n"
     save_text(path, head + "".join(map(_channel_text, clip.channels)) + "}\n")

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.checking import (
     archive_of,
     are_indices,
@@ -33,6 +34,7 @@ from viewer.formats._archive.checking import (
 from viewer.formats._archive.values import Archive
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import Source
+from viewer.phrases import listed, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.bodies.model_parameters import PER_JOINT, ModelParameters, driven_dofs
@@ -95,15 +97,25 @@ def _files(source: Source) -> tuple[Source, Source]:
     place = source.inside if source.is_folder else source.beside
     names = _file_names(folder)
     if _RIG not in names:
-        raise source.fault("F002.mhr-folder")
+        raise source.fault(
+            "F002.mhr-folder: expected rig.npz and lod*.npz in the folder: MHR's "
+            "`convert_assets.py` writes them, and its `download_assets.py --lod 1` downloads "
+            "them"
+        )
     rig = source if source.path.name == _RIG else place(_RIG)
     named = _LOD.fullmatch(source.path.name)
     wanted = source.option("lod") or (named[1] if named else "")
     levels = sorted(int(match[1]) for match in map(_LOD.fullmatch, names) if match)
     if not levels:
-        raise source.fault("F002.mhr-no-lod")
+        raise source.fault(
+            "F002.mhr-no-lod: expected lod0.npz to lod6.npz next to rig.npz, found none"
+        )
     if wanted and wanted not in map(str, levels):
-        raise source.fault("F002.mhr-lod", found=wanted, known=list(map(str, levels)))
+        raise source.fault(
+            "F002.mhr-lod: --lod: no level of detail {found}; available levels: {known}",
+            found=quoted(wanted),
+            known=listed(list(map(str, levels)), 12),
+        )
     fine = [level for level in levels if level >= _USUAL]
     level = wanted or (fine[0] if fine else levels[0])
     is_this = named is not None and named[1] == str(level)
@@ -122,7 +134,12 @@ def _opened(source: Source, keys: str) -> Archive:
     archive = archive_of(source)
     missing = [key for key in keys.split() if not archive.has(key)]
     if missing:
-        raise source.fault("F002.mhr-keys", missing=missing, found=list(archive.keys))
+        raise source.fault(
+            "F002.mhr-keys: expected MHR's portable files; keys missing: {missing}; keys "
+            "found: {found}",
+            missing=listed(missing, 12),
+            found=listed(list(archive.keys), 12),
+        )
     return archive
 
 
@@ -130,7 +147,11 @@ def _parameters(archive: Archive, n_shapes: int) -> ModelParameters:
     """Return the model parameters, without those of the blend shapes, which come last."""
     version = archive.array("schema_version", ()).values()
     if int(version) != _VERSION:
-        raise archive.fault("F002.mhr-version", item="schema_version", found=int(version))
+        raise archive.fault(
+            "F002.mhr-version: {item}: expected version 1, found {found}",
+            item="schema_version",
+            found=int(version),
+        )
     n_joints = archive.array("joint_offsets", (None, 3)).shape[0]
     transform = finite_array(archive, "parameter_transform", (PER_JOINT * n_joints, None))
     names = archive.array("parameter_names", (transform.shape[1],), "SU").values().tolist()
@@ -138,7 +159,11 @@ def _parameters(archive: Archive, n_shapes: int) -> ModelParameters:
     if count < 0 or transform[:, count:].any():
         found = transform.shape[1]
         raise archive.fault(
-            "F002.mhr-parameters", item="parameter_transform", found=found, n=n_shapes
+            "F002.mhr-parameters: {item}: expected the parameters of {n} blend shapes at the "
+            "end, without effect on joints, found {found} columns",
+            item="parameter_transform",
+            found=found,
+            n=n_shapes,
         )
     return ModelParameters(tuple(map(str, names[:count])), transform[:, :count])
 
@@ -153,7 +178,7 @@ def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
     wrong = np.flatnonzero((parents >= places) | (parents % 1 != 0) | (is_root != (places == 0)))
     if len(wrong):
         joint = int(wrong[0])
-        key = "F002.root" if joint == 0 else "S001.parent"
+        key = wording.ROOT if joint == 0 else wording.LATE_PARENT
         found = float(parents[joint])
         raise archive.fault(key, item="joint_parents", joint=joint, found=found)
     rotations = _quaternions(archive, "joint_prerotations", count)
@@ -175,7 +200,7 @@ def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
 def _quaternions(archive: Archive, key: str, count: int) -> Floats:
     values = finite_array(archive, key, (count, 4))
     if not values.any(axis=1).all():
-        raise archive.fault("F002.mhr-quaternion", item=key)
+        raise archive.fault(wording.MHR_QUATERNION, item=key)
     return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
@@ -198,7 +223,7 @@ def _skin(lod: Archive, n_vertices: int, inverse_bind: Floats) -> Skin:
     weights = finite_array(lod, "skin_weights", (n_vertices, None))
     joints = lod.array("skin_indices", weights.shape).values()
     if not are_indices(joints, len(inverse_bind)):
-        raise lod.fault("F002.mhr-index", item="skin_indices", last=len(inverse_bind) - 1)
+        raise lod.fault(wording.MHR_INDEX, item="skin_indices", last=len(inverse_bind) - 1)
     vertices, slots = np.nonzero(weights > _SMALLEST)
     return skin_from_entries(
         n_vertices,
@@ -214,7 +239,7 @@ def _bind_matrices(archive: Archive, n_joints: int) -> Floats:
     key = "inverse_bind_pose"
     rows = finite_array(archive, key, (n_joints, 8))
     if not rows[:, 3:7].any(axis=1).all():
-        raise archive.fault("F002.mhr-quaternion", item=key)
+        raise archive.fault(wording.MHR_QUATERNION, item=key)
     matrices = np.tile(np.eye(4), (n_joints, 1, 1))
     matrices[:, :3, :3] = quaternion_to_matrix(rows[:, 3:7]) * rows[:, 7:, None]
     matrices[:, :3, 3] = rows[:, :3]
@@ -242,7 +267,7 @@ def _correctives(
 ) -> Correctives | None:
     """Return the correctives; their offsets stay in single precision, to save memory."""
     if not (lod.has("corrective_blendshapes") and rig.has("0.sparse_indices")):
-        source.warn("F007.mhr-correctives")
+        source.warn("F007.mhr-correctives: no pose correctives: plain linear blend skinning")
         return None
     array = lod.array("corrective_blendshapes", (None, n_vertices, 3))
     feature = _feature(rig, n_joints, array.shape[0])
@@ -269,6 +294,6 @@ def _feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFeature:
     entries = finite_array(archive, "0.sparse_weight", (indices.shape[1],))
     for row, end in enumerate((n_weights, 6 * (n_joints - 2))):
         if not are_indices(indices[row], end):
-            raise archive.fault("F002.mhr-index", item="0.sparse_indices", last=end - 1)
+            raise archive.fault(wording.MHR_INDEX, item="0.sparse_indices", last=end - 1)
     outputs, inputs = indices.astype(np.int32)
     return NetworkFeature(n_joints, n_weights, outputs, inputs, entries)

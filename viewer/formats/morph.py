@@ -16,9 +16,11 @@ import re
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats.skin.tables import find_block, read_count, read_rows, to_whole
+from viewer.phrases import optional, quoted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.morph_target import MorphTarget
 
@@ -51,12 +53,16 @@ def read(source: Source) -> MorphTarget:
         sections[name], position = _section(source, name.decode(), word)
     if b"positions" not in sections:
         looks = source.looks_like()
-        raise source.fault("F002.morph-positions", None if looks else source.end, looks=looks)
+        raise source.fault(
+            "F002.morph-positions: expected a positions section, found none{looks}",
+            None if looks else source.end,
+            looks=optional(" ({})", looks),
+        )
     positions = sections[b"positions"]
     if len(positions.vertices) == 0:
-        source.warn("F007.morph-empty")
+        source.warn("F007.morph-empty: empty: moves no vertex")
     if b"normals" not in sections:
-        source.warn("F007.morph-normals")
+        source.warn("F007.morph-normals: no normals section: normals unchanged")
         return MorphTarget(source.path.stem, positions.vertices, positions.values)
     normals = sections[b"normals"]
     _check_same(source, positions, normals)
@@ -65,28 +71,36 @@ def read(source: Source) -> MorphTarget:
 
 def _unexpected(source: Source, word: re.Match[bytes], is_repeated: bool) -> FormatError:
     if is_repeated:
-        return source.fault("F002.morph-repeated", word.start(), section=word.group().decode())
-    return source.fault("F002.morph-section", word.start(), found=word.group())
+        return source.fault(
+            "F002.morph-repeated: expected one {section} section, found a second one",
+            word.start(),
+            section=word.group().decode(),
+        )
+    return source.fault(
+        "F002.morph-section: expected positions or normals, found {found}",
+        word.start(),
+        found=quoted(word.group()),
+    )
 
 
 def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[_Section, int]:
     """Read a section without its invalid rows, and return the offset of its end."""
     count, position = read_count(source, name, header)
     block = find_block(source, name, header, position)
-    rows, offset_of = read_rows(source, block, count, _WIDTH, item="entry")
+    rows, offset_of = read_rows(source, block, count, _WIDTH, item="{section}, entry {index}")
     if len(rows) != count:
         source.refuse(
-            "F002.skin-declared", header.start(), section=name, expected=count, found=len(rows)
+            wording.SKIN_DECLARED, header.start(), section=name, expected=count, found=len(rows)
         )
     if not block.closed:
-        source.warn("F006.last-brace", section=name)
+        source.warn(wording.LAST_BRACE, section=name)
     known = np.flatnonzero(~np.isnan(rows).any(axis=1))
     vertices, _ = to_whole(rows[known, 0])
     wrong = known[(vertices != rows[known, 0]) | (vertices < 0)]
     if len(wrong):
         row = int(wrong[0])
         source.refuse(
-            "F002.morph-index",
+            "F002.morph-index: {section}: expected a vertex index, found {found:g}",
             offset_of(row),
             len(wrong),
             section=name,
@@ -99,7 +113,7 @@ def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[_Secti
         twice = np.setdiff1d(np.arange(len(known)), first)
         row = int(known[twice[0]])
         source.refuse(
-            "F002.morph-twice",
+            "F002.morph-twice: {section}: expected unique vertices, found vertex {vertex} again",
             offset_of(row),
             len(twice),
             section=name,
@@ -114,7 +128,8 @@ def _check_same(source: Source, positions: _Section, normals: _Section) -> None:
     """Refuse positions and normals of different vertices."""
     if len(positions.vertices) != len(normals.vertices):
         raise source.fault(
-            "F002.morph-counts",
+            "F002.morph-counts: expected as many normals as positions, found {second} normals "
+            "(line {other}) and {first} positions (line {line})",
             normals.header,
             line=source.line(positions.header),
             first=len(positions.vertices),
@@ -125,7 +140,8 @@ def _check_same(source: Source, positions: _Section, normals: _Section) -> None:
     if len(differs):
         row = int(differs[0])
         raise source.fault(
-            "F002.morph-vertices",
+            "F002.morph-vertices: normals: expected vertex {expected} as in positions, found "
+            "vertex {found}",
             normals.header,
             found=int(normals.vertices[row]),
             expected=int(positions.vertices[row]),

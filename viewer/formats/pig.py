@@ -35,7 +35,7 @@ from viewer.formats._placeholders import neutral_corners, neutral_positions
 from viewer.formats._source import Source
 from viewer.formats._text.table import read_table
 from viewer.media.file_names import folder_name
-from viewer.phrases import printable
+from viewer.phrases import listed, optional, printable
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
@@ -48,7 +48,7 @@ from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
 
 _Indices = NDArray[np.int64]
-_JOINT, _VERTEX = "noun-joint", "noun-vertex"  # keys of phrases
+_JOINT, _VERTEX = "joint", "vertex"  # keys of phrases
 
 _CORE = {
     "vertices": 3,
@@ -136,7 +136,7 @@ class _Part:
         if self.offset_of is not None:
             return ""
         name = printable(self.name, 60)
-        return name if row is None else Phrase("row-of", name=name, index=row)
+        return name if row is None else Phrase("{name}: row {index}", name=name, index=row)
 
     def odd_offset(self, wanted: int) -> int | None:
         """Return the offset of the first surplus row, or of the last row if rows are missing."""
@@ -204,7 +204,10 @@ def _from_folder(source: Source) -> _PigFiles:
     present = {path.name for path in source.path.iterdir()}
     missing = [f"{name}.txt" for name in _CORE if f"{name}.txt" not in present]
     if missing:
-        raise source.fault("F002.pig-folder", missing=missing)
+        raise source.fault(
+            "F002.pig-folder: expected a PIG folder; files missing: {missing}",
+            missing=listed(missing, 12),
+        )
     files = _PigFiles()
     for name, columns in _WIDTHS.items():
         if f"{name}.txt" in present:
@@ -232,7 +235,11 @@ def _from_archive(source: Source) -> _PigFiles:
     archive = archive_of(source)
     missing = [name for name in _CORE if not archive.has(name)]
     if missing:
-        raise source.fault("F002.pig-keys", missing=missing, found=list(archive.keys))
+        raise source.fault(
+            "F002.pig-keys: expected a PIG model; keys missing: {missing}; keys found: {found}",
+            missing=listed(missing, 12),
+            found=listed(list(archive.keys), 12),
+        )
     files = _PigFiles()
     for name, columns in _WIDTHS.items():
         if archive.has(name):
@@ -264,7 +271,9 @@ def _archive_part(source: Source, name: str, columns: int) -> _Part:
     numbers = archive.array(name, shape).values()
     values = finite(archive, name, numbers, _PARTS.get(name, "")).reshape(-1, columns)
     if len(values) == 0:
-        raise archive.fault("F002.no-rows", item=name)
+        raise archive.fault(
+            "F002.no-rows: {item}: expected at least one row, found none", item=name
+        )
     return _Part(name, values, source)
 
 
@@ -314,22 +323,31 @@ def _parents(part: _Part) -> Ints:
 def _refuse_parent(part: _Part, parents: Floats, joint: int) -> None:
     found, values = float(parents[joint]), {"joint": joint}
     if joint == 0:
-        key, values = "F002.pig-root", {}
+        key = "F002.pig-root: {item}joint 0: expected the root, whose parent is -1, found {found:g}"
+        values = {}
     elif found == -1.0:
-        key = "F002.pig-roots"
+        key = "F002.pig-roots: {item}joint {joint}: expected one root, found a second"
     else:
         key = "S002.parent" if cycle_members(parents)[joint] else "S001.parent"
+        key += ": {item}joint {joint}: expected a parent before it, found {found:g}"
     part.source.refuse(
-        key, part.offset(joint), 1, "joints", [joint], item=part.item(joint), found=found, **values
+        key,
+        part.offset(joint),
+        1,
+        "joints",
+        [joint],
+        item=optional("{}: ", part.item(joint)),
+        found=found,
+        **values,
     )
 
 
 def _count_fault(part: _Part, wanted: int, other: _Part) -> FormatError:
     """Return the error for a part whose number of rows differs from another part's."""
     return part.source.fault(
-        "F002.pig-rows-as",
+        "F002.pig-rows-as: {item}expected {expected} rows as in {other}, found {found}",
         part.odd_offset(wanted),
-        item=part.item(),
+        item=optional("{}: ", part.item()),
         expected=wanted,
         other=other.name,
         found=len(part.values),
@@ -341,11 +359,11 @@ def _mesh(source: Source, parts: dict[str, _Part], positions: Floats) -> Mesh:
     uvs, uv_triangles = None, None
     if "textures" in parts and "faces_tex" in parts:
         uvs = parts["textures"].values
-        uv_triangles = _corners(parts["faces_tex"], "noun-texture-coordinate", parts["textures"])
+        uv_triangles = _corners(parts["faces_tex"], "texture coordinate", parts["textures"])
         if len(uv_triangles) != len(triangles):
             raise _count_fault(parts["faces_tex"], len(triangles), parts["faces_vert"])
     else:
-        source.warn("F007.pig-texture")
+        source.warn("F007.pig-texture: no textures or faces_tex: drawn untextured")
     # Normals are computed before vertices are split, to avoid visible seams.
     normals = vertex_normals(positions, triangles)
     return Mesh(positions, normals, triangles, uvs, uv_triangles=uv_triangles)
@@ -360,7 +378,14 @@ def _skin(parts: dict[str, _Part], joints: Floats, n_vertices: int) -> Skin:
     lost = vertices[~usable & (vertices >= 0)]
     if not usable.all():
         # Errors in these rows are recorded already; this marks vertices with incomplete weights.
-        part.source.refuse("F002.pig-lost", None, 0, "weights", lost, item=part.item())
+        part.source.refuse(
+            "F002.pig-lost: {item}rows with invalid entries",
+            None,
+            0,
+            "weights",
+            lost,
+            item=optional("{}: ", part.item()),
+        )
         columns, vertices, weights = columns[usable], vertices[usable], weights[usable]
     rows = np.flatnonzero(usable)
     part.remember("weights", lambda vertex: _row_of(rows, vertices, vertex))
@@ -370,10 +395,11 @@ def _skin(parts: dict[str, _Part], joints: Floats, n_vertices: int) -> Skin:
     if len(twice):
         row = int(order[twice + 1].min())
         part.source.refuse(
-            "F002.pig-twice",
+            "F002.pig-twice: {item}expected unique pairs, found joint {joint} and vertex "
+            "{vertex} again",
             part.offset(int(rows[row])),
             len(twice),
-            item=part.item(int(rows[row])),
+            item=optional("{}: ", part.item(int(rows[row]))),
             joint=int(columns[row]),
             vertex=int(vertices[row]),
         )
@@ -406,7 +432,7 @@ def _pose_layout(n_joints: int) -> PoseLayout:
 
 def _body_parts(files: _PigFiles, n_vertices: int) -> BodyParts | None:
     names = files.part_names
-    of_vertex = _column(files.parts, "body_parts", n_vertices, len(names) or 1000, "noun-body-part")
+    of_vertex = _column(files.parts, "body_parts", n_vertices, len(names) or 1000, "body part")
     if of_vertex is None:
         return None
     count = len(names) or int(of_vertex.max(initial=0)) + 1
@@ -432,7 +458,7 @@ def _reduced(parts: dict[str, _Part], n_vertices: int) -> ReducedMesh | None:
     if "reduced_ids" not in parts or "reduced_faces" not in parts:
         return None
     vertices = _indices(parts["reduced_ids"], 0, n_vertices, _VERTEX, parts["vertices"])
-    corners = _corners(parts["reduced_faces"], "noun-reduced-vertex", parts["reduced_ids"])
+    corners = _corners(parts["reduced_faces"], "reduced vertex", parts["reduced_ids"])
     return ReducedMesh(vertices, corners)
 
 
@@ -445,9 +471,10 @@ def _symmetry(parts: dict[str, _Part], n_vertices: int) -> Ints | None:
         vertex = int(wrong[0])
         part = parts["sym"]
         raise part.source.fault(
-            "F002.pig-symmetry",
+            "F002.pig-symmetry: {item}expected vertices paired with each other, found {vertex} "
+            "-> {partner} -> {back}",
             part.offset(vertex),
-            item=part.item(vertex),
+            item=optional("{}: ", part.item(vertex)),
             vertex=vertex,
             partner=int(partners[vertex]),
             back=int(partners[partners[vertex]]),
@@ -462,9 +489,9 @@ def _column(parts: dict[str, _Part], name: str, rows: int, end: int, noun: str) 
     part = parts[name]
     if len(part.values) != rows:
         raise part.source.fault(
-            "F002.pig-rows",
+            "F002.pig-rows: {item}expected {expected} rows, found {found}",
             part.odd_offset(rows),
-            item=part.item(),
+            item=optional("{}: ", part.item()),
             expected=rows,
             found=len(part.values),
         )
@@ -492,16 +519,22 @@ def _columns(part: _Part, columns: slice, end: int, noun: str, rows_of: _Part | 
         row, column = wrong[0].tolist()
         is_mesh = part.name.startswith("faces_vert")
         part.source.refuse(
-            "W010.pig-joint" if noun == _JOINT else "F002.pig-index",
+            "W010.pig-joint: {item}expected a {noun} index from 0 to {last}, found "
+            "{found:.16g}{proof}"
+            if noun == _JOINT
+            else "F002.pig-index: {item}expected a {noun} index from 0 to {last}, found "
+            "{found:.16g}{proof}",
             part.offset(row),
             len(wrong),
             "triangles" if is_mesh else "",
             wrong[:, 0] if is_mesh else None,
-            item=part.item(row),
+            item=optional("{}: ", part.item(row)),
             noun=Phrase(noun),
             last=end - 1,
             found=float(values[row, column]),
-            proof=Phrase("rows-as", name=rows_of.name, n=end) if rows_of else "",
+            proof=optional(
+                ": {}", Phrase("{name} has {n} rows", name=rows_of.name, n=end) if rows_of else ""
+            ),
         )
     if fits.all():
         return values.astype(np.int32)

@@ -35,7 +35,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.opening import is_archive
@@ -53,7 +54,7 @@ from viewer.formats._text.table import read_numbers
 from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
-from viewer.phrases import printable
+from viewer.phrases import axes, listed, optional, printable, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
@@ -119,7 +120,9 @@ def read(source: Source) -> PoseRecord:
         return _from_values(_parse_json(source))
     numbers = read_numbers(source)
     if len(numbers) == 0:
-        raise source.fault("F002.pose-empty", found=source.looks_like())
+        raise source.fault(
+            "F002.pose-empty: expected pose values, found {found}", found=source.looks_like()
+        )
     end = len(source.data.rstrip())
     return PoseRecord(vector=numbers, line_of=lambda part, name: source.line(end))
 
@@ -137,11 +140,15 @@ def _archive_values(source: Source) -> _NamedValues:
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
         both = _NamedValues(source, {"dof_names": names, "dofs": dofs})
-        labels = both.array("dof_names", "U", Phrase("pose-names"))
-        numbers = both.array("dofs", "iuf", Phrase("pose-numbers"))
+        labels = both.array("dof_names", "U", Phrase("names"))
+        numbers = both.array("dofs", "iuf", Phrase("numbers"))
         if labels.ndim != 1 or labels.shape != numbers.shape:
             sizes = {"expected": numbers.size, "found": labels.size}
-            raise source.fault("F002.pose-names", item="dof_names", **sizes)
+            raise source.fault(
+                "F002.pose-names: {item}: expected {expected} names to match dofs, found {found}",
+                item="dof_names",
+                **sizes,
+            )
         values["dofs"] = dict(zip(labels.tolist(), numbers.tolist(), strict=True))
     return _NamedValues(source, values)
 
@@ -152,7 +159,7 @@ def _from_values(named: _NamedValues) -> PoseRecord:
     version = version.tolist() if isinstance(version, np.ndarray) else version
     if version != _VERSION:
         raise named.fault(
-            "F002.pose-array",
+            wording.POSE_ARRAY,
             "viewer_pose",
             item="viewer_pose",
             expected=_VERSION,
@@ -179,7 +186,10 @@ def _from_values(named: _NamedValues) -> PoseRecord:
     )
     if translation is not None and len(translation) != 3:
         raise named.fault(
-            "F002.pose-three", keys["translation"], item="translation", found=len(translation)
+            "F002.pose-three: {item}: expected 3 numbers, found {found}",
+            keys["translation"],
+            item="translation",
+            found=len(translation),
         )
     _check_keys(named, record)
     return record
@@ -198,21 +208,31 @@ def _numbers(named: _NamedValues, key: str) -> Floats | None:
     is_per_joint = key in _PER_JOINT and array.shape[-1:] == (3,)
     frames = math.prod(array.shape[: -2 if is_per_joint else -1])
     if frames > 1:
-        raise named.fault("F002.pose-frames", key, item=key, found=frames)
+        raise named.fault(
+            "F002.pose-frames: {item}: expected a single pose, found {found} frames",
+            key,
+            item=key,
+            found=frames,
+        )
     return array.ravel()
 
 
 def _single(named: _NamedValues, key: str) -> float | None:
     values = _numbers(named, key)
     if values is not None and len(values) != 1:
-        raise named.fault("F002.pose-single", key, item=key, found=len(values))
+        raise named.fault(
+            "F002.pose-single: {item}: expected a single number, found {found}",
+            key,
+            item=key,
+            found=len(values),
+        )
     return None if values is None else float(values[0])
 
 
 def _flag(named: _NamedValues, key: str) -> bool | None:
     if named.values.get(key) is None:
         return None
-    return bool(named.array(key, "bi", Phrase("pose-flag")).all())
+    return bool(named.array(key, "bi", Phrase("true or false")).all())
 
 
 def _dofs(named: _NamedValues) -> dict[str, float]:
@@ -220,13 +240,23 @@ def _dofs(named: _NamedValues) -> dict[str, float]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise named.fault("F002.pose-dofs", "dofs", found=_described(given))
+        raise named.fault(
+            "F002.pose-dofs: dofs: expected an object mapping names to numbers, found {found}",
+            "dofs",
+            found=_described(given),
+        )
     dofs: dict[str, float] = {}
     for name, value in given.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not abs(value) < 1e9:
             item = printable(name, 60)
-            raise named.fault("F002.pose-dof", "dofs", name, item=item, found=describe(value))
+            raise named.fault(
+                "F002.pose-dof: dofs: {item}: expected a number, found {found}",
+                "dofs",
+                name,
+                item=item,
+                found=describe(value),
+            )
         dofs[str(name)] = float(value)
     return dofs
 
@@ -236,7 +266,12 @@ def _shape_space(named: _NamedValues) -> ShapeSpace:
     key = next((key for key in GENDERS if values.get(key) is not None), GENDERS[0])
     gender, odd = gender_in(values.get(key))
     if odd:
-        named.warn("F007.motion-gender", key, found=odd)
+        named.warn(
+            wording.MOTION_GENDER,
+            key,
+            found=odd,
+            remedy=Remedy("open the model of the right gender first", "--gender sets it"),
+        )
     said = [values[key] for key in MODELS if key in values]
     # This program writes the titles of all models, others those of the SMPL family.
     title = str(said[0]) if said and "viewer_pose" in values else ""
@@ -261,10 +296,19 @@ def _check_keys(named: _NamedValues, record: PoseRecord) -> None:
         known = (*_KNOWN, *_NOT_NEEDED, *_ROTATION_KEYS)
         odd = next((key for key in named.values if key not in known), "")
         if not named.values:
-            raise named.fault("F002.pose-no-keys")
+            raise named.fault(
+                "F002.pose-no-keys: expected a pose (dofs, poses, body_pose, betas …), found no "
+                "keys"
+            )
         where = [odd] if odd else []
         near = did_you_mean(odd, (*_KNOWN, *_ROTATION_KEYS))
-        raise named.fault("F002.pose-keys", *where, keys=list(named.values), near=near)
+        raise named.fault(
+            "F002.pose-keys: expected a pose (dofs, poses, body_pose, betas …), found keys "
+            "{keys}{near}",
+            *where,
+            keys=listed(list(named.values), 12),
+            near=optional("; {}", near),
+        )
     used = (
         (*_KNOWN, *_NOT_NEEDED)
         if record.joint_rotations is None
@@ -272,14 +316,18 @@ def _check_keys(named: _NamedValues, record: PoseRecord) -> None:
     )
     unread = [key for key in named.values if key not in used]
     if unread:
-        named.warn("F007.pose-keys", unread[0], keys=[*map(_with_hint, unread)])
+        named.warn(
+            "F007.pose-keys: ignored unknown keys: {keys}",
+            unread[0],
+            keys=listed([*map(_with_hint, unread)], 12),
+        )
 
 
 def _with_hint(key: str) -> Phrase | str:
     """Return a description of an unknown key, with the most similar known key."""
     near = [] if key in _ROTATION_KEYS else near_names(key, (*_KNOWN, *_ROTATION_KEYS))[:1]
     shown = printable(key, 40)
-    return Phrase("pose-key-near", name=shown, near=question(near)) if near else shown
+    return Phrase("{name} ({near})", name=shown, near=question(near)) if near else shown
 
 
 def _read_rotations(named: _NamedValues) -> JointRotations | None:
@@ -308,10 +356,16 @@ def _read_rotations(named: _NamedValues) -> JointRotations | None:
 
 
 def _joint_names(named: _NamedValues) -> tuple[str, ...]:
-    names = named.array("joint_names", "U", Phrase("pose-names"))
+    names = named.array("joint_names", "U", Phrase("names"))
     if names.ndim != 1:
         key = "joint_names"
-        raise named.fault("F002.pose-list", key, item=key, found=names.ndim)
+        raise named.fault(
+            "F002.pose-list: {item}: expected a one-dimensional list of names, found {found} "
+            "dimensions",
+            key,
+            item=key,
+            found=names.ndim,
+        )
     return tuple(names.tolist())
 
 
@@ -322,17 +376,23 @@ def _quaternions(named: _NamedValues, key: str, names: tuple[str, ...]) -> Float
     if len(short):
         row = int(short[0])
         joint = printable(names[row], 60)
-        raise named.fault("F002.pose-quaternion", key, row, item=key, joint=joint)
+        raise named.fault(
+            "F002.pose-quaternion: {item}: {joint}: expected a quaternion, found four zeros",
+            key,
+            row,
+            item=key,
+            joint=joint,
+        )
     return rows
 
 
 def _rows(named: _NamedValues, key: str, count: int, width: int) -> Floats:
-    array = named.array(key, "iuf", Phrase("pose-numbers"))
+    array = named.array(key, "iuf", Phrase("numbers"))
     if array.shape != (count, width):
-        expected = Phrase("wanted-numbers", shape=(count, width))
-        shape = Phrase("pose-shape", shape=array.shape)
-        found = shape if array.shape else Phrase("pose-one-number")
-        raise named.fault("F002.pose-array", key, item=key, expected=expected, found=found)
+        expected = Phrase("{shape} numbers", shape=axes((count, width)))
+        shape = Phrase("{shape}", shape=axes(array.shape))
+        found = shape if array.shape else Phrase("a single number")
+        raise named.fault(wording.POSE_ARRAY, key, item=key, expected=expected, found=found)
     return named.numbers(key)
 
 
@@ -340,7 +400,7 @@ def _meanings(named: _NamedValues, count: int) -> tuple[str, ...]:
     """Return the meaning of each joint; an empty tuple if their number differs."""
     if named.values.get("joint_meanings") is None:
         return ()
-    found = named.array("joint_meanings", "U", Phrase("pose-names"))
+    found = named.array("joint_meanings", "U", Phrase("names"))
     return tuple(found.tolist()) if found.shape == (count,) else ()
 
 
@@ -356,7 +416,11 @@ def _left(named: _NamedValues) -> Floats:
 def _up(named: _NamedValues) -> str:
     word = _word(named, "up", "y")
     if word not in _UPS:
-        raise named.fault("F002.pose-up", "up", found=printable(word, 20))
+        raise named.fault(
+            'F002.pose-up: up: expected "y" or "z", found {found}',
+            "up",
+            found=quoted(printable(word, 20)),
+        )
     return word
 
 
@@ -364,7 +428,12 @@ def _word(named: _NamedValues, key: str, default: str) -> str:
     value = named.values.get(key, default)
     word = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if not isinstance(word, str):
-        raise named.fault("F002.pose-word", key, item=key, found=describe(value))
+        raise named.fault(
+            "F002.pose-word: {item}: expected a string, found {found}",
+            key,
+            item=key,
+            found=describe(value),
+        )
     return word[:_LONGEST_WORD]
 
 
@@ -411,19 +480,25 @@ class _NamedValues:
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return array
         path, odd = _odd_value(value, kinds)
-        found = Phrase("pose-ragged") if path is None else _described(odd)
+        found = Phrase("ragged lists") if path is None else _described(odd)
         raise self.fault(
-            "F002.pose-array", key, *(path or ()), item=key, expected=expected, found=found
+            wording.POSE_ARRAY, key, *(path or ()), item=key, expected=expected, found=found
         )
 
     def numbers(self, key: str) -> Floats:
         """Return an array of finite numbers; see ``array``."""
-        array = self.array(key, "iuf", Phrase("pose-numbers")).astype(np.float64)
+        array = self.array(key, "iuf", Phrase("numbers")).astype(np.float64)
         wrong = np.argwhere(~(np.abs(array) <= LARGEST))
         if len(wrong):
             place = wrong[0].tolist()
             found = float(array[tuple(place)])
-            raise self.fault("F003.pose-number", key, *place, item=key, found=found)
+            raise self.fault(
+                "F003.pose-number: {item}: expected finite numbers, found {found:g}",
+                key,
+                *place,
+                item=key,
+                found=found,
+            )
         return array
 
 
@@ -475,17 +550,20 @@ def _parse_json(source: Source) -> _NamedValues:
         )
     except json.JSONDecodeError as problem:
         place = _byte_offset(text, problem.pos)
-        raise source.fault("F002.json", place, reason=printable(problem.msg, 100)) from None
+        raise source.fault(wording.JSON, place, reason=printable(problem.msg, 100)) from None
     except RecursionError:
         place = _byte_offset(text, nesting_place(text, _DEEPEST))
-        raise source.fault("F002.json-nesting", place) from None
+        raise source.fault(wording.JSON_NESTING, place) from None
     if odd:
         raise _odd_json(source, text)
     named = _NamedValues(source, values if isinstance(values, dict) else {}, text)
     if not isinstance(values, dict):
         is_word = values is None or isinstance(values, bool)
-        found = Phrase("pose-word", word=json.dumps(values)) if is_word else describe(values)
-        raise named.fault("F002.pose-object", found=found)
+        found = Phrase("{word}", word=json.dumps(values)) if is_word else describe(values)
+        raise named.fault(
+            "F002.pose-object: expected a pose (an object with named values), found {found}",
+            found=found,
+        )
     return named
 
 
@@ -500,11 +578,13 @@ def _odd_json(source: Source, text: str) -> FormatError:
     constant, repeated = constant_place(text), repeated_key(text)
     if constant is not None:
         return source.fault(
-            "F002.json-constant", _byte_offset(text, constant[1]), found=constant[0]
+            "F002.json-constant: expected a finite number, found {found}",
+            _byte_offset(text, constant[1]),
+            found=constant[0],
         )
     assert repeated is not None  # a repeated key is the only remaining reason
     found = printable(repeated[0], 40)
-    return source.fault("F002.json-twice", _byte_offset(text, repeated[1]), found=found)
+    return source.fault(wording.JSON_TWICE, _byte_offset(text, repeated[1]), found=found)
 
 
 def _byte_offset(text: str, place: int) -> int:
@@ -518,7 +598,7 @@ def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError
         line = record.line_of(problem.part, problem.name)
     found = problem.diagnostic
     if found is None:
-        found = Diagnostic("F002.pose-misfit", values={"problem": str(problem)})
+        found = Diagnostic("F002.pose-misfit: {problem}", values={"problem": str(problem)})
     return FormatError(replace(found, path=path, line=line))
 
 

@@ -15,9 +15,11 @@ import re
 from pathlib import Path
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
+from viewer.phrases import counted, quoted
 
 _WORD = re.compile(rb'[{}]|"[^"\r\n]*"|[^{}\s]+')
 
@@ -51,11 +53,18 @@ def read(source: Source) -> NamedFiles:
     while words and words[-1].group() != b"}":
         files += _item(source, words)
     if not words:
-        source.warn("F006.closing")
+        source.warn(wording.CLOSING)
     elif len(words) > 1:
-        source.warn("F006.rig-after", words[-2].start(), found=words[-2].group())
+        source.warn(
+            "F006.rig-after: ignored data after the rig, starting with {found}",
+            words[-2].start(),
+            found=quoted(words[-2].group()),
+        )
     if not files:
-        raise source.fault("F002.rig-empty", _next(source, words)[0])
+        raise source.fault(
+            "F002.rig-empty: expected the file name of a skeleton or skin, found none",
+            _next(source, words)[0],
+        )
     return NamedFiles(" ".join(name) or source.path.stem, tuple(files))
 
 
@@ -64,18 +73,27 @@ def _item(source: Source, words: Words) -> list[Path]:
     if word.group() in (b"skeleton", b"skin"):
         return [_file(source, words, word.group().decode())]
     if word.group() != b"morphs":
-        raise source.fault("F002.rig-item", word.start(), found=word.group())
+        raise source.fault(
+            "F002.rig-item: expected skeleton, skin or morphs, found {found}",
+            word.start(),
+            found=quoted(word.group()),
+        )
     count = to_number(words[-1].group()) if words else None
     if count is None or count != int(count) or count < 0:
         where, found = _next(source, words)
-        raise source.fault("F002.count", where, item="morphs", found=found)
+        raise source.fault(wording.COUNT, where, item="morphs", found=quoted(found))
     stated = words.pop()
     _expect(source, words, b"{")
     files = []
     while words and words[-1].group() != b"}":
         files.append(_file(source, words, "morphs"))
     if len(files) != count:
-        raise source.fault("F002.rig-morphs", stated.start(), expected=int(count), found=len(files))
+        raise source.fault(
+            "F002.rig-morphs: morphs: expected {expected}, found {found}",
+            stated.start(),
+            expected=counted(int(count), "file"),
+            found=len(files),
+        )
     _expect(source, words, b"}")
     return files
 
@@ -83,11 +101,22 @@ def _item(source: Source, words: Words) -> list[Path]:
 def _file(source: Source, words: Words, item: str) -> Path:
     if not words or words[-1].group() in (b"{", b"}"):
         where, found = _next(source, words)
-        raise source.fault("F002.rig-name", where, item=item, found=found)
+        raise source.fault(
+            "F002.rig-name: {item}: expected a file name, found {found}",
+            where,
+            item=item,
+            found=quoted(found),
+        )
     word = words.pop()
     path = referenced_path(source.path.parent, _text(word))
     if path is None:
-        raise source.fault("F002.rig-outside", word.start(), item=item, found=word.group())
+        raise source.fault(
+            "F002.rig-outside: {item}: expected a file within the folder of the .rig, found "
+            "{found}",
+            word.start(),
+            item=item,
+            found=quoted(word.group()),
+        )
     return path
 
 
@@ -98,7 +127,12 @@ def _text(word: re.Match[bytes]) -> str:
 def _expect(source: Source, words: Words, text: bytes) -> None:
     if not words or words[-1].group() != text:
         where, found = _next(source, words)
-        raise source.fault("F002.rig-word", where, expected=text.decode(), found=found)
+        raise source.fault(
+            'F002.rig-word: expected "{expected}", found {found}',
+            where,
+            expected=text.decode(),
+            found=quoted(found),
+        )
     words.pop()
 
 

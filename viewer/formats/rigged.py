@@ -40,12 +40,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import wording
 from viewer.errors import FormatError, RigError
 from viewer.formats._archive.checking import archive_of, corners_of, finite, finite_array
 from viewer.formats._archive.values import Archive
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
+from viewer.phrases import counted, quoted
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bytes, Deferred, Floats
 from viewer.rig.blendshapes import Correctives
@@ -88,10 +90,17 @@ def read(source: Source) -> Figure:
     archive = archive_of(source)
     version = int(finite_array(archive, "viewer_rig", ()))
     if version != _VERSION:
-        raise archive.fault("F002.rig-version", item="viewer_rig", expected=_VERSION, found=version)
+        raise archive.fault(
+            "F002.rig-version: {item}: expected version {expected}, found {found}",
+            item="viewer_rig",
+            expected=_VERSION,
+            found=version,
+        )
     up = archive.text("up")
     if up not in ("y", "z"):
-        raise archive.fault("F002.rig-up", item="up", found=up[:20])
+        raise archive.fault(
+            "F002.rig-up: {item}: expected y or z, found {found}", item="up", found=quoted(up[:20])
+        )
     try:
         skeleton = _skeleton(archive)
         count = skeleton.n_joints
@@ -110,7 +119,7 @@ def read(source: Source) -> Figure:
     except RigError as problem:
         if problem.diagnostic is not None:
             raise FormatError(replace(problem.diagnostic, path=source.path)) from None
-        raise source.fault("F002.rig-parts", problem=str(problem)) from None
+        raise source.fault("F002.rig-parts: {problem}", problem=str(problem)) from None
 
 
 def _mesh(archive: Archive) -> Mesh:
@@ -154,7 +163,7 @@ def _materials(archive: Archive) -> tuple[Material, ...]:
     names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
     if len(names) != len(textures):
         raise archive.fault(
-            "F002.value", item="material_textures", expected=len(names), found=len(textures)
+            wording.VALUE, item="material_textures", expected=len(names), found=len(textures)
         )
     materials = []
     for index, (name, texture) in enumerate(zip(names, textures, strict=True)):
@@ -165,7 +174,7 @@ def _materials(archive: Archive) -> tuple[Material, ...]:
         return tuple(materials)
     records = _texts(archive, _RECORDS)
     if len(records) != len(names):
-        raise archive.fault("F002.value", item=_RECORDS, expected=len(names), found=len(records))
+        raise archive.fault(wording.VALUE, item=_RECORDS, expected=len(names), found=len(records))
     pictures: dict[str, Bytes | None] = {}
     return tuple(
         _completed(archive, material, records[index], index, pictures)
@@ -202,7 +211,10 @@ def _completed(
         return replace(material, **found, **record)
     except (ValueError, TypeError, AttributeError, RecursionError, RigError) as problem:
         raise archive.fault(
-            "F002.rig-material", item=_RECORDS, index=index, problem=str(problem)[:200]
+            "F002.rig-material: {item}: row {index} is not a material: {problem}",
+            item=_RECORDS,
+            index=index,
+            problem=str(problem)[:200],
         ) from None
 
 
@@ -255,8 +267,8 @@ def _parents(archive: Archive, count: int) -> NDArray[Any]:
         return parents
     cycles = cycle_members(parents)
     for key, joints in (
-        ("S002.parent", late[cycles[late]]),
-        ("S001.parent", late[~cycles[late]]),
+        (wording.CYCLIC_PARENT, late[cycles[late]]),
+        (wording.LATE_PARENT, late[~cycles[late]]),
     ):
         if len(joints):
             archive.refuse(
@@ -282,7 +294,8 @@ def _limits(archive: Archive, n_dofs: int) -> Floats:
     dof = int(wrong.argmax())
     low, high = limits[dof].tolist()
     archive.refuse(
-        "S003.rig-limits",
+        "S003.rig-limits: {item}: DOF {dof}: expected a minimum not above the maximum, "
+        "found {low:g} and {high:g}",
         item="dof_limits",
         count=int(wrong.sum()),
         dof=dof,
@@ -302,12 +315,16 @@ def _skin(archive: Archive, n_joints: int) -> Skin:
     inverse_bind = finite_array(archive, "inverse_bind", (None, 4, 4), "bindings")
     if len(inverse_bind) != n_joints:
         raise archive.fault(
-            "B001.rig-matrices", item="inverse_bind", expected=n_joints, found=len(inverse_bind)
+            "B001.rig-matrices: {item}: expected {expected}, one per joint, found {found}",
+            item="inverse_bind",
+            expected=counted(n_joints, "matrix"),
+            found=len(inverse_bind),
         )
     wrong = (joints < 0) | (joints >= n_joints)
     if wrong.any() and len(joints) == len(weights):
         archive.refuse(
-            "W010.vertex",
+            "W010.vertex: {item}: vertex {vertex}: expected a joint index from 0 to {last}, "
+            "found {found}",
             item="skin_joints",
             count=int(wrong.sum()),
             part="weights",
@@ -338,7 +355,10 @@ def _layout(archive: Archive, n_joints: int) -> PoseLayout | None:
     ends = (int(starts.max()) + 3, translation + 3 * (translation >= 0), scale + 1)
     if starts.min() < 0 or max(ends) > total:
         raise archive.fault(
-            "F002.rig-layout", item="layout_counts", expected=max(ends), found=total
+            "F002.rig-layout: {item}: expected at least {expected}, found {found}",
+            item="layout_counts",
+            expected=max(ends),
+            found=total,
         )
     return PoseLayout(total, starts.astype(np.int32), is_euler, translation, scale)
 
@@ -351,7 +371,12 @@ def _hand(archive: Archive, index: int, n_joints: int) -> Hand:
     key = f"hand_{index}_joints"
     joints = _numbers(archive, key, (None,))
     if ((joints < 0) | (joints >= n_joints)).any():
-        raise archive.fault("F002.rig-hand", item=key, last=n_joints - 1)
+        raise archive.fault(
+            "F002.rig-hand: {item}: expected joint indices from 0 to {last}, found indices out "
+            "of range",
+            item=key,
+            last=n_joints - 1,
+        )
     return Hand(
         archive.text(f"hand_{index}_side"),
         joints,

@@ -24,10 +24,11 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Part, Phrase
+from viewer.diagnostics import Diagnostic, Part, Phrase, wording
 from viewer.errors import UnsupportedFormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST, is_infinite, is_number, to_number
+from viewer.phrases import brief, counted, optional, quoted, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
@@ -68,7 +69,11 @@ def read(source: Source) -> Figure:
     if not joints:
         looks = source.looks_like()
         where = None if looks else source.end
-        raise source.fault("F002.no-joint", where, looks=looks)
+        raise source.fault(
+            "F002.no-joint: expected a skeleton, found no balljoint{looks}",
+            where,
+            looks=optional(" ({})", looks),
+        )
     source.remember("joints", lambda joint: joints[joint].start)
     skeleton, dofs = _skeleton(source, joints)
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
@@ -120,7 +125,7 @@ class _Parser:
         if self.word is None or self.word.group() != b"{":
             where = start if self.word is None else self.word.start()
             raise self.source.fault(
-                "F002.opening", where, item=_called(joint), found=_text(self.word)
+                wording.OPENING, where, item=_called(joint), found=quoted(_text(self.word))
             )
         self.open.append(len(self.found))
         self.found.append(joint)
@@ -168,18 +173,44 @@ class _Parser:
         refuse, word, places = self.source.refuse, _text(self.word), [self.open[-1]]
         part: Part = "joints" if keyword.group() == b"offset" else "items"
         owner = _called(self.found[self.open[-1]])
-        item = Phrase("of", item=keyword.group().decode(), owner=owner)
+        item = Phrase("{item} of {owner}", item=keyword.group().decode(), owner=owner)
         start, here = keyword.start(), self.word.start() if self.word else 0
         if found == expected:
-            refuse("F002.more", here, 1, part, places, item=item, expected=expected, found=word)
+            refuse(
+                wording.MORE,
+                here,
+                1,
+                part,
+                places,
+                item=item,
+                expected=counted(expected, "number"),
+                found=quoted(word),
+            )
         elif word is None:
             refuse(
-                "F002.width-end", start, 1, part, places, item=item, expected=expected, found=found
+                "F002.width-end: {item}: expected {expected}, found {found} before the end of the "
+                "file",
+                start,
+                1,
+                part,
+                places,
+                item=item,
+                expected=counted(expected, "number"),
+                found=found,
             )
         elif word in (b"{", b"}", *KEYWORDS):
-            refuse("F002.width", start, 1, part, places, item=item, expected=expected, found=found)
+            refuse(
+                wording.WIDTH,
+                start,
+                1,
+                part,
+                places,
+                item=item,
+                expected=counted(expected, "number"),
+                found=found,
+            )
         else:
-            refuse(number_key(word), here, 1, part, places, item=item, found=word)
+            refuse(number_key(word), here, 1, part, places, item=item, found=quoted(word))
         self._skip_item()
 
     def _skip_item(self, on_line: bool = True) -> None:
@@ -202,7 +233,7 @@ class _Parser:
         """Skip an unknown word with its line and numbers, or with its whole balanced block."""
         assert self.word is not None  # checked by the caller
         keyword = self.word
-        self.source.warn("F006.unknown", keyword.start(), found=keyword.group())
+        self.source.warn(wording.UNKNOWN, keyword.start(), found=quoted(keyword.group()))
         if keyword.group() != b"{":
             self._advance()
             # One warning for the whole line: "colour red" is a single unknown item.
@@ -215,7 +246,7 @@ class _Parser:
             self._advance()
             if depth == 0:
                 return
-        raise self.source.fault("F002.open", keyword.start(), word=keyword.group())
+        raise self.source.fault(wording.OPEN, keyword.start(), word=quoted(keyword.group()))
 
     def _finds_block(self) -> bool:
         """Move to the "{" of ``word name? {`` if such a block follows."""
@@ -233,16 +264,16 @@ class _Parser:
         if len(self.open) > 1:
             joint = self.found[self.open[-1]]
             raise self.source.fault(
-                "F002.joint-open",
+                wording.JOINT_OPEN,
                 self.source.end,
-                found=None,
+                found=quoted(None),
                 joint=_called(joint),
                 line=self.source.line(joint.start),
             )
         if self.open:
-            self.source.warn("F006.closing")
+            self.source.warn(wording.CLOSING)
         if self.extra_braces:
-            self.source.warn("F006.extra-braces", n=self.extra_braces)
+            self.source.warn(wording.EXTRA_BRACES, n=self.extra_braces)
 
 
 def _text(word: _Word | None) -> bytes | None:
@@ -250,7 +281,7 @@ def _text(word: _Word | None) -> bytes | None:
 
 
 def _called(joint: _Joint) -> Phrase:
-    return Phrase("joint", name=joint.name) if joint.name else Phrase("unnamed-joint")
+    return Phrase("joint {name}", name=brief(joint.name)) if joint.name else Phrase("unnamed joint")
 
 
 def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
@@ -292,11 +323,12 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
         joint, axis = joints[wrong[0] // 3], int(wrong[0] % 3)
         low, high = limits[wrong[0]].tolist()
         source.warn(
-            "S003.ignored",
+            "S003.ignored: ignored {n} with minimum above maximum (first: rot{axis}limit "
+            "{low:g} {high:g} of {joint})",
             joint.limits[axis][1],
             part="items",
             places=wrong // 3,
-            n=len(wrong),
+            n=counted(len(wrong), "limit"),
             axis=DOF_KINDS[3 + axis],
             low=low,
             high=high,
@@ -314,9 +346,11 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ..
 
     first = int(moved[0])
     beyond = beyond_text(skeleton, first, float(dofs[first]))
-    values = {"n": len(moved), "dof": beyond}
+    values = {"n": counted(len(moved), "DOF"), "dof": beyond}
     joints = np.unique(skeleton.dof_joints[moved])
-    clamped = Diagnostic("S004.clamped", part="joints", places=joints, values=values)
+    clamped = Diagnostic(
+        "S004.clamped: {n} clamped: {dof}", part="joints", places=joints, values=values
+    )
     return (("pose outside limits", clamped),)
 
 
@@ -333,7 +367,9 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     from viewer.media.saving import save_text
 
     if figure.skeleton is None:
-        raise _unsupported("F002.skel-none", figure=figure.name)
+        raise _unsupported(
+            "F002.skel-none: figure {figure} has no skeleton to write as .skel", figure=figure.name
+        )
     _check_dofs(figure.skeleton)
     _check_numbers(figure.skeleton)
     _check_names(figure.skeleton)
@@ -345,26 +381,36 @@ def _check_dofs(skeleton: Skeleton) -> None:
     unturned = np.allclose(skeleton.rest_rotations[:, :3], 0.0, atol=1e-12)
     unscaled = np.allclose(skeleton.rest_scales, 1.0, atol=1e-12)
     if not (unturned and unscaled):
-        raise _unsupported("F002.skel-rest")
+        raise _unsupported(
+            "F002.skel-rest: .skel cannot store joints with a rest rotation or scale"
+        )
     rotations = np.arange(6, 3 * skeleton.n_joints + 3)
     table = np.concatenate([np.arange(6), np.tile([3, 4, 5], skeleton.n_joints - 1)])
     owners = np.concatenate([np.zeros(6, int), 1 + (rotations - 6) // 3])
     if not (
         np.array_equal(skeleton.dof_kinds, table) and np.array_equal(skeleton.dof_joints, owners)
     ):
-        raise _unsupported("F002.skel-dofs")
+        raise _unsupported(
+            "F002.skel-dofs: .skel can store only rotations about x, y and z as DOFs"
+        )
     if skeleton.rest_dofs[:3].any() or np.isfinite(skeleton.dof_limits[:3]).any():
-        raise _unsupported("F002.skel-root")
+        raise _unsupported(
+            "F002.skel-root: .skel cannot store a root translation in the pose, or its limits"
+        )
 
 
 def _check_numbers(skeleton: Skeleton) -> None:
     limits = skeleton.dof_limits
     finite = np.isfinite(limits)
     if (finite & np.stack([limits[:, 0] <= -_UNLIMITED, limits[:, 1] >= _UNLIMITED], 1)).any():
-        raise _unsupported("F002.skel-limits", most=_UNLIMITED)
+        raise _unsupported(
+            "F002.skel-limits: .skel treats limits beyond ±{most:.0f} as unlimited", most=_UNLIMITED
+        )
     arrays = [skeleton.rest_translations, skeleton.boxes, skeleton.rest_dofs, limits[finite]]
     if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
-        raise _unsupported("F002.skel-numbers", most=LARGEST)
+        raise _unsupported(
+            "F002.skel-numbers: .skel cannot store numbers beyond ±{most}", most=rounded(LARGEST)
+        )
 
 
 def _check_names(skeleton: Skeleton) -> None:
@@ -375,12 +421,17 @@ def _check_names(skeleton: Skeleton) -> None:
         while ancestors and ancestors[-1] != parent:
             ancestors.pop()
         if parent >= 0 and not ancestors:
-            raise _unsupported("F002.skel-order", joint=joint_label(skeleton, joint))
+            raise _unsupported(
+                "F002.skel-order: .skel lists joints depth-first; joint {joint} is out of order",
+                joint=joint_label(skeleton, joint),
+            )
         ancestors.append(joint)
     for name in skeleton.names:
         words = as_words(name)
         if words is None or KEYWORDS & set(words):
-            raise _unsupported("F002.skel-name", name=name)
+            raise _unsupported(
+                'F002.skel-name: .skel cannot store the joint name "{name}"', name=name
+            )
 
 
 def _unsupported(key: str, **values: Any) -> UnsupportedFormatError:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.checking import (
     archive_of,
     corners_of,
@@ -26,6 +27,7 @@ from viewer.formats._archive.checking import (
 from viewer.formats._archive.values import Archive
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
+from viewer.phrases import listed
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
 from viewer.rig.bodies.joint_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
@@ -56,7 +58,9 @@ def read(source: Source) -> Figure:
     archive = archive_of(source)
     missing = [key for key in _KEYS.split() if not archive.has(key)]
     if missing:
-        raise source.fault("F002.smpl-keys", missing=missing, found=list(archive.keys))
+        raise source.fault(
+            wording.SMPL_KEYS, missing=listed(missing, 12), found=listed(list(archive.keys), 12)
+        )
     positions = finite_array(archive, "skin_template_v", (None, 3), "positions")
     given = archive.array("skin_template_f", (None, 3)).values()
     triangles = corners_of(archive, "skin_template_f", given, len(positions))
@@ -67,7 +71,7 @@ def read(source: Source) -> Figure:
     regressor = JointRegressor(len(JOINTS), rows.astype(np.int32), columns.astype(np.int32), values)
     joints = regress_joints(regressor, positions)
     if archive.has("skel_template_v"):
-        source.warn("F007.skel-bones")
+        source.warn("F007.skel-bones: the skeleton mesh (`skel_template_v`) is omitted")
     return Figure(
         name=source.path.stem,
         mesh=Mesh(positions, vertex_normals(positions, triangles), triangles),
@@ -109,7 +113,10 @@ def _parents(archive: Archive) -> Ints:
     places = np.arange(len(JOINTS))
     inner = table[0, 1:]
     if (table[1] != places).any() or ((inner < 0) | (inner >= places[1:]) | (inner % 1 != 0)).any():
-        raise archive.fault("F002.skel-tree", item="osim_kintree_table")
+        raise archive.fault(
+            "F002.skel-tree: {item}: expected 24 joints in order, parents before children",
+            item="osim_kintree_table",
+        )
     return np.append(-1, inner).astype(np.int32)
 
 
@@ -117,7 +124,11 @@ def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:
     products = np.swapaxes(matrices, 1, 2) @ matrices
     wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > _ROUNDED
     if wrong.any():
-        raise archive.fault("F002.skel-rotation", item=key, joint=int(wrong.argmax()))
+        raise archive.fault(
+            "F002.skel-rotation: {item}: joint {joint}: expected a rotation matrix",
+            item=key,
+            joint=int(wrong.argmax()),
+        )
 
 
 def _skin(archive: Archive, joints: Floats, n_vertices: int) -> Skin:
@@ -144,7 +155,7 @@ def _shapes(archive: Archive, n_vertices: int) -> BlendShapes | None:
 
 def _correctives(source: Source, archive: Archive, n_vertices: int) -> Correctives | None:
     if not archive.has("posedirs"):
-        source.warn("F007.smpl-posedirs")
+        source.warn(wording.SMPL_POSEDIRS)
         return None
     feature = MappedFeature(_SMPL, _N_SMPL)
     array = archive.array("posedirs", (n_vertices, 3, feature.n_weights))

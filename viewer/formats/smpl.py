@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.formats._archive.checking import (
     archive_of,
     are_indices,
@@ -32,7 +32,7 @@ from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
-from viewer.phrases import printable
+from viewer.phrases import axes, listed, printable, rounded
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
@@ -81,7 +81,9 @@ def read(source: Source) -> Figure:
     archive = archive_of(source)
     missing = [key for key in KEYS if not archive.has(key)]
     if missing:
-        raise source.fault("F002.smpl-keys", missing=missing, found=list(archive.keys))
+        raise source.fault(
+            wording.SMPL_KEYS, missing=listed(missing, 12), found=listed(list(archive.keys), 12)
+        )
     used: list[str] = []
     mesh = _mesh(source, archive, used)
     parents = _parents(archive, used)
@@ -116,7 +118,10 @@ def read(source: Source) -> Figure:
 def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
     positions = finite_array(archive, "v_template", ("V", 3), "positions")
     if len(positions) == 0:
-        raise archive.fault("F002.smpl-no-vertex", item="v_template")
+        raise archive.fault(
+            "F002.smpl-no-vertex: {item}: expected at least one vertex, found none",
+            item="v_template",
+        )
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
     positions = neutral_positions(positions, triangles)
     used += ["v_template", "f"]
@@ -139,7 +144,7 @@ def _uvs(
     uvs = finite_array(archive, "vt", ("U", 2))
     corners = archive.array("ft", (n_triangles, 3)).values()
     if not are_indices(corners, len(uvs)):
-        source.warn("F007.smpl-uvs")
+        source.warn("F007.smpl-uvs: `vt` and `ft` do not match: omitted")
         return None, None
     used += ["vt", "ft"]
     return uvs, corners.astype(np.int32)
@@ -150,15 +155,19 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
     table = archive.array("kintree_table").values()
     if table.ndim not in (1, 2) or (table.ndim == 2 and len(table) != 2) or table.size == 0:
         raise archive.fault(
-            "F002.value",
+            wording.VALUE,
             item="kintree_table",
-            expected=Phrase("wanted-numbers", shape=(2, "J")),
+            expected=Phrase("{shape} numbers", shape=axes((2, "J"))),
             found=describe(archive.get("kintree_table")),
         )
     rows = np.atleast_2d(table).astype(np.float64)
     ids = rows[1] if len(rows) == 2 else np.arange(rows.shape[1])
     if (ids != np.arange(len(ids))).any():
-        raise archive.fault("F002.smpl-joints", item="kintree_table")
+        raise archive.fault(
+            "F002.smpl-joints: {item}: expected joint indices 0, 1, 2 … in the second row, "
+            "found different indices",
+            item="kintree_table",
+        )
     parents = rows[0].copy()
     if np.isin(parents[0], (*_ROOTS, 0.0)):
         parents[0] = -1.0
@@ -176,12 +185,29 @@ def _refuse_parent(archive: Archive, parents: Floats, joint: int) -> None:
     key, found = "kintree_table", float(parents[joint])
     is_cycle = cycle_members(parents)[joint]
     if joint and np.isin(found, _ROOTS):
-        archive.refuse("F002.roots", item=key, part="joints", places=[joint], joint=joint)
+        archive.refuse(
+            "F002.roots: {item}: expected one root, found joints 0 and {joint}",
+            item=key,
+            part="joints",
+            places=[joint],
+            joint=joint,
+        )
     elif joint:
-        code = "S002.parent" if is_cycle else "S001.parent"
-        archive.refuse(code, item=key, part="joints", places=[joint], joint=joint, found=found)
+        code = wording.CYCLIC_PARENT if is_cycle else wording.LATE_PARENT
+        archive.refuse(
+            code,
+            item=key,
+            part="joints",
+            places=[joint],
+            joint=joint,
+            found=found,
+        )
     else:
-        code = "S002.root" if is_cycle else "F002.root"
+        code = (
+            "S002.root: {item}: joint 0: expected the root, whose parent is -1, found {found:g}"
+            if is_cycle
+            else wording.ROOT
+        )
         archive.refuse(code, item=key, part="joints", places=[0], found=found)
 
 
@@ -199,13 +225,14 @@ def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]
     if abs(sums[worst] - 1.0) > _ODD_SUM:
         wrong = np.flatnonzero(np.abs(sums - 1.0) > _ODD_SUM)
         archive.refuse(
-            "F002.smpl-regressor",
+            "F002.smpl-regressor: {item}: joint {joint}: expected weights that sum to 1, found "
+            "{found}",
             item="J_regressor",
             count=len(wrong),
             part="joints",
             places=wrong,
             joint=worst,
-            found=float(sums[worst]),
+            found=rounded(float(sums[worst]), 4),
         )
     used.append("J_regressor")
     return JointRegressor(n_joints, joints.astype(np.int32), vertices.astype(np.int32), weights)
@@ -233,8 +260,13 @@ def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
     value = archive.get(key)
     if isinstance(value, Opaque):
         # numpy pickles a sparse matrix in an .npz, and unpickling could run code.
-        problem = Phrase("matrix-objects", shape=shape, what=value.what)
-        raise archive.fault("F002.archive-value", item=key, problem=problem)
+        problem = Phrase(
+            "expected {shape} numbers, found an unsupported value ({what}): save it as a dense "
+            "array (`.toarray()`)",
+            shape=axes(shape),
+            what=value.what,
+        )
+        raise archive.fault(wording.ARCHIVE_VALUE, item=key, problem=problem)
     return archive.sparse(key, shape)
 
 
@@ -249,7 +281,7 @@ def _shapes(
 ) -> BlendShapes | None:
     """Return shape and expression directions, read on first use."""
     if not archive.has("shapedirs"):
-        source.warn("F007.smpl-shapedirs")
+        source.warn("F007.smpl-shapedirs: no `shapedirs`: fixed shape")
         return None
     array = archive.array("shapedirs", (n_vertices, 3, "S"))
     count = array.shape[2]
@@ -280,7 +312,7 @@ def _correctives(
 ) -> tuple[Correctives | None, str]:
     """Return the correctives, and the title of the model that has them instead of SMPL's."""
     if not archive.has("posedirs"):
-        source.warn("F007.smpl-posedirs")
+        source.warn(wording.SMPL_POSEDIRS)
         return None, ""
     other = _quaternion_correctives(archive, n_vertices, n_joints)
     if other is not None:
@@ -379,7 +411,7 @@ def _keypoints(source: Source, archive: Archive, mesh: Mesh, used: list[str]) ->
     shares = archive.array("lmk_bary_coords", (len(faces), 3)).values()
     weights = finite(archive, "lmk_bary_coords", shares)
     if not are_indices(faces, mesh.n_triangles):
-        source.warn("F007.smpl-landmarks")
+        source.warn("F007.smpl-landmarks: `lmk_faces_idx` refers to nonexistent triangles: omitted")
         return None
     used += ["lmk_faces_idx", "lmk_bary_coords"]
     return Keypoints(
@@ -396,11 +428,13 @@ def _symmetry(source: Source, archive: Archive, n_vertices: int, used: list[str]
         return None
     partners = archive.array("vert_sym_idxs", (n_vertices,)).values()
     if not are_indices(partners, n_vertices):
-        source.warn("F007.smpl-symmetry-range")
+        source.warn(
+            "F007.smpl-symmetry-range: `vert_sym_idxs` refers to nonexistent vertices: omitted"
+        )
         return None
     indices = partners.astype(np.int32)
     if (indices[indices] != np.arange(n_vertices)).any():
-        source.warn("F007.smpl-symmetry")
+        source.warn("F007.smpl-symmetry: `vert_sym_idxs` does not pair all vertices: ignored")
         return None
     used.append("vert_sym_idxs")
     return indices

@@ -19,8 +19,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.diagnostic import merged
-from viewer.diagnostics.wording import PLACES
+from viewer.diagnostics.diagnostic import NOUNS, merged
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding, LintOptions
@@ -121,13 +120,15 @@ def _of_error(problem: ViewerError, path: Path | None = None) -> Finding:
     """Return an error as a finding; ``path`` is the file that failed, if the error has none."""
     found = problem.diagnostic
     if found is None:  # the figure's classes reported parts that do not match
-        found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
+        found = Diagnostic(
+            "F002.misfit: {message}", path, values={"message": str(problem)}, is_refusal=True
+        )
     return of_diagnostic(found)
 
 
 def of_diagnostic(found: Diagnostic) -> Finding:
     """Return a reader's diagnostic as a finding."""
-    field = PLACES.get(found.part)
+    field = NOUNS.get(found.part)
     if field is None or found.places is None:
         return Finding(found)
     places: dict[str, Any] = {field: found.places}

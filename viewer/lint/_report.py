@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.diagnostics import SEVERITIES, Diagnostic, described
-from viewer.diagnostics.template import as_data
+from viewer.diagnostics.remedy import as_data
 from viewer.formats import folder_name
 from viewer.lint._finding import Finding
 from viewer.phrases import counted, printable

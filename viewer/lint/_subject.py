@@ -134,7 +134,7 @@ class Subject:
         """Return faults of the actor's figure as findings about it."""
         return [
             self.found(
-                fault.key,
+                fault.message,
                 severity=fault.severity,
                 vertices=fault.vertices,
                 triangles=fault.triangles,

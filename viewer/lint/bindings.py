@@ -6,6 +6,7 @@ import numpy as np
 
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
+from viewer.phrases import counted
 from viewer.rig.arrays import Bools
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.faults import are_usable, bind_faults
@@ -53,8 +54,11 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     first = int(away[0])
     return [
         subject.found(
-            "B004.joints",
-            n=len(away),
+            "B004.joints: {n} from the rest pose (worst: {joint} by {distance}): the mesh is "
+            "deformed at rest",
+            n=counted(
+                len(away), "joint", "has a bind pose that differs", "have bind poses that differ"
+            ),
             joint=joint_labels(skeleton)[first],
             distance=subject.length(float(distances[first])),
             joints=away,

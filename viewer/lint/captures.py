@@ -8,6 +8,7 @@ from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
 from viewer.lint.clips import missing_frames
+from viewer.phrases import all_of, counted, listed, rounded
 from viewer.rig.arrays import Ints
 from viewer.rig.captures.points import PointClip
 
@@ -49,10 +50,10 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
     if len(never):
         findings.append(
             subject.found(
-                "C012.points",
-                n=len(never),
+                "C012.points: {n} never visible: {names}",
+                n=counted(len(never), "keypoint", "is", "are", of=len(names)),
                 all=len(names),
-                names=[names[point] for point in never],
+                names=listed([names[point] for point in never]),
                 part="clip",
                 joints=never,
             )
@@ -67,7 +68,8 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
         frames = numbers[is_low[:, point]]
         findings.append(
             subject.found(
-                "C011.point",
+                "C011.point: {name} has a confidence below {limit:g} in {percent:.0f} % of the {n} "
+                "frames in which it is visible (first: frame {frame})",
                 name=names[point],
                 limit=limit,
                 percent=100.0 * float(fractions[point]),
@@ -83,15 +85,20 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
     if len(others):
         frames = numbers[is_low[:, others].any(axis=1)]
         shown = [
-            Phrase("low-point", name=names[point], percent=100.0 * float(fractions[point]))
+            Phrase(
+                "{name} in {percent:.0f} %",
+                name=names[point],
+                percent=100.0 * float(fractions[point]),
+            )
             for point in others.tolist()
         ]
         findings.append(
             subject.found(
-                "C011.more-points",
-                n=len(others),
+                "C011.more-points: {n} a confidence below {limit:g} in some of the frames in which "
+                "they are visible: {points}",
+                n=counted(len(others), "more keypoint", "has", "have"),
                 limit=limit,
-                points=shown,
+                points=all_of(shown),
                 part="clip",
                 joints=others,
                 frames=frames + first_frame,
@@ -122,12 +129,13 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]
     frames = both[wrong]
     return [
         subject.found(
-            "C003.point",
-            n=len(wrong),
+            "C003.point: {n}: {name} moves at {speed} units per second at frame {frame} (limit "
+            "{limit})",
+            n=counted(len(wrong), "frame", of=_n_frames(rows)),
             all=_n_frames(rows),
             name=names[point],
-            speed=float(fastest[wrong[0]]),
-            limit=float(limit),
+            speed=rounded(float(fastest[wrong[0]])),
+            limit=rounded(float(limit)),
             frame=int(frames[0]) + clip.timing.first_frame,
             part="clip",
             joints=[point],

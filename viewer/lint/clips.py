@@ -10,6 +10,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, frame_range
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject, Track, frame_numbers, key_times, track_of
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip, evaluate_all
@@ -38,7 +39,12 @@ def check(subject: Subject) -> list[Finding]:
         findings += _keys(subject, clip)
         findings += _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:
-        return [*findings, subject.found("C010.one-time", time=float(clip.start), part="clip")]
+        return [
+            *findings,
+            subject.found(
+                "C010.one-time: starts and ends at {time:zg} s", time=float(clip.start), part="clip"
+            ),
+        ]
     track = track_of(subject)
     assert track is not None  # the actor has a clip and a skeleton
     return findings + _jumps(subject, track, skeleton) + _fast_rotations(subject, track, skeleton)
@@ -59,11 +65,11 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     times = timing.start + gaps / timing.frame_rate + subject.actor.offset
     return [
         subject.found(
-            "C005.gaps",
-            n=len(gaps),
+            "C005.gaps: {n} missing in {n_gaps}: {gaps}",
+            n=counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1),
             all=int(there[-1] - there[0]) + 1,
-            n_gaps=len(runs),
-            gaps=[frame_range(int(run[0]) + first, int(run[-1]) + first) for run in runs],
+            n_gaps=counted(len(runs), "gap"),
+            gaps=listed([frame_range(int(run[0]) + first, int(run[-1]) + first) for run in runs]),
             part="clip",
             frames=gaps + first,
             times=times,
@@ -82,8 +88,9 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
     channel = next(index for index, found in enumerate(times) if len(found))
     return [
         subject.found(
-            "C002.keys",
-            n=count,
+            "C002.keys: {n} the same time as the previous key (first: channel {channel} at "
+            "{time:zg} s)",
+            n=counted(count, "key", "has", "have"),
             channel=channel,
             time=float(times[channel][0]),
             part="clip",
@@ -105,12 +112,16 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
     worst = int(outside[beyond[:, outside].max(axis=0).argmax()])
     row = int(beyond[:, worst].argmax())
     number = int(frame_numbers(subject, times[row : row + 1])[0])
-    when = Phrase("in-frame", frame=number, time=float(times[row] + subject.actor.offset))
+    when = Phrase(
+        " in frame {frame} at {time:z.3f} s",
+        frame=number,
+        time=float(times[row] + subject.actor.offset),
+    )
     order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
     return [
         subject.found(
-            "C006.curves",
-            n=len(outside),
+            "C006.curves: {n} limits: {dof}",
+            n=counted(len(outside), "curve", "exceeds its", "exceed their"),
             dof=beyond_text(skeleton, int(targets[worst]), float(values[row, worst]), when),
             part="clip",
             joints=np.unique(skeleton.dof_joints[targets[outside]]),
@@ -141,8 +152,9 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
         return []
     return [
         subject.found(
-            "C003.joint",
-            n=len(fast.rows),
+            "C003.joint: {n}: {joint} moves at {speed} at frame {frame}, {time:z.3f} s (limit "
+            "{limit})",
+            n=counted(len(fast.rows), "frame", of=track.n_frames),
             all=track.n_frames,
             joint=joint_labels(skeleton)[fast.joints[0]],
             speed=subject.speed(fast.rate / track.scale),
@@ -181,8 +193,9 @@ def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[
         return []
     return [
         subject.found(
-            "C004.joint",
-            n=len(fast.rows),
+            "C004.joint: {n}: {joint} rotates at {rate:.0f} degrees per second at frame "
+            "{frame}, {time:z.3f} s (limit {limit:.0f})",
+            n=counted(len(fast.rows), "frame", of=track.n_frames),
             all=track.n_frames,
             joint=joint_labels(skeleton)[fast.joints[0]],
             rate=math.degrees(fast.rate),

@@ -7,6 +7,7 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject, Track, track_of
+from viewer.phrases import counted, listed, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.feet import limits
@@ -67,12 +68,21 @@ def _moving(subject: Subject, figure: Figure) -> Track | None:
 def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
     """Report that the ground is unknown, and feet were therefore not checked."""
     if not found.levels:
-        return subject.found("C013.no-height", part="clip")
+        return subject.found(
+            "C013.no-height: feet never rest long enough at one height: ground height unclear, "
+            "feet not checked",
+            part="clip",
+        )
     levels = [
-        Phrase("resting-height", height=height, seconds=count * step)
+        Phrase("{height} for {seconds} s", height=rounded(height), seconds=rounded(count * step, 2))
         for height, count in found.levels
     ]
-    return subject.found("C013.heights", n=len(levels), levels=levels, part="clip")
+    return subject.found(
+        "C013.heights: feet rest at {n} ({levels}): ground height unclear, feet not checked",
+        n=counted(len(levels), "height"),
+        levels=listed(levels),
+        part="clip",
+    )
 
 
 def _sunk(
@@ -97,8 +107,8 @@ def _sunk(
     each = track.of_each(frames)
     return [
         subject.found(
-            "C008.foot",
-            n=len(each),
+            "C008.foot: {n}: {joint} is {depth} below the ground at frame {frame}",
+            n=counted(len(each), "frame", of=track.n_frames),
             all=track.n_frames,
             joint=labels[worst],
             depth=subject.length(float(deepest[frames[0]] / track.scale)),
@@ -136,8 +146,9 @@ def _floating(
     each = track.of_each(frames)
     return [
         subject.found(
-            "C016.foot",
-            n=len(each),
+            "C016.foot: {n}: both feet rest up to {height} above the ground, highest at frame "
+            "{frame}",
+            n=counted(len(each), "frame", of=track.n_frames),
             all=track.n_frames,
             height=subject.length(float(lowest[frames[0]] / track.scale)),
             frame=int(track.numbers[frames[0]]),
@@ -192,8 +203,9 @@ def _slipped(
     each = track.of_each(np.concatenate([[fastest], np.flatnonzero(slides.any(axis=1))]))
     return [
         subject.found(
-            "C007.foot",
-            n=len(each),
+            "C007.foot: {n}: {joint} slides by {distance} in total, at up to {speed} (frame "
+            "{frame})",
+            n=counted(len(each), "frame", of=track.n_frames),
             all=track.n_frames,
             joint=labels[worst],
             distance=subject.length(float(distances[worst] / track.scale)),

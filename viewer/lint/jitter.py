@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject, track_of
-from viewer.phrases import rounded
+from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frames import runs_of
@@ -91,8 +91,9 @@ def _found(
     joints = order[noise[:, order].max(axis=0) > limit]
     return [
         subject.found(
-            "C014.jitter",
-            n=len(frames),
+            "C014.jitter: {n}: {joint} jitters by {noise} from frame to frame, most around "
+            "frame {frame} (limit {limit})",
+            n=counted(len(frames), "frame", of=int((~np.isnan(highest)).sum())),
             all=int((~np.isnan(highest)).sum()),
             joint=labels[joints[0]],
             **values,

@@ -6,6 +6,7 @@ import numpy as np
 
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject
+from viewer.phrases import agree, counted, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import Edges, edges_of, orientations, welded
 from viewer.rig.geometry.vectors import unit
@@ -51,8 +52,8 @@ def _flat(subject: Subject, flat: Bools) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M001.triangles",
-            n=len(triangles),
+            "M001.triangles: {n} zero area (first: triangle {triangle})",
+            n=counted(len(triangles), "triangle", "has", "have", of=len(flat)),
             all=len(flat),
             triangle=int(triangles[0]),
             triangles=triangles,
@@ -72,8 +73,8 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M011.triangles",
-            n=len(copies),
+            "M011.triangles: {n} (first: triangle {triangle})",
+            n=counted(len(copies), "duplicate triangle"),
             triangle=int(copies[0]),
             triangles=copies,
             at=("triangles", int(copies[0])),
@@ -92,8 +93,9 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
     vertices = np.unique(ends)
     return [
         subject.found(
-            "M006.edges",
-            n=len(ends),
+            "M006.edges: {n} with up to {most} triangles (first: between vertices {vertex} and "
+            "{other})",
+            n=counted(len(ends), "non-manifold edge"),
             most=int(edges.counts.max()),
             vertex=int(ends[0, 0]),
             other=int(ends[0, 1]),
@@ -122,8 +124,14 @@ def _sides(
         triangles = valid[flipped]
         findings.append(
             subject.found(
-                "M002.triangles",
-                n=len(triangles),
+                "M002.triangles: {n} neighbours (first: triangle {triangle})",
+                n=counted(
+                    len(triangles),
+                    "triangle",
+                    "is wound opposite to its",
+                    "are wound opposite to their",
+                    of=mesh.n_triangles,
+                ),
                 all=mesh.n_triangles,
                 triangle=int(triangles[0]),
                 triangles=triangles,
@@ -134,8 +142,8 @@ def _sides(
         triangles = valid[one_sided]
         findings.append(
             subject.found(
-                "M012.surface",
-                n=len(triangles),
+                "M012.surface: non-orientable surface of {n} (at triangle {triangle})",
+                n=counted(len(triangles), "triangle"),
                 triangle=int(triangles[0]),
                 triangles=triangles,
                 at=("triangles", int(triangles[0])),
@@ -157,8 +165,8 @@ def _borders(subject: Subject, mesh: Mesh, valid: Indices, border: Bools) -> lis
     first = ends[np.lexsort(ends.T[::-1])[0]]
     return [
         subject.found(
-            "M005.edges",
-            n=len(ends),
+            "M005.edges: {n} (first: between vertices {vertex} and {other})",
+            n=counted(len(ends), "boundary edge"),
             vertex=int(first[0]),
             other=int(first[1]),
             vertices=vertices,
@@ -204,12 +212,13 @@ def _inside_out(
     triangles = valid[np.isin(component, wrong)]
     return [
         subject.found(
-            "M003.parts",
-            n=len(wrong),
-            n_triangles=len(triangles),
+            "M003.parts: {n} with {n_triangles} {are} inside out (first: triangle {triangle})",
+            n=counted(len(wrong), "closed part"),
+            n_triangles=counted(len(triangles), "triangle"),
             triangle=int(triangles[0]),
             triangles=triangles,
             at=("triangles", int(triangles[0])),
+            are=agree(len(wrong), "is", "are"),
         )
     ]
 
@@ -232,8 +241,8 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
     if len(zero):
         findings.append(
             subject.found(
-                "M007.normals",
-                n=len(zero),
+                "M007.normals: {n} zero length (first: vertex {vertex})",
+                n=counted(len(zero), "normal", "has", "have"),
                 vertex=int(zero[0]),
                 vertices=zero,
                 at=("normals", int(zero[0])),
@@ -244,10 +253,10 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
         odd = odd[np.argsort(-np.abs(lengths[odd] - 1.0), kind="stable")]
         findings.append(
             subject.found(
-                "M008.normals",
-                n=len(odd),
+                "M008.normals: {n} not unit length (worst: {length} at vertex {vertex})",
+                n=counted(len(odd), "normal", "is", "are"),
                 vertex=int(odd[0]),
-                length=float(lengths[odd[0]]),
+                length=rounded(float(lengths[odd[0]]), 4),
                 vertices=odd,
                 at=("normals", int(odd[0])),
             )
@@ -274,8 +283,8 @@ def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
         return []
     return [
         subject.found(
-            "M009.normals",
-            n=len(against),
+            "M009.normals: {n} the winding of all adjacent triangles (first: vertex {vertex})",
+            n=counted(len(against), "normal", "opposes", "oppose", of=int((numbers > 0).sum())),
             all=int((numbers > 0).sum()),
             vertex=int(against[0]),
             vertices=against,
@@ -292,8 +301,8 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
     if len(unused):
         findings.append(
             subject.found(
-                "M004.vertices",
-                n=len(unused),
+                "M004.vertices: {n} not used by any triangle (first: vertex {vertex})",
+                n=counted(len(unused), "vertex", "is", "are", of=mesh.n_vertices),
                 all=mesh.n_vertices,
                 vertex=int(unused[0]),
                 vertices=unused,

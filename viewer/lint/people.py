@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics.remedy import Remedy
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
@@ -101,10 +103,10 @@ def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[F
     number = int(frames[0]) + one.timing.first_frame
     return [
         subject.found(
-            "C015.exchanged",
+            "C015.exchanged: swaps positions with {other}, {distance} away, in {n}: {frames_text}",
             other=person_label(other.person or 0),
-            n=len(frames),
-            frames_text=[str(frame + one.timing.first_frame) for frame in frames.tolist()],
+            n=counted(len(frames), "frame"),
+            frames_text=listed([str(frame + one.timing.first_frame) for frame in frames.tolist()]),
             distance=_length(subject, float(kept[np.searchsorted(after, frames[0])])),
             frame=number,
             part="clip",
@@ -124,18 +126,21 @@ def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[
     if apart > _NEAR * own.size:
         return []
     numbers = own.timing.first_frame + np.array([first])
+    ids = f"{other.person},{subject.actor.person}"
     return [
         subject.found(
-            "C015.continued",
+            "C015.continued: appears in frame {first}, {distance} from where {other} disappears in "
+            "frame {last}: may be one person{remedy}",
             other=person_label(other.person or 0),
             first=first + own.timing.first_frame,
             last=last + own.timing.first_frame,
             distance=_length(subject, apart),
-            ids=f"{other.person},{subject.actor.person}",
+            ids=ids,
             part="clip",
             severity="note",
             frames=numbers,
             times=_times(subject, own, np.array([first])),
+            remedy=Remedy("", f" (--merge-ids {ids} of viewer convert)"),
         )
     ]
 

@@ -9,6 +9,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
+from viewer.phrases import agree, counted, listed, quoted, rounded
 from viewer.rig.inspection.faults import UNIT_ROTATION
 from viewer.rig.pose import Pose
 from viewer.rig.posing.dof_text import beyond_text
@@ -35,12 +36,12 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     repeated = [j for j, name in enumerate(skeleton.names) if name and counts[name] > 1]
     if repeated:
         names = list(dict.fromkeys(skeleton.names[joint] for joint in repeated))
-        shown = [Phrase("repeated-name", name=name, n=counts[name]) for name in names]
+        shown = [Phrase("{name} ({n})", name=quoted(name), n=counts[name]) for name in names]
         findings.append(
             subject.found(
-                "S006.joints",
-                n=len(repeated),
-                names=shown,
+                "S006.joints: {n} with duplicate names: {names}",
+                n=counted(len(repeated), "joint"),
+                names=listed(shown),
                 part="skeleton",
                 joints=repeated,
                 at=("joints", repeated[0]),
@@ -52,8 +53,8 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     if nameless:
         findings.append(
             subject.found(
-                "S007.joints",
-                n=len(nameless),
+                "S007.joints: {n} no name (first: joint {joint})",
+                n=counted(len(nameless), "joint", "has", "have"),
                 joint=nameless[0],
                 part="skeleton",
                 joints=nameless,
@@ -65,9 +66,9 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         labels = joint_labels(skeleton)
         findings.append(
             subject.found(
-                "S008.roots",
+                "S008.roots: {n} joints have no parent: {names}",
                 n=len(roots),
-                names=[labels[joint] for joint in roots],
+                names=listed([labels[joint] for joint in roots]),
                 part="skeleton",
                 joints=roots,
                 at=("joints", int(roots[1])),
@@ -85,10 +86,10 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
     if len(odd):
         findings.append(
             subject.found(
-                "S009.rotations",
-                n=len(odd),
+                "S009.rotations: {n} not normalised (first: length {length} at {joint})",
+                n=counted(len(odd), "rest rotation", "is", "are"),
                 joint=labels[odd[0]],
-                length=float(lengths[odd[0]]),
+                length=rounded(float(lengths[odd[0]]), 4),
                 part="skeleton",
                 joints=odd,
                 at=("joints", int(odd[0])),
@@ -99,8 +100,8 @@ def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
         x, y, z = skeleton.rest_scales[flat[0]].tolist()
         findings.append(
             subject.found(
-                "S010.scales",
-                n=len(flat),
+                "S010.scales: {n} not positive (first: {x:zg} {y:zg} {z:zg} at {joint})",
+                n=counted(len(flat), "rest scale", "is", "are"),
                 joint=labels[flat[0]],
                 x=x,
                 y=y,
@@ -120,7 +121,13 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         joints = [] if fact.places is None else fact.places.tolist()
         at = ("joints", joints[0]) if joints else None
         findings.append(
-            subject.found(fact.key, part="skeleton", joints=joints, at=at, **fact.values)
+            subject.found(
+                f"{fact.key}: {fact.sentence}",
+                part="skeleton",
+                joints=joints,
+                at=at,
+                **{**fact.values, **fact.texts},
+            )
         )
     low, high = skeleton.dof_limits.T
     if pose is not None:
@@ -131,12 +138,13 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
             worst = int(outside[0])
             findings.append(
                 subject.found(
-                    "S004.pose",
-                    n=len(outside),
+                    "S004.pose: {n} of the pose {are} limits: {dof}",
+                    n=counted(len(outside), "DOF"),
                     dof=beyond_text(skeleton, worst, float(pose.dofs[worst])),
                     part="skeleton",
                     joints=np.unique(skeleton.dof_joints[outside]),
                     at=("joints", int(skeleton.dof_joints[worst])),
+                    are=agree(len(outside), "is outside its", "are outside their"),
                 )
             )
     locked = np.flatnonzero(skeleton.locked)
@@ -144,10 +152,10 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         labels = dof_labels(skeleton)
         findings.append(
             subject.found(
-                "S005.dofs",
-                n=len(locked),
+                "S005.dofs: {n} locked: {names}",
+                n=counted(len(locked), "DOF", "is", "are", of=skeleton.n_dofs),
                 all=skeleton.n_dofs,
-                names=[labels[dof] for dof in locked],
+                names=listed([labels[dof] for dof in locked]),
                 part="skeleton",
                 joints=np.unique(skeleton.dof_joints[locked]),
                 at=("joints", int(skeleton.dof_joints[locked[0]])),

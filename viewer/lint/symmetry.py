@@ -7,6 +7,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
+from viewer.phrases import agree, counted, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, box_size
@@ -53,8 +54,13 @@ def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
     worst = int(off[0])
     return [
         subject.found(
-            "Y001.positions",
-            n=len(off),
+            "Y001.positions: {n} (worst: {distance} at vertex {vertex})",
+            n=counted(
+                len(off),
+                "vertex",
+                "is not at the mirrored position of its counterpart",
+                "are not at the mirrored positions of their counterparts",
+            ),
             distance=subject.length(float(distances[worst])),
             vertex=worst,
             severity="warning" if distances[worst] > _ASKEW * size else "note",
@@ -75,13 +81,15 @@ def _weights(
     worst = int(off[0])
     return [
         subject.found(
-            "Y002.weights",
-            n=len(off),
-            difference=float(differences[worst]),
+            "Y002.weights: weights of {n} differ from those of {their} (worst: total "
+            "difference {difference} at vertex {vertex})",
+            n=counted(len(off), "vertex"),
+            difference=rounded(float(differences[worst])),
             vertex=worst,
             severity="warning" if differences[worst] > _UNEQUAL else "note",
             vertices=off,
             at=("weights", worst),
+            their=agree(len(off), "its mirror counterpart", "their mirror counterparts"),
         )
     ]
 

@@ -7,6 +7,7 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
+from viewer.phrases import counted, listed, optional
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
@@ -51,7 +52,15 @@ def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
         return []  # the missing weights may refer to these joints
     labels = [_label(subject, int(joint)) for joint in idle]
     at = ("bindings", int(idle[0]))
-    return [subject.found("W006.joints", n=len(idle), names=labels, joints=idle, at=at)]
+    return [
+        subject.found(
+            "W006.joints: {n} no influence: {names}",
+            n=counted(len(idle), "joint", "has", "have"),
+            names=listed(labels),
+            joints=idle,
+            at=at,
+        )
+    ]
 
 
 def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
@@ -61,8 +70,8 @@ def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
         return []
     return [
         subject.found(
-            "W009.joints",
-            n=len(fewer),
+            "W009.joints: {n} a joint more than once (first: vertex {vertex})",
+            n=counted(len(fewer), "vertex", "lists", "list"),
             vertex=int(fewer[0]),
             vertices=fewer,
             at=("weights", int(fewer[0])),
@@ -79,7 +88,10 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
     used[~known] = 0.0
     can_pose = figure.is_attached and not len(subject.invalid.get("joints", ()))
     findings = []
-    for code, limit in (("W007", 4), ("W008", 8)):
+    for message, limit in (
+        ("W007.influences: {n} more than 4 influences (maximum: {most}){cost}", 4),
+        ("W008.influences: {n} more than 8 influences (maximum: {most}){cost}", 8),
+    ):
         crowded = np.flatnonzero(used > limit)
         if len(crowded) == 0:
             continue
@@ -88,10 +100,10 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
             cost, crowded = _cost(subject, skin, limit, crowded)
         findings.append(
             subject.found(
-                f"{code}.influences",
-                n=len(crowded),
+                message,
+                n=counted(len(crowded), "vertex", "has", "have"),
                 most=int(used.max()),
-                cost=cost,
+                cost=optional("; {}", cost),
                 vertices=crowded,
                 at=("weights", int(crowded[0])),
             )
@@ -109,18 +121,30 @@ def _cost(
     errors, n_poses = _cut_errors(subject, limit)
     is_known = (_posable(subject, skin) & np.isfinite(errors))[crowded]
     known, lost = crowded[is_known], crowded[~is_known]
-    left_out = Phrase("cut-cost-left-out", n=len(lost)) if len(lost) else ""
+    left_out = (
+        Phrase(
+            "{n} omitted because a required position or bind matrix is invalid",
+            n=counted(len(lost), "vertex", "is", "are"),
+        )
+        if len(lost)
+        else ""
+    )
     if len(known) == 0:
-        return Phrase("cut-cost-unknown", limit=limit, left_out=left_out), crowded
+        return Phrase(
+            "the effect of pruning to {limit} is unknown: {left_out}",
+            limit=limit,
+            left_out=left_out,
+        ), crowded
     known = known[np.argsort(-errors[known], kind="stable")]
     cost = Phrase(
-        "cut-cost",
+        "pruning to {limit} moves the mesh by up to {most} (vertex {vertex}), {mean} on "
+        "average over these vertices, in {poses}{left_out}",
         limit=limit,
         most=subject.length(float(errors[known[0]])),
         vertex=int(known[0]),
         mean=subject.length(float(errors[known].mean())),
-        poses=n_poses,
-        left_out=left_out,
+        poses=counted(n_poses, "pose"),
+        left_out=optional("; {}", left_out),
     )
     return cost, np.concatenate([known, lost])
 

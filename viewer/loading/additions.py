@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import RigError
 from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents, with_texture
@@ -31,7 +31,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
     for path, record in contents.poses:
         if trial.pose is None:
             values = {"figure": actor.figure.name}
-            raise RigError(Diagnostic("F004.pose", path, values=values))
+            raise RigError(Diagnostic(wording.POSE, path, values=values))
         notes += apply_pose(path, record, trial)
     # Nothing after this line can fail.
     if actor.pose is not None and trial.pose is not None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import FormatError, RigError
 from viewer.loading.contents import Contents
 from viewer.loading.pairing import joined_figures
@@ -27,6 +27,7 @@ from viewer.loading.placing import (
 )
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
+from viewer.phrases import all_of, quoted
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers, model_of_joints
 from viewer.rig.inspection.faults import faults_of
@@ -125,7 +126,7 @@ def _faults(contents: Contents, actors: Sequence[Actor]) -> list[Diagnostic]:
         for fault in faults_of(figure):
             if fault.severity == "note":
                 continue
-            one = Diagnostic(fault.key, values=fault.values, level=fault.severity)
+            one = Diagnostic(fault.message, values=fault.values, level=fault.severity)
             if origin is not None:
                 path, line, pointer = contents.place_of(origin, *fault.at)
                 one = replace(one, path=path, line=line, pointer=pointer)
@@ -228,7 +229,11 @@ def _give_morphs(contents: Contents, draft: SceneDraft) -> None:
             try:
                 if figure.skeleton is None and figure.mesh is not None:
                     figure = on_one_joint(figure)
-                    draft.note("F007.only-morphs", figure=figure.name)
+                    draft.note(
+                        "F007.only-morphs: {figure}: without its .skel, only blend shapes deform "
+                        "it",
+                        figure=figure.name,
+                    )
                 figure = with_morphs(figure, [target])
                 actors[index] = replace(actor, figure=figure, pose=None)
                 break
@@ -236,7 +241,13 @@ def _give_morphs(contents: Contents, draft: SceneDraft) -> None:
                 problem = problem or refused
         else:
             if problem is None:
-                raise RigError(Diagnostic("F004.morph-alone", path))
+                raise RigError(
+                    Diagnostic(
+                        "F004.morph-alone: a blend shape without a mesh: open it together with "
+                        "its .skin",
+                        path,
+                    )
+                )
             found = problem.diagnostic
             raise problem if found is None else RigError(replace(found, path=path))
 
@@ -279,7 +290,12 @@ def _animate(draft: SceneDraft, wanted: str) -> None:
     if not files and wanted.lower() == NONE:
         return
     if wanted and not files:
-        raise RigError(Diagnostic("F004.no-animations", values={"name": wanted}))
+        raise RigError(
+            Diagnostic(
+                "F004.no-animations: no animation is called {name}: the files have none",
+                values={"name": quoted(wanted)},
+            )
+        )
     refusals = []
     for actors in files:
         try:
@@ -330,7 +346,12 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
             except FormatError as found:
                 problem = problem or found
     is_pose = record.dofs or record.parts or record.vector is not None
-    key = "F004.pose-alone" if is_pose or record.shape is None else "F004.shape-alone"
+    key = (
+        "F004.pose-alone: a pose without a figure: open it together with a figure"
+        if is_pose or record.shape is None
+        else "F004.shape-alone: the shape of a body without a motion: open it together with a "
+        "body model"
+    )
     raise problem or RigError(Diagnostic(key, path))
 
 
@@ -347,9 +368,14 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     chosen = next(iter(bare or open_for_it), None)
     if chosen is None:
         if not actors:
-            raise RigError(Diagnostic("F004.picture-alone", path))
-        values = {"figures": [actor.figure.name for actor in actors]}
-        raise RigError(Diagnostic("F004.picture", path, values=values))
+            raise RigError(
+                Diagnostic(
+                    "F004.picture-alone: an image without a figure: open it together with a figure",
+                    path,
+                )
+            )
+        values = {"figures": all_of([actor.figure.name for actor in actors])}
+        raise RigError(Diagnostic(wording.F004_PICTURE, path, values=values))
     chosen.figure = with_texture(chosen.figure, path, pixels)
 
 
@@ -376,22 +402,26 @@ def _note_unused_options(contents: Contents, draft: SceneDraft, settings: Motion
     is_driving = any(builder.target is not None for builder in draft.builders)
     if is_driving or any(actor.drive is not None for actor in draft.actors):
         used.add("joint-map")
-    given = {
-        "rig": settings.rig,
-        "lod": settings.lod,
-        "space": settings.space,
-        "average-shape": settings.average_shape,
-        "video": settings.video,
-        "images": settings.images,
-        "model": settings.model,
-        "gender": settings.gender,
-    }
-    for name, value in given.items():
+    for name, value, why in (
+        ("rig", settings.rig, "only Anny has several rigs"),
+        ("lod", settings.lod, "only MHR has levels of detail"),
+        ("space", settings.space, "no file has results of video motion capture"),
+        ("average-shape", settings.average_shape, "no file has a person whose shape varies"),
+        ("video", settings.video, "no file is a capture"),
+        ("images", settings.images, "no file is a capture"),
+        ("model", settings.model, "no file has a motion that could drive it"),
+        ("gender", settings.gender, "no file has the motion of a body of the SMPL family"),
+    ):
         if value and name not in used:
-            draft.note(f"F007.unused-{name}", value=value)
+            option = f"--{name}" if value is True else f"--{name} {{value}}"
+            draft.note(f"F007.unused-{name}: {option} has no effect: {why}", value=value)
     joint_map = settings.joint_map
     if joint_map is not None and "joint-map" not in used:
-        draft.note("F007.unused-joint-map", joint_map.path)
+        draft.note(
+            "F007.unused-joint-map: --joint-map has no effect: no motion of another skeleton "
+            "drives a figure",
+            joint_map.path,
+        )
 
 
 def _assembled_in(

@@ -9,6 +9,7 @@ from typing import Literal
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.loading.body_driving import has_joints
@@ -18,6 +19,7 @@ from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.models import family_model, models_of_kind, named_files
 from viewer.models.bundled import bundled_body
+from viewer.phrases import listed
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
 
@@ -126,7 +128,7 @@ class BodyModels:
         joined = [figure for _, figure in joined_figures(contents.figures)]
         figure = next((each for each in joined if each.is_attached), next(iter(joined), None))
         if figure is None or figure.skeleton is None or figure.mesh is None:
-            raise FormatError(Diagnostic("F002.no-body-model", paths[0]))
+            raise FormatError(Diagnostic("F002.no-body-model: --model: not a body model", paths[0]))
         self.draft.diagnostics += contents.diagnostics
         self.draft.used_options |= {"model", *(contents.used_options or ())}
         self.draft.files += contents.files
@@ -158,19 +160,31 @@ class BodyModels:
         ``use``: ``"model"`` if it is shown, ``"carrier"`` if it moves the figure of ``--model``.
         """
 
-        def note(key: str, **values: object) -> tuple[Diagnostic, ...]:
-            return (Diagnostic(f"F007.own-{key}", path, values=values),)
+        def note(message: str, **values: object) -> tuple[Diagnostic, ...]:
+            return (Diagnostic(message, path, values=values),)
 
         found = family_model(space.model, space.gender)
         if found is None:
             others = models_of_kind(space.model)
             wanted = space.title
-            return None, note("model-missing", wanted=wanted, names=others) if others else ()
+            if not others:
+                return None, ()
+            return None, note(
+                "F007.own-model-missing: the model folder has no {wanted} model, only {names}: "
+                "{remedy}",
+                wanted=wanted,
+                names=listed(others),
+                remedy=Remedy("open one of them first", "--gender chooses one"),
+            )
         if (found,) not in self._read:
             try:
                 model = read(Source.open(found))
             except FormatError as problem:  # the user has not named this file
-                return None, note("model-unreadable", problem=problem.diagnostic)
+                return None, note(
+                    "F007.own-model-unreadable: the model in the model folder cannot be read: "
+                    "{problem}",
+                    problem=problem.diagnostic,
+                )
             if not isinstance(model, Figure) or not (is_body(model) or space.model == "MHR"):
                 return None, ()
             self._read[(found,)] = model
@@ -178,8 +192,18 @@ class BodyModels:
         figure = self._read[(found,)]
         gender = figure.shape_space.gender
         if space.gender and gender and gender != space.gender:
-            return figure, note("model-of-other-gender", model=found.name, wanted=space.title)
-        return figure, note(use, model=found.name)
+            return figure, note(
+                "F007.own-model-of-other-gender: {model} is used: the model folder has no {wanted} "
+                "model",
+                model=found.name,
+                wanted=space.title,
+            )
+        if use == "carrier":
+            message = "F007.own-carrier: motion computed with {model} from the model folder"
+        else:
+            message = "F007.own-model: {model} from the model folder is used ({remedy})"
+        remedy = Remedy("open another one first to use it", "--model selects another")
+        return figure, note(message, model=found.name, remedy=remedy)
 
     def _bundled(self) -> Figure:
         paths = (bundled_body(),)

@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
 from viewer.loading.scaling import scale_to_unit
@@ -163,14 +164,25 @@ class Builder:
     def _shape_notes(self) -> list[Diagnostic]:
         """At the end, return messages about bodies without a shape, and a model without bodies."""
         if self.is_done and self.target is not None and not self._bodies:
-            key = "F007.model-of-parameters" if self._has_parameters else "F007.model-of-points"
+            key = (
+                "F007.model-of-parameters: --model has no effect: parameters of {member} can drive "
+                "a figure only if {member} is in the model folder (viewer models)"
+                if self._has_parameters
+                else "F007.model-of-points: --model has no effect: the capture has only keypoints"
+            )
             values = {"member": self.capture.model}
             return [Diagnostic(key, self.path, values=values)]
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         lacks = lacks and self.target is None and self.model.parameters is None
         if not (self.is_done and self.keeps_shape and lacks):
             return []
-        return [Diagnostic("F007.no-shapes", self.path)]
+        return [
+            Diagnostic(
+                "F007.no-shapes: no shape coefficients in the files: the model's mean shape is "
+                "used for all",
+                self.path,
+            )
+        ]
 
     def _add_body(self, person: int, motion: BodyMotion, new: list[Actor]) -> list[Diagnostic]:
         self.has_shape |= motion.shape is not None and bool(motion.shape.any())
@@ -285,7 +297,14 @@ class Builder:
                 "frame": self.n_read + self.capture.first_frame,
                 "known": len(known.names),
             }
-            return [Diagnostic("C005.keypoint-count", self.path, values=values)]
+            return [
+                Diagnostic(
+                    "C005.keypoint-count: {person} has {n} keypoints from frame {frame} onwards, "
+                    "{known} before; those frames are omitted",
+                    self.path,
+                    values=values,
+                )
+            ]
         self._replace_clip(actor, _joined_points(actor.clip, clip))
         return []
 
@@ -351,8 +370,17 @@ class Builder:
 
     def refusal(self, problem: RigError) -> RigError:
         """Return an error that also names the model that would match."""
-        values = {"problem": problem.cause, "member": self.capture.model}
-        key = "F004.capture-of-member" if self.capture.model else "F004.capture"
+        model = f"the {self.capture.model} model" if self.capture.model else "the model"
+        values = {
+            "problem": problem.cause,
+            "member": self.capture.model,
+            "remedy": Remedy(f"open {model} first", f"specify {model} with --model"),
+        }
+        key = (
+            "F004.capture-of-member: {problem}; {remedy}"
+            if self.capture.model
+            else "F004.capture: {problem}; {remedy}"
+        )
         return RigError(Diagnostic(key, self.path, values=values))
 
 

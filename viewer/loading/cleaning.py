@@ -11,6 +11,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError
 from viewer.loading.settings import CleanUp
+from viewer.phrases import agree, counted, listed, optional, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip
@@ -53,7 +54,14 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
         clip = actor.clip
         if not isinstance(clip, Captured):
             if clip is not None:
-                notes.append(Diagnostic("X006.keys", values={"figure": actor.name}))
+                notes.append(
+                    Diagnostic(
+                        "X006.keys: {figure}: its motion has keys instead of captured frames and "
+                        "is "
+                        "unchanged",
+                        values={"figure": actor.name},
+                    )
+                )
             continue
         actor.clip, said = _cleaned(scene, actor, clip, wanted)
         notes += said
@@ -112,31 +120,60 @@ def _cleaned(
 def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured, Diagnostic]:
     found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
     values = {"filter": _filter_phrase(chosen, clip)}
-    return found, _note("X006.smoothed", actor, values, clip, found)
+    return found, _note(
+        "X006.smoothed: {figure}: smoothed ({filter}): ", actor, values, clip, found
+    )
 
 
 def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[Diagnostic]]:
     """Return a motion whose feet do not slide during ground contact."""
     figure = actor.figure
     if isinstance(clip, PointClip) or not legs_of(figure.require_skeleton()):
-        return clip, [Diagnostic("X006.no-legs", values={"figure": actor.name})]
+        return clip, [
+            Diagnostic(
+                "X006.no-legs: {figure}: feet not held, because no joint has the name of a leg",
+                values={"figure": actor.name},
+            )
+        ]
     axis, hangs = own_up(scene, actor)
     found, lock = lock_feet(figure, clip, "xyz".index(axis), -1.0 if hangs else 1.0)
     if not lock.n_contacts:
-        key = "X006.only-glides" if lock.n_glides else "X006.no-contacts"
-        return clip, [Diagnostic(key, values={"figure": actor.name, "n": lock.n_glides})]
+        key = (
+            "X006.only-glides: {figure}: feet not held, because they glide too far in {n} with "
+            "the ground"
+            if lock.n_glides
+            else "X006.no-contacts: {figure}: no foot is held, because none rests on the ground"
+        )
+        return clip, [
+            Diagnostic(key, values={"figure": actor.name, "n": counted(lock.n_glides, "contact")})
+        ]
     values: dict[str, object] = {
-        "n": lock.n_contacts,
+        "n": counted(lock.n_contacts, "contact"),
         "before": length_text(figure, lock.before),
         "after": length_text(figure, lock.after if lock.after > _ROUNDING else 0.0),
     }
-    notes = [_note("X006.locked", actor, values, clip, found)]
+    message = (
+        "X006.locked: {figure}: feet held in place in {n}, so they slide by {after} instead of "
+        "{before}: "
+    )
+    notes = [_note(message, actor, values, clip, found)]
     if lock.lowered > _ROUNDING:
         values = {"figure": actor.name, "length": length_text(figure, lock.lowered)}
-        notes.append(Diagnostic("X006.locked-lowered", values=values))
+        notes.append(
+            Diagnostic(
+                "X006.locked-lowered: {figure}: lowered by up to {length}, so that its feet reach "
+                "the ground",
+                values=values,
+            )
+        )
     if lock.n_glides:
-        values = {"figure": actor.name, "n": lock.n_glides}
-        notes.append(Diagnostic("X006.locked-glides", values=values))
+        values = {"figure": actor.name, "n": counted(lock.n_glides, "more contact")}
+        notes.append(
+            Diagnostic(
+                "X006.locked-glides: {figure}: feet not held in {n}, in which they glide too far",
+                values=values,
+            )
+        )
     return found, notes
 
 
@@ -144,7 +181,11 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
     """Return a motion whose feet rest at height 0 of the scene."""
     found = resting_height(replace(actor, clip=clip), scene.up)
     if found is None or isinstance(clip, PointClip):
-        return clip, Diagnostic("X006.no-feet", values={"figure": actor.name})
+        return clip, Diagnostic(
+            "X006.no-feet: {figure}: not moved to the ground, because it has neither feet with "
+            "a mesh nor joints of known names",
+            values={"figure": actor.name},
+        )
     height = 0.0 if abs(found.height) < _ROUNDING else found.height
     lift = np.zeros(3)
     lift[2 if scene.up == "z" else 1] = -height
@@ -157,7 +198,12 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
         "height": length_text(actor.figure, abs(height)),
         "way": Phrase("lowered" if height > 0.0 else "raised"),
     }
-    key = "X006.grounded" if found.is_clear else "X006.grounded-lowest"
+    key = (
+        "X006.grounded: {figure}: {way} by {height}, so that its feet rest at height 0"
+        if found.is_clear
+        else "X006.grounded-lowest: {figure}: {way} by {height}, so that the lowest position of "
+        "its feet is at height 0 (they never clearly rest)"
+    )
     return replace(clip, figure_translations=places), Diagnostic(key, values=values)
 
 
@@ -166,10 +212,14 @@ def _resampled(actor: Actor, clip: Captured, rate: float) -> tuple[Captured, Dia
     values = {
         "old": clip.timing.frame_rate,
         "new": rate,
-        "before": clip.timing.n_frames,
+        "before": counted(clip.timing.n_frames, "frame"),
         "after": found.timing.n_frames,
     }
-    return found, _note("X006.resampled", actor, values, clip, found)
+    message = (
+        "X006.resampled: {figure}: resampled from {old:g} to {new:g} fps, {before} to {after}: at "
+        "the times of the original frames, "
+    )
+    return found, _note(message, actor, values, clip, found)
 
 
 def _trimmed(
@@ -179,7 +229,10 @@ def _trimmed(
     found = trimmed(clip, *frames)
     number, count = found.timing.first_frame, found.timing.n_frames
     values = {"first": number, "last": number + count - 1, "n": count, "all": timing.n_frames}
-    return found, Diagnostic("X006.trimmed", values={"figure": actor.name, **values})
+    return found, Diagnostic(
+        "X006.trimmed: {figure}: frames {first} to {last} kept, {n} of {all}",
+        values={"figure": actor.name, **values},
+    )
 
 
 def _interpolated(
@@ -193,56 +246,96 @@ def _interpolated(
     if gaps.closed:
         first, stop = max(gaps.closed, key=lambda gap: gap[1] - gap[0])
         values = {
-            "n": sum(b - a for a, b in gaps.closed),
-            "gaps": len(gaps.closed),
+            "n": counted(sum(b - a for a, b in gaps.closed), "missing frame"),
+            "gaps": counted(len(gaps.closed), "gap"),
             "longest": frame_range(first + timing.first_frame, stop + timing.first_frame - 1),
-            "seconds": (stop - first) / timing.frame_rate,
+            "seconds": rounded((stop - first) / timing.frame_rate, 2),
         }
-        notes.append(Diagnostic("X006.gaps", values={"figure": actor.name, **values}))
+        notes.append(
+            Diagnostic(
+                "X006.gaps: {figure}: {n} in {gaps} interpolated; the longest is {longest} "
+                "({seconds} s)",
+                values={"figure": actor.name, **values},
+            )
+        )
     if gaps.left:
         spans = [
             frame_range(a + timing.first_frame, b + timing.first_frame - 1) for a, b in gaps.left
         ]
-        values = {"n": len(gaps.left), "limit": limit, "gaps": spans}
-        notes.append(Diagnostic("X006.gaps-left", values={"figure": actor.name, **values}))
+        values = {
+            "n": counted(len(gaps.left), "gap"),
+            "limit": counted(limit, "frame"),
+            "gaps": listed(spans),
+        }
+        notes.append(
+            Diagnostic(
+                "X006.gaps-left: {figure}: {n} longer than {limit} {remain}: {gaps}",
+                values={
+                    "figure": actor.name,
+                    **values,
+                    "remain": agree(len(gaps.left), "remains", "remain"),
+                },
+            )
+        )
     return clip, notes
 
 
 def _filter_phrase(chosen: OneEuro | SavitzkyGolay, clip: Captured) -> Phrase:
     """Return the filter with the windows that were used, which are shorter in short runs."""
     if isinstance(chosen, OneEuro):
-        return Phrase("one-euro", cutoff=chosen.cutoff, beta=chosen.beta)
+        return Phrase(
+            "One Euro filter, cutoff {cutoff:g} Hz, beta {beta:g}",
+            cutoff=chosen.cutoff,
+            beta=chosen.beta,
+        )
     rate = clip.timing.frame_rate
     used = [chosen.used_frames(count, rate) for count in run_lengths(clip)]
     windows = sorted(set(filter(None, used)))
-    values = {"order": chosen.order, "n": windows[-1] if windows else chosen.frames(rate)}
+    values = {
+        "order": chosen.order,
+        "n": counted(windows[-1] if windows else chosen.frames(rate), "frame"),
+    }
     shortest = windows[0] if len(windows) > 1 else 0
-    left = Phrase("savgol-short", n=used.count(0)) if 0 in used else ""
-    return Phrase("savgol", **values, shortest=shortest, left=left)
+    left = (
+        Phrase(
+            "{n} with too few frames {are} unchanged",
+            n=counted(used.count(0), "run"),
+            are=agree(used.count(0), "is", "are"),
+        )
+        if 0 in used
+        else ""
+    )
+    return Phrase(
+        "Savitzky-Golay filter, {shortest}{n}, degree {order}{left}",
+        **values,
+        shortest=optional("{} to ", shortest),
+        left=optional("; {}", left),
+    )
 
 
 def _note(
     key: str, actor: Actor, values: Mapping[str, object], before: Captured, after: Captured
 ) -> Diagnostic:
-    """Return a note with the displacement of joints or points."""
+    """Return a note that ends with the displacement of joints or points."""
     figure = actor.figure
     labels: Sequence[str] = ()
     if isinstance(before, SampledClip) and isinstance(after, SampledClip):
         found = joint_displacement(figure, before, after)
-        labels, part = joint_labels(figure.require_skeleton()), Phrase("moved-joints")
+        labels, part = joint_labels(figure.require_skeleton()), Phrase("joints")
     elif isinstance(before, PointClip) and isinstance(after, PointClip):
         found = point_displacement(before, after)
         labels = () if figure.points is None else figure.points.names
-        part = Phrase("moved-points")
+        part = Phrase("points")
     where: object = ""
     if found.largest and found.joint < len(labels):
-        where = Phrase("joint-in-frame", joint=labels[found.joint], frame=found.frame)
+        where = Phrase("{joint}, frame {frame}", joint=labels[found.joint], frame=found.frame)
     moved = {
         "part": part,
         "mean": length_text(figure, found.mean),
         "largest": length_text(figure, found.largest),
-        "where": where,
+        "where": optional(" ({})", where),
     }
+    key += "{part} move by {mean} on average, by {largest} at most{where}"
     return Diagnostic(key, values={"figure": actor.name, **values, **moved})
 
 
@@ -274,9 +367,9 @@ def _merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
 
 def _renumbered(actor: Actor, person: int) -> Diagnostic:
     """Return a note about a body or keypoints that the first person did not have."""
-    part = Phrase("part-points" if isinstance(actor.clip, PointClip) else "part-body")
+    part = Phrase("keypoints" if isinstance(actor.clip, PointClip) else "body")
     values = {"part": part, "other": person_label(actor.person or 0), "kept": person_label(person)}
-    return Diagnostic("X006.renumbered", values=values)
+    return Diagnostic("X006.renumbered: {part} of {other} assigned to {kept}", values=values)
 
 
 def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list[Diagnostic]:
@@ -290,8 +383,8 @@ def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list
     kept.clip = joined_tracks(first, second)
     kept.drive = _joined_drives(kept.drive, other.drive)
     timing = first.timing
-    names["n"] = int(second.timing.present.sum())
-    notes = [Diagnostic("X006.merged", values=names)]
+    names["n"] = counted(int(second.timing.present.sum()), "frame")
+    notes = [Diagnostic("X006.merged: {other}: {n} joined to {kept}", values=names)]
     if len(both):
         is_both = np.zeros(int(both[-1]) + 1, dtype=np.bool_)
         is_both[both] = True
@@ -299,8 +392,14 @@ def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list
             frame_range(a + timing.first_frame, b + timing.first_frame - 1)
             for a, b in runs_of(is_both)
         ]
-        values = {"frames": spans, "distance": length_text(kept.figure, apart)}
-        notes.append(Diagnostic("X006.overlap", values={**names, "n": len(both), **values}))
+        values = {"frames": listed(spans), "distance": length_text(kept.figure, apart)}
+        notes.append(
+            Diagnostic(
+                "X006.overlap: {other} and {kept} are both present in {n} ({frames}), {distance} "
+                "apart: the frames of {kept} are used",
+                values={**names, "n": counted(len(both), "frame"), **values},
+            )
+        )
     return notes
 
 

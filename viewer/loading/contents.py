@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Collector, Diagnostic
+from viewer.diagnostics import Collector, Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.settings import MotionSettings
-from viewer.phrases import printable
+from viewer.phrases import all_of, printable
 from viewer.progress import report
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure, Origin
@@ -244,7 +245,11 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             images=settings.images,
         )
         if capture.n_frames > 1 and not (settings.frame_rate or video):
-            source.warn("F007.no-rate", rate=rate)
+            source.warn(
+                wording.NO_RATE,
+                rate=rate,
+                remedy=Remedy("Frames per second in the Timeline sets it", "--fps sets it"),
+            )
         return capture
     if kind == "video_mocap":
         from viewer.formats.video_mocap import open_results
@@ -303,17 +308,26 @@ def _with_own_picture(source: Source, figure: Figure) -> Figure:
         inside = source.inside(path.name)
         if path.is_file() and _is_picture(inside):
             if referenced_path(source.path, path.name) is None:
-                source.warn("F005.texture-outside", name=path.name)
+                source.warn(
+                    "F005.texture-outside: texture {name} is outside the folder: not read",
+                    name=path.name,
+                )
                 continue
             pictures.append(inside)
     if len(pictures) > 1:
-        source.warn("F007.several-pictures", n=len(pictures))
+        source.warn(
+            "F007.several-pictures: {n} images in the folder: specify the texture to show",
+            n=len(pictures),
+        )
     if len(pictures) != 1:
         return figure
     try:
         return with_texture(figure, pictures[0].path, read_picture(pictures[0]))
     except FormatError as problem:
-        source.warn("F005.texture-unreadable", problem=problem.diagnostic)
+        source.warn(
+            "F005.texture-unreadable: texture {problem}; drawn untextured",
+            problem=problem.diagnostic,
+        )
         return figure
 
 
@@ -330,8 +344,8 @@ def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
     """
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None:
-        values = {"figures": [figure.name]}
-        raise RigError(Diagnostic("F004.picture", path, values=values))
+        values = {"figures": all_of([figure.name])}
+        raise RigError(Diagnostic(wording.F004_PICTURE, path, values=values))
     covered = replace(
         mesh,
         materials=(Material(path.stem, Texture(path.name, pixels)),),

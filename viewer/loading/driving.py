@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.formats._video_images import VideoImages
 from viewer.formats.easymocap.images import ImageFolders, find_images
@@ -32,6 +33,7 @@ from viewer.loading.skeleton_motions import (
     map_refusal,
     model_refusal,
 )
+from viewer.phrases import counted, listed, rounded
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
 from viewer.rig.captures.cameras import CameraImages, CameraView
 from viewer.rig.captures.capture import Capture, capture_rate
@@ -64,7 +66,10 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
     models = BodyModels(draft, settings)
     named = models.named("") if drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
-        draft.note("F007.model-beside", model=settings.model)
+        draft.note(
+            "F007.model-beside: --model {model}: no motion is applied to it with --beside",
+            model=settings.model,
+        )
         draft.used_options |= {"model", "rig", "lod"}  # no further messages about these options
     lone: list[Lone] = []
     for path, motion in contents.skeleton_motions:
@@ -85,8 +90,16 @@ def _check_footage(contents: Contents, settings: MotionSettings) -> None:
     paths = [path for path, _ in contents.captures]
     for option, footage in (("--video", settings.video), ("--images", settings.images)):
         if footage is not None and len(paths) > 1:
-            values = {"option": option, "n": len(paths), "paths": paths}
-            raise RigError(Diagnostic("F001.several-captures", footage, values=values))
+            values = {"option": option, "n": len(paths), "paths": listed(paths)}
+            raise RigError(
+                Diagnostic(
+                    "F001.several-captures: expected one capture with {option}, found {n}: "
+                    "{paths}; "
+                    "open them one at a time",
+                    footage,
+                    values=values,
+                )
+            )
 
 
 def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) -> None:
@@ -103,12 +116,22 @@ def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) ->
             return
     first = next((skeleton for skeleton in skeletons if skeleton is not None), None)
     if first is None:
-        raise RigError(Diagnostic("F004.clip-alone", path))
+        raise RigError(
+            Diagnostic(
+                "F004.clip-alone: a clip without a skeleton: open it together with its .skel", path
+            )
+        )
     if any(skeleton is not None and suits(clip, skeleton) for skeleton in skeletons):
-        raise RigError(Diagnostic("F004.clip-taken", path))
+        raise RigError(
+            Diagnostic("F004.clip-taken: every matching skeleton already has a clip", path)
+        )
     owner = next(path for path, figure in contents.figures if figure.skeleton)
-    values = {"n": len(clip.channels), "skeleton": owner, "misfit": misfit(clip, first)}
-    raise RigError(Diagnostic("C009.clip", path, values=values))
+    values = {
+        "n": counted(len(clip.channels), "channel"),
+        "skeleton": owner,
+        "misfit": misfit(clip, first),
+    }
+    raise RigError(Diagnostic("C009.clip: found {n}, {skeleton} {misfit}", path, values=values))
 
 
 def _give_body_motion(
@@ -158,8 +181,11 @@ def _moved(
     try:
         clip, notes = body_clip(motion, model)
     except RigError as problem:
-        values = {"problem": problem.cause}
-        raise RigError(Diagnostic("F004.model", path, values=values)) from None
+        values = {
+            "problem": problem.cause,
+            "remedy": Remedy("open another model first", "--model selects the model"),
+        }
+        raise RigError(Diagnostic(wording.MODEL, path, values=values)) from None
     actor = Actor(model, clip=clip, called=draft.free_title(motion.name))
     return actor, [replace(note, path=path) for note in notes]
 
@@ -190,8 +216,13 @@ def _judged_up(path: Path, actors: Sequence[Actor], draft: SceneDraft, usual: st
 
     up = guess_up(actors)
     if up != usual:
-        key = "F007.up-judged-over" if up.startswith("-") else "F007.up-judged"
-        draft.note(key, path, up=up)
+        key = (
+            "F007.up-judged-over: {up} up, estimated from the poses: the capture is upside "
+            "down and is rotated upright; {remedy} overrides it"
+            if up.startswith("-")
+            else "F007.up-judged: {up} up, estimated from the poses; {remedy} overrides it"
+        )
+        draft.note(key, path, up=up, remedy=Remedy("Up axis in Preferences", "--up"))
     return up
 
 
@@ -229,13 +260,18 @@ def _drives_character(
 
 def _note_bundled(draft: SceneDraft, path: Path, has_shape: bool, has_expression: bool) -> None:
     """Record that the bundled body is shown, and which data it ignores."""
-    key = {
-        (False, False): "F007.bundled-body",
-        (True, False): "F007.bundled-body-without-shapes",
-        (False, True): "F007.bundled-body-without-expressions",
-        (True, True): "F007.bundled-body-without-either",
+    name, data = {
+        (False, False): ("", ""),
+        (True, False): ("-without-shapes", "shape"),
+        (False, True): ("-without-expressions", "expression"),
+        (True, True): ("-without-either", "shape and expression"),
     }[has_shape, has_expression]
-    draft.note(key, path)
+    ignored = f", to which the {data} coefficients of the files do not apply" if data else ""
+    draft.note(
+        f"F007.bundled-body{name}: drawn with the bundled body{ignored} ({{remedy}})",
+        path,
+        remedy=Remedy("open another body first to use it", "--model selects another body"),
+    )
 
 
 def _begin_capture(path: Path, capture: Capture, draft: SceneDraft, models: BodyModels) -> None:
@@ -379,16 +415,41 @@ def filmed(
 def _rate_notes(path: Path, video: float, rate: float) -> list[Diagnostic]:
     if abs(video / rate - 1.0) <= _SAME_RATE:
         return []
-    return [Diagnostic("F007.video-rate", path, values={"video": video, "rate": rate})]
+    return [
+        Diagnostic(
+            "F007.video-rate: the video has {video} frames per second, the capture {rate}: "
+            "they are matched by time ({remedy} sets the capture's rate)",
+            path,
+            values={
+                "video": rounded(video, 6),
+                "rate": rounded(rate, 6),
+                "remedy": Remedy("Frames per second in the Timeline", "--fps"),
+            },
+        )
+    ]
 
 
 def _camera_of(views: Sequence[CameraView], path: Path) -> int:
     """Return the index of the camera that recorded a video: the only one, or one of its name."""
     if not views:
-        raise RigError(Diagnostic("F001.video-camera", path))
+        raise RigError(
+            Diagnostic(
+                "F001.video-camera: the capture has no camera to which the video could belong: "
+                "expected calibrated cameras, or people in camera space{remedy}",
+                path,
+                values={"remedy": Remedy("", " (--space camera)")},
+            )
+        )
     names = [view.name for view in views]
     if len(views) > 1 and path.stem not in names:
-        raise RigError(Diagnostic("F001.video-cameras", path, values={"names": names}))
+        raise RigError(
+            Diagnostic(
+                "F001.video-cameras: expected a video with the name of one of the cameras "
+                "({names})",
+                path,
+                values={"names": listed(names)},
+            )
+        )
     return names.index(path.stem) if path.stem in names else 0
 
 
@@ -399,5 +460,10 @@ def _assumed(size: tuple[int, int], path: Path) -> tuple[list[CameraView], list[
         [[focal, 0.0, size[0] / 2.0], [0.0, focal, size[1] / 2.0], [0.0, 0.0, 1.0]]
     )
     values = {"focal": focal, "width": size[0], "height": size[1]}
-    note = Diagnostic("F007.assumed-camera", path, values=values)
+    note = Diagnostic(
+        "F007.assumed-camera: the files have no camera: a focal length of {focal:.0f} "
+        "pixels, the diagonal of {width} x {height}, is assumed",
+        path,
+        values=values,
+    )
     return [CameraView(_CAMERA, intrinsic, np.eye(3), np.zeros(3), size)], [note]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
+from viewer.phrases import counted
 from viewer.rig.figure import Figure
 
 
@@ -62,10 +63,27 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
     assert skeleton is not None  # the first figure of a pair is the skeleton
     if skin is None:
         values = {"n": skeleton.n_joints, "skeleton": paths[0]}
-        raise FormatError(Diagnostic("F004.skin", paths[1], values=values))
+        raise FormatError(
+            Diagnostic(
+                "F004.skin: expected weights and bindings for the {n} joints of {skeleton}, found "
+                "none",
+                paths[1],
+                values=values,
+            )
+        )
     if skin.n_joints != skeleton.n_joints:
-        values = {"n": skin.n_joints, "skeleton": paths[0], "joints": skeleton.n_joints}
-        raise RigError(Diagnostic("B001.joints", paths[1], values=values))
+        values = {
+            "n": skin.n_joints,
+            "skeleton": paths[0],
+            "joints": counted(skeleton.n_joints, "bind matrix"),
+        }
+        raise RigError(
+            Diagnostic(
+                "B001.joints: expected {joints}, one per joint of {skeleton}, found {n}",
+                paths[1],
+                values=values,
+            )
+        )
     facts = (*figures[0].facts, *figures[1].facts)
     origins = (*figures[0].origins, *figures[1].origins)
     return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts, origins=origins)

@@ -21,7 +21,13 @@ def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:
     factor = METRES[own] / METRES[unit]
     actor.placement = scaling(factor) @ actor.placement
     values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
-    return [Diagnostic("F007.unit-matched", values={**values, "factor": factor})]
+    return [
+        Diagnostic(
+            "F007.unit-matched: {figure} is in {unit}: scaled by {factor:g} to match the "
+            "scene, which is in {wanted}",
+            values={**values, "factor": factor},
+        )
+    ]
 
 
 def scaling(factor: float) -> Floats:

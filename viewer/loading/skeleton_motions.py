@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.formats import Source
 from viewer.loading.scene_draft import SceneDraft
@@ -63,7 +64,12 @@ def give_skeleton_motion(
     """
     motion = as_asked(motion, settings)
     for note in motion.up_notes:
-        draft.note("F007.up-taken", path, note=note)
+        draft.note(
+            "F007.up-taken: {note}; {remedy} overrides it",
+            path,
+            note=note,
+            remedy=Remedy("Up axis in Preferences", "--up"),
+        )
     fault = rest_fault(motion, settings.source_rest)
     if fault is not None:
         raise RigError(replace(fault, path=path))
@@ -90,7 +96,7 @@ def give_skeleton_motion(
         if is_driving:
             return None
         if refusal:
-            draft.note("F007.stands-alone", path, problem=refusal)
+            draft.note("F007.stands-alone: shown separately: {problem}", path, problem=refusal)
     called = draft.free_title(motion.figure.name)
     figure = read_from(path, motion.figure)
     actor = Actor(figure, clip=motion.clip, placement=placement, called=called)
@@ -165,7 +171,16 @@ def model_refusal(problem: RigError, path: Path | None) -> RigError:
     cause = problem.cause
     if isinstance(cause, Diagnostic) and cause.path is not None:
         return problem
-    return RigError(Diagnostic("F004.model", path, values={"problem": cause}))
+    return RigError(
+        Diagnostic(
+            wording.MODEL,
+            path,
+            values={
+                "problem": cause,
+                "remedy": Remedy("open another model first", "--model selects the model"),
+            },
+        )
+    )
 
 
 def map_refusal(problem: RigError, path: Path | None) -> RigError:
@@ -194,8 +209,15 @@ def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
                 one.actor, figure=figure, clip=scaled.clip, clip_origin=origin, pose=None
             )
         if one.motion.unit_note is not None:
-            key = "F007.unit-taken-and-scaled" if one in chosen else "F007.unit-taken"
-            draft.note(key, one.path, note=one.motion.unit_note)
+            key = (
+                "F007.unit-taken-and-scaled: {note}, and scaled to metres to match the "
+                "others{remedy}"
+                if one in chosen
+                else "F007.unit-taken: {note}{remedy}"
+            )
+            draft.note(
+                key, one.path, note=one.motion.unit_note, remedy=Remedy("", "; --unit overrides it")
+            )
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:
@@ -227,7 +249,9 @@ def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
     for figure in figures:
         if isinstance(figure, Figure) and figure.skeleton is not None and figure.animations:
             return _motion_of(figure, wanted)
-    raise source.fault("F002.no-motion")
+    raise source.fault(
+        "F002.no-motion: --motion: expected a motion or an animation of a skeleton, found none"
+    )
 
 
 def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, ViewerError
 from viewer.rig.arrays import Bytes
 
@@ -50,16 +51,28 @@ class VideoFrames:
             path.open("rb").close()  # FFmpeg's own messages do not state the reason
         except OSError as problem:
             values = {"reason": str(problem.strerror or problem)}
-            raise FormatError(Diagnostic("F001.video", path, values=values)) from None
+            raise FormatError(
+                Diagnostic("F001.video: unreadable video: {reason}", path, values=values)
+            ) from None
         try:
             self._container = self._errors.open(str(path))
         except (self._errors.FFmpegError, ValueError):
-            raise FormatError(Diagnostic("F002.video", path)) from None
+            raise FormatError(Diagnostic(wording.VIDEO, path)) from None
         if self._container.format.name.endswith(_PICTURES):
-            raise FormatError(Diagnostic("F002.video-picture", path))
+            raise FormatError(
+                Diagnostic(
+                    "F002.video-picture: expected a video, found a picture{remedy}",
+                    path,
+                    values={"remedy": Remedy("", " (--images takes a folder of pictures)")},
+                )
+            )
         streams = self._container.streams.video
         if not streams:
-            raise FormatError(Diagnostic("F002.video-stream", path))
+            raise FormatError(
+                Diagnostic(
+                    "F002.video-stream: expected a video, found a file without video frames", path
+                )
+            )
         self._stream = streams[0]
         self._stream.thread_type = "AUTO"
         self.rate = float(self._stream.average_rate or self._stream.guessed_rate or 0.0)
@@ -70,7 +83,7 @@ class VideoFrames:
         self._restart(0.0)
         first = self._next()
         if first is None or not self.rate > 0.0:
-            raise FormatError(Diagnostic("F002.video", path))
+            raise FormatError(Diagnostic(wording.VIDEO, path))
         turned = _quarter_turns(first.frame) % 2
         wide, high = first.frame.width, first.frame.height
         self.size = (high, wide) if turned else (wide, high)
@@ -114,7 +127,7 @@ class VideoFrames:
             self._container.seek(begin + int(target / stream.time_base), stream=stream)
         except self._errors.FFmpegError:
             values = {"seconds": seconds}
-            raise FormatError(Diagnostic("F002.video-damaged", self.path, values=values)) from None
+            raise FormatError(Diagnostic(wording.VIDEO_DAMAGED, self.path, values=values)) from None
         self._source, self._is_over = self._container.decode(stream), False
         self._kept.clear()
 
@@ -127,7 +140,7 @@ class VideoFrames:
             self._source = iter(())
             seconds = self._kept[-1].ends if self._kept else 0.0
             values = {"seconds": seconds}
-            raise FormatError(Diagnostic("F002.video-damaged", self.path, values=values)) from None
+            raise FormatError(Diagnostic(wording.VIDEO_DAMAGED, self.path, values=values)) from None
         if frame is None:
             self._is_over = True
             return None

@@ -6,6 +6,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
@@ -29,9 +30,15 @@ def unused_coefficients(group: str, values: Floats, used: int, name: str) -> lis
         "last": count,
         "figure": name,
         "most": used,
-        "largest": float(np.abs(rest).max()),
+        "largest": rounded(float(np.abs(rest).max())),
     }
-    key = "F007.coefficients-left-out" if count > used + 1 else "F007.coefficient-left-out"
+    key = (
+        "F007.coefficients-left-out: {group} coefficients {first} to {last} omitted "
+        "(largest value {largest}): {figure} has {most}"
+        if count > used + 1
+        else "F007.coefficient-left-out: {group} coefficient {last} omitted (largest value "
+        "{largest}): {figure} has {most}"
+    )
     return [Diagnostic(key, values=values_shown)]
 
 
@@ -44,9 +51,17 @@ def space_misfit(space: ShapeSpace, figure: Figure) -> Diagnostic | None:
     own = figure.shape_space
     values = {"figure": figure.name, "own": own.title, "other": space.title}
     if not space.shares_coefficients(own):
-        return Diagnostic("C019.model", values=values)
+        return Diagnostic(
+            "C019.model: shape coefficients of {other} omitted: they do not apply to {own} "
+            "({figure})",
+            values=values,
+        )
     if own.gender and space.gender and own.gender != space.gender:
-        return Diagnostic("C019.gender", values=values)
+        return Diagnostic(
+            "C019.gender: made for a {other} body, but {figure} is {own}: size and shape "
+            "differ from the file's",
+            values=values,
+        )
     return None
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
@@ -58,9 +59,15 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
         return figure
     mesh, shapes = figure.mesh, figure.blend_shapes
     if mesh is None:
-        raise _refusal("F004.morph-mesh", targets[0], figure)
+        raise _refusal(
+            "F004.morph-mesh: morph {morph}: {figure} has no mesh to deform", targets[0], figure
+        )
     if shapes is not None and shapes.normal_offsets is None:
-        raise _refusal("F004.morph-shapes", targets[0], figure)
+        raise _refusal(
+            "F004.morph-shapes: morph {morph}: {figure} already has blend shapes",
+            targets[0],
+            figure,
+        )
     for target in targets:
         _check_vertices(target, figure, mesh.n_vertices)
     count = len(targets)
@@ -118,7 +125,14 @@ def _check_vertices(target: MorphTarget, figure: Figure, count: int) -> None:
     wrong = np.flatnonzero((target.vertices < 0) | (target.vertices >= count))
     if len(wrong):
         found = int(target.vertices[wrong[0]])
-        raise _refusal("F004.morph-vertex", target, figure, found=found, n=count)
+        raise _refusal(
+            "F004.morph-vertex: morph {morph}: vertex index {found} is out of range for "
+            "{figure}, which has {n}",
+            target,
+            figure,
+            found=found,
+            n=counted(count, "vertex"),
+        )
 
 
 def _refusal(key: str, target: MorphTarget, figure: Figure, **values: Any) -> RigError:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.commands.diff import pair_actors
-from viewer.diagnostics import Phrase
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -92,20 +91,20 @@ def test_people_are_paired_by_their_number() -> None:
     second = [points("a", person=2), points("a", person=3)]
     found = pair_actors(first, second)
     assert [(one.person, other.person) for one, other in found.pairs] == [(2, 2)]
-    assert found.first == (Phrase("lone-points", name=first[0].name),)
-    assert found.second == (Phrase("lone-points", name=second[1].name),)
+    assert found.first == (f"{first[0].name} (captured points)",)
+    assert found.second == (f"{second[1].name} (captured points)",)
 
 
 def test_unpaired_figures_are_reported_with_their_side() -> None:
     found = pair_actors([rig("a")], [skeleton("other"), surface("skin"), rig("a"), rig("b")])
     assert found.first == ()
     assert found.second == (
-        Phrase("lone-skeleton", name="other"),
-        Phrase("lone-mesh", name="skin"),
-        Phrase("lone-figure", name="b"),
+        "other (a skeleton)",
+        "skin (a mesh)",
+        "b",
     )
     found = pair_actors([rig("a"), rig("b")], [rig("b")])
-    assert found.first == (Phrase("lone-figure", name="a"),) and found.second == ()
+    assert found.first == ("a",) and found.second == ()
 
 
 def test_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
@@ -117,7 +116,7 @@ def test_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
         assert one.clip is walk and other.clip is mine and other.figure.name == "a"
         assert (found.first, found.second)[:: -1 if turned else 1] == (
             (),
-            (Phrase("lone-skeleton", name="stray"),),
+            ("stray (a skeleton)",),
         )
     assert second[0].clip is mine and second[1].clip is None  # both clips are unchanged
 
@@ -138,6 +137,6 @@ def test_clip_with_a_different_name_is_used_only_if_necessary() -> None:
     found = pair_actors([rig("a")], [skeleton("s", run), rig("a")])
     assert found.pairs[0][1].clip is None
     assert found.second == (
-        Phrase("lone-skeleton", name="s"),
-        Phrase("lone-motion", name="run"),
+        "s (a skeleton)",
+        "motion run",
     )

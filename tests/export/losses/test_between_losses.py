@@ -10,7 +10,7 @@ import pytest
 from exporting import export_frames
 from rig import hand_made
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic
 from viewer.export import ExportOptions
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -51,7 +51,7 @@ def densest(actor: Actor, rate: float) -> float:
 
 def error_between(notes: list[Diagnostic]) -> Diagnostic:
     """Return the only error between frames."""
-    between_frames = Phrase("motion-between-frames")
+    between_frames = "the motion between frames"
     (note,) = [note for note in notes if note.values.get("original") == between_frames]
     return note
 
@@ -106,5 +106,5 @@ def test_motions_too_long_to_check_are_reported(tmp_path):
     actor = swinging(end=120.0)
     notes = write(sample_animation(actor, 20.0), tmp_path, "bvh", "a.bvh")
     note = error_between(notes)
-    assert note.values["estimate"].key == "estimated-times"
+    assert note.values["estimate"].sentence == "an estimate from {n}"
     assert note.values["joint"].values["distance"] == pytest.approx(densest(actor, 20.0), rel=TOLD)

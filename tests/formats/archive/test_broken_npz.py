@@ -13,7 +13,6 @@ from faults import Fault, fault_of
 from formats.npz_bytes import ROWS, cost, header, look, npy, npz, opened, refusal, zipped
 from numpy.testing import assert_array_equal
 
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._source import Source
@@ -25,35 +24,36 @@ BOUND = 64 << 20  # limit of allocated memory in bytes
     ("data", "line"),
     [
         (npy(header(shape="(1099511627776,)"), bytes(8)), ("F002.archive-value", None,
-         {"item": "v", "problem": Phrase("array-bytes", shape=(1099511627776,), dtype="float64",
-         found=8)})),
+         {"item": "v", "problem": "expected 1099511627776 float64, found 8 bytes"})),
         (npy(header(shape="(0, 4611686018427387904)")), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("array-bytes", shape=(0, 4611686018427387904), dtype="float64",
-         found=0)})),
+         "problem": "expected 0 x 4611686018427387904 float64, found 0 bytes"})),
         (npy(header(shape="(2,)"), bytes(8)), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("array-bytes", shape=(2,), dtype="float64", found=8)})),
+         "problem": "expected 2 float64, found 8 bytes"})),
         (npy(header(shape="(1,)"), bytes(9)), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("array-bytes", shape=(1,), dtype="float64", found=9)})),
+         "problem": "expected 1 float64, found 9 bytes"})),
         (npy(header(shape="()")), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("array-bytes", shape=(), dtype="float64", found=0)})),
+         "problem": "expected a single float64, found 0 bytes"})),
         (npy(header("'|S4'", shape="(9,)"), bytes(8)), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("array-bytes", shape=(9,), dtype="bytes32", found=8)})),
-        (npy("")[:10], ("F002.archive-value", None, {"item": "v", "problem": Phrase("npy-header",
-         found=b"")})),
-        (npy("{}"), ("F002.archive-value", None, {"item": "v", "problem": Phrase("npy-header",
-         found=b"{}")})),
+         "problem": "expected 9 bytes32, found 8 bytes"})),
+        (npy("")[:10], ("F002.archive-value", None, {"item": "v",
+         "problem": ("expected a header with descr, fortran_order and shape, "
+        "found b''")})),
+        (npy("{}"), ("F002.archive-value", None, {"item": "v",
+         "problem": ("expected a header with descr, fortran_order and shape, "
+        "found b'{}'")})),
         (npy(header(), version=b"\4\0"), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("npy-lead", found=b"\x93NUMPY\x04\x00")})),
+         "problem": "expected an .npy header, found b'\\x93NUMPY\\x04\\x00'"})),
         (b"cos\nsystem\n", ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("npy-lead", found=b"cos\nsyst")})),
-        (b"", ("F002.archive-value", None, {"item": "v", "problem": Phrase("npy-lead",
-         found=b"")})),
+         "problem": "expected an .npy header, found b'cos\\nsyst'"})),
+        (b"", ("F002.archive-value", None, {"item": "v",
+         "problem": "expected an .npy header, found b''"})),
         (npy(b"x" * 10)[:15], ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("npy-header-cut", expected=10, found=5)})),
+         "problem": "expected a header of 10 bytes, found 5"})),
         (npy("")[:6] + b"\2\0\0\0\1\0", ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("npy-header-length", found=65536)})),
+         "problem": "expected a header smaller than 64 KiB, found 65536 bytes"})),
         (npy("", version=b"\2\0")[:8], ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("npy-header", found=b"")})),
+         "problem": ("expected a header with descr, fortran_order and shape, "
+        "found b''")})),
     ],
 )  # fmt: skip
 def test_headers_with_false_sizes_are_refused(data: bytes, line: Fault) -> None:
@@ -91,7 +91,11 @@ def test_headers_with_false_sizes_are_refused(data: bytes, line: Fault) -> None:
 )
 def test_headers_with_syntax_errors_are_refused(text: str) -> None:
     key, _, values = refusal(zipped({"v.npy": npy(text, bytes(8))}))
-    assert (key, values["item"], values["problem"].key) == ("F002.archive-value", "v", "npy-header")
+    assert (key, values["item"], values["problem"].sentence) == (
+        "F002.archive-value",
+        "v",
+        "expected a header with descr, fortran_order and shape, found {found}",
+    )
     assert len(str(values["problem"])) < 400
 
 

@@ -96,7 +96,8 @@ def test_errors_state_the_path_of_the_value() -> None:
     assert person is not None
     inner = person.inside("cam")
     assert inner is not None
-    assert str(inner.fault("F002.no-key", item="w")) == "x.pkl: 3.cam.w: key not found"
+    fault = inner.fault("F002.no-key: {item}: key not found", item="w")
+    assert str(fault) == "x.pkl: 3.cam.w: key not found"
 
 
 def test_compressed_files_of_other_writers_are_read() -> None:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from rig.retargeting.trotting import animal
 from rig.retargeting.two_people import figure_of
 
-from viewer.diagnostics import Phrase
 from viewer.formats import Source, detect
 from viewer.formats.bvh.guess import guess_up
 from viewer.rig.motion.evaluation import frames_of, world_frames
@@ -188,7 +187,7 @@ def test_the_second_offset_of_soma_is_ignored_and_said() -> None:
     motion, warnings = read(doubled)
     np.testing.assert_array_equal(motion.figure.skeleton.rest_translations[1:3],
                                   [[0.1, 0, 0], [0, -0.9, 0]])  # fmt: skip
-    values = {"n": 2, "joint": Phrase("joint", name="LeftUpLeg")}
+    values = {"n": 2, "joint": "joint LeftUpLeg"}
     assert warnings == [("F006.bvh-offset", 8, values)]
 
 
@@ -282,30 +281,22 @@ def test_frame_rate_snaps_to_the_common_one_matching_the_frame_time(
     assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-15)
 
 
-def near(number: float) -> float:
-    return pytest.approx(number, rel=1e-9)
-
-
-def of_size(unit: str, size: float, metres: float = 0.0) -> Phrase:
-    return Phrase("unit-from-size", unit=unit, size=near(size), metres=near(metres))
+def of_size(unit: str, size: str, inches: str = "") -> str:
+    return f"{unit} assumed (skeleton {size} high{inches})"
 
 
 @pytest.mark.parametrize(
     ("factor", "unit", "warnings"),
     [
         (1, "m", []),
-        (100, "cm", [of_size("centimetres", 170)]),
-        (1000, "mm", [of_size("millimetres", 1700)]),
-        (
-            40,
-            "cm",
-            [of_size("centimetres", 68, 1.7272)],
-        ),
-        (10, "", [Phrase("unit-unknown", size=near(17), metres=0.0)]),
-        (1e5, "", [Phrase("unit-unknown", size=near(1.7e5), metres=0.0)]),
+        (100, "cm", [of_size("centimetres", "170")]),
+        (1000, "mm", [of_size("millimetres", "1700")]),
+        (40, "cm", [of_size("centimetres", "68", "; if in inches, 1.73 m")]),
+        (10, "", ["unit unknown (skeleton 17 high)"]),
+        (1e5, "", ["unit unknown (skeleton 170,000 high)"]),
     ],
 )
-def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[Phrase]) -> None:
+def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[str]) -> None:
     text = one_joint("Xrotation", "0").replace("0 1.7 0", f"0 {1.7 * factor:g} 0")
     motion, found = read(text)
     assert (motion.figure.unit, found) == (unit, warnings)
@@ -316,13 +307,13 @@ def test_z_is_up_if_the_head_is_above_the_feet_along_z() -> None:
     text = GOOD.replace("0.0 -0.9 0.0", "0 0 -0.9").replace("0.0 0.6 0.0", "0.0 0.0 0.6")
     motion, warnings = read(text.replace("0.0 1.0 0.0 0 0 0", "0 0 1 0 0 0"))
     assert motion.figure.up == "z"
-    assert warnings == [Phrase("up-of-head", up="z")]
+    assert warnings == ["z up assumed: the head is above the feet along z"]
 
 
 def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
     motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
     assert motion.figure.up == "z"
-    assert warnings == [Phrase("up-of-longest", up="z")]
+    assert warnings == ["z up assumed: the rest skeleton is longest along z"]
 
 
 def test_y_is_up_if_an_animal_that_is_longest_along_z_stands_on_its_legs() -> None:
@@ -341,7 +332,12 @@ def test_the_axis_along_which_frames_are_upright_is_up() -> None:
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
     assert motion.figure.up == "z"
-    assert warnings == [Phrase("up-of-frames", up="z", axis="+y")]
+    assert warnings == [
+        (
+            "z up assumed: the skeleton is upright along z in the "
+            "frames, although along +y in the rest pose"
+        )
+    ]
 
 
 def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis() -> None:
@@ -350,7 +346,12 @@ def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis() ->
     rows = "0 0 1 90 0 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(text.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
     assert ("up", "y, from the frames") in motion.figure.facts
-    assert warnings == [Phrase("up-of-frames", up="y", axis="+x")]
+    assert warnings == [
+        (
+            "y up assumed: the skeleton is upright along y in the "
+            "frames, although along +x in the rest pose"
+        )
+    ]
 
 
 def test_bvh_is_recognised_by_content() -> None:

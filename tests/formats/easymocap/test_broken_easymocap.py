@@ -6,13 +6,14 @@ import random
 
 import numpy as np
 import pytest
-from faults import INF, NAN, fault_of
+from faults import fault_of
 from formats.capture_files import body, noticed, opened, points, rows_of, write_frames
 from formats.easymocap.capture_faults import gap
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, easymocap
+from viewer.phrases import listed, one_of
 
 
 def refusal(path, **options):
@@ -31,13 +32,13 @@ def refusal(path, **options):
         ("[1, 2", ("F007.record", 1, {"problem": ("F002.json", None,
          {"reason": "Expecting ',' delimiter"})})),
         ("null", ("F007.record", 1, {"problem": ("F002.capture-list", None,
-         {"found": Phrase("found-nothing")})})),
+         {"found": "None"})})),
         ("17", ("F007.record", 1, {"problem": ("F002.capture-list", None,
-         {"found": Phrase("found-value", value="17")})})),
+         {"found": "17"})})),
         ('{"id": 0}', ("F007.record", 1, {"problem": ("F002.capture-list", None,
-         {"found": Phrase("found-named", n=1)})})),
+         {"found": "a dict of 1 value"})})),
         ('{"annots":\n 3}', ("F007.record", 1, {"problem": ("F002.capture-list", None,
-         {"found": Phrase("found-value", value="3")})})),
+         {"found": "3"})})),
         ("\n[" * 100_000, ("F007.record", 100001, {"problem": ("F002.json-nesting", None, {})})),
         (f"[\n1{'0' * 5000}]", ("F007.record", 2, {"problem": ("F002.capture-digits", None,
          {"most": 4300})})),
@@ -101,45 +102,39 @@ def test_pipe_among_the_frames_is_ignored(tmp_path):
     ("changes", "message"),
     [
         ({"poses": [[0.0] * 71]}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-count", expected=72, found=71)})})),
+         {"item": "person 0: poses", "problem": "expected 72 numbers, found 71"})})),
         ({"poses": [[0.0] * 165]}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-count", expected=72,
-         found=165)})})),
+         {"item": "person 0: poses", "problem": "expected 72 numbers, found 165"})})),
         ({"poses": [[0.0] * 71 + ["1"]]}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
-         found=Phrase("found-value", value="'1'"))})})),
+         {"item": "person 0: poses", "problem": "expected 72 numbers, found '1' among them"})})),
         ({"poses": [[0.0] * 71 + [None]]}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
-         found=Phrase("found-nothing"))})})),
+         {"item": "person 0: poses", "problem": "expected 72 numbers, found None among them"})})),
         ({"poses": [[0.0] * 71 + [[1.0]]]}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
-         found=Phrase("found-list", n=1))})})),
+         {"item": "person 0: poses",
+          "problem": "expected 72 numbers, found a list of length 1 among them"})})),
         ({"poses": [[0.0] * 71 + [10**400]]}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
-         found=Phrase("found-value", value="100000000000000000000000000000000000000…"))})})),
+         {"item": "person 0: poses", "problem": ("expected 72 numbers, found "
+        "100000000000000000000000000000000000000… among them")})})),
         ({"poses": [[0.0] * 72] * 2}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-count", expected=72, found=2)})})),
+         {"item": "person 0: poses", "problem": "expected 72 numbers, found 2"})})),
         ({"poses": "0" * 72}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: poses", "problem": Phrase("record-numbers",
-         found=Phrase("found-value", value="'00000000000000000000000000000000000000…"))})})),
+         {"item": "person 0: poses", "problem": ("expected numbers, found "
+        "'00000000000000000000000000000000000000…")})})),
         ({"poses": None, "pose": 1}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0", "problem": Phrase("record-lacks", expected=("poses", "keypoints3d"),
-         keys=["id", "Rh", "Th", "shapes", "pose"])})})),
+         {"item": "person 0", "problem": ("expected poses or keypoints3d, found keys id, Rh, Th, "
+        "shapes, pose")})})),
         ({"poses": [[float("nan")] * 72]}, ("F007.record", 1, {"problem": ("F003.record", None,
-         {"item": "person 0: poses", "problem": Phrase("not-finite", found=NAN)})})),
+         {"item": "person 0: poses", "problem": "expected finite numbers, found nan"})})),
         ({"Th": [[0.0, 1e300, 0.0]]}, ("F007.record", 1, {"problem": ("F003.record", None,
-         {"item": "person 0: Th", "problem": Phrase("beyond-limit", limit=1000000000.0,
-         found=1e300)})})),
+         {"item": "person 0: Th", "problem": "expected numbers within ±1e+09, found 1e+300"})})),
         ({"Rh": [[0.0, float("-inf"), 0.0]]}, ("F007.record", 1, {"problem": ("F003.record", None,
-         {"item": "person 0: Rh", "problem": Phrase("not-finite", found=-INF)})})),
+         {"item": "person 0: Rh", "problem": "expected finite numbers, found -inf"})})),
         ({"Rh": None}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: Rh", "problem": Phrase("record-numbers",
-         found=Phrase("found-no-key"))})})),
+         {"item": "person 0: Rh", "problem": "expected numbers, found no value"})})),
         ({"Th": 3}, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "person 0: Th",
-         "problem": Phrase("record-numbers", found=Phrase("found-value", value="3"))})})),
+         "problem": "expected numbers, found 3"})})),
         ({"Th": {"x": 1, "y": 2, "z": 3}}, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: Th", "problem": Phrase("record-numbers", found=Phrase("found-named",
-         n=3))})})),
+         {"item": "person 0: Th", "problem": "expected numbers, found a dict of 3 values"})})),
     ],
 )  # fmt: skip
 def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
@@ -158,14 +153,13 @@ def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
     ("person", "message"),
     [
         (1.5, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
-         "problem": Phrase("record-id", found=Phrase("found-value", value="1.5"))})})),
+         "problem": "expected an integer or a name, found 1.5"})})),
         (True, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
-         "problem": Phrase("record-id", found=Phrase("found-value", value="True"))})})),
+         "problem": "expected an integer or a name, found True"})})),
         ([1], ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
-         "problem": Phrase("record-id", found=Phrase("found-list", n=1))})})),
+         "problem": "expected an integer or a name, found a list of length 1"})})),
         (1 << 40, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
-         "problem": Phrase("record-id-limit", limit=2147483648, found=Phrase("found-value",
-         value="1099511627776"))})})),
+         "problem": "expected an id below 2147483648, found 1099511627776"})})),
     ],
 )  # fmt: skip
 def test_person_without_a_number_is_left_out(tmp_path, person, message):
@@ -188,7 +182,7 @@ def test_value_that_is_not_a_record_is_left_out(tmp_path):
                 "problem": (
                     "F002.record",
                     None,
-                    {"item": "", "problem": Phrase("record-person", found=Phrase("found-nothing"))},
+                    {"item": "", "problem": "expected a person with named values, found None"},
                 )
             },
         ),
@@ -201,7 +195,7 @@ def test_value_that_is_not_a_record_is_left_out(tmp_path):
                     None,
                     {
                         "item": "",
-                        "problem": Phrase("record-person", found=Phrase("found-value", value="3")),
+                        "problem": "expected a person with named values, found 3",
                     },
                 )
             },
@@ -229,7 +223,10 @@ def test_messages_identify_untracked_people(tmp_path):
                 "problem": (
                     "F003.record",
                     None,
-                    {"item": "untracked 2: Th", "problem": Phrase("not-finite", found=NAN)},
+                    {
+                        "item": "untracked 2: Th",
+                        "problem": "expected finite numbers, found nan",
+                    },
                 )
             },
         ),
@@ -266,7 +263,11 @@ def test_capture_of_broken_files_only_is_refused(tmp_path):
 
 def test_vposer_latent_code_is_refused(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, 32)]})
-    problem = Phrase("record-vposer", found=32)
+    problem = (
+        "expected rotations, found 32 numbers, a VPoser latent "
+        "vector, which needs the VPoser network to decode: export "
+        "full poses from EasyMocap"
+    )
     fault = ("F002.record", 1, {"item": "person 0: poses", "problem": problem})
     assert refusal(tmp_path / "smpl" / "000000.json") == fault
 
@@ -274,7 +275,9 @@ def test_vposer_latent_code_is_refused(tmp_path):
 def test_unknown_pose_length_is_refused_with_the_known_lengths(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, 90)]})
     lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
-    problem = Phrase("record-lengths", expected=lengths, found=90)
+    problem = Phrase(
+        "expected {expected} numbers, found {found}", expected=one_of(lengths), found=90
+    )
     fault = ("F002.record", 1, {"item": "person 0: poses", "problem": problem})
     assert refusal(tmp_path / "smpl" / "000000.json") == fault
 
@@ -293,7 +296,9 @@ def test_two_dimensional_points_are_refused(tmp_path):
     write_frames(tmp_path / "annots", {0: {"annots": [{"personID": 0, "keypoints": [[1, 2, 1]]}]}})
     found = refusal(tmp_path / "annots")[2]["problem"]
     wanted, keys = ("poses", "keypoints3d"), ["personID", "keypoints"]
-    problem = Phrase("record-lacks", expected=wanted, keys=keys)
+    problem = Phrase(
+        "expected {expected}, found keys {keys}", expected=one_of(wanted), keys=listed(keys, 8)
+    )
     assert found == ("F002.record", 1, {"item": "person 0", "problem": problem})
 
 

@@ -6,7 +6,6 @@ import pytest
 from formats.capture_files import body, noticed, opened, points, write_frames
 from formats.easymocap.capture_faults import gap
 
-from viewer.diagnostics import Phrase
 from viewer.formats._text.json_places import line_at, nearest_place
 
 
@@ -25,7 +24,13 @@ def test_non_finite_keypoints_are_undetected(tmp_path):
                 "problem": (
                     "F002.record",
                     None,
-                    {"item": "person 0", "problem": Phrase("record-unseen", n=3)},
+                    {
+                        "item": "person 0",
+                        "problem": (
+                            "3 keypoints with non-finite numbers or negative "
+                            "confidence, treated as not visible"
+                        ),
+                    },
                 )
             },
         ),
@@ -38,17 +43,21 @@ def test_non_finite_keypoints_are_undetected(tmp_path):
     ("rows", "message"),
     [
         ([[0.0] * 4] * 24, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-points", expected=25,
-         found=24)})})),
+         {"item": "person 0: keypoints3d", "problem": "expected 25 keypoints, found 24"})})),
         ([[0.0] * 4] * 24 + [[0.0] * 5], ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-other-rows")})})),
+         {"item": "person 0: keypoints3d",
+          "problem": ("expected rows of 3 or 4 numbers, found rows of different "
+        "lengths")})})),
         ([[0.0] * 4] * 24 + [["1"] * 4], ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-other-rows")})})),
+         {"item": "person 0: keypoints3d",
+          "problem": ("expected rows of 3 or 4 numbers, found rows of different "
+        "lengths")})})),
         ([0.0] * 25, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-other-rows")})})),
+         {"item": "person 0: keypoints3d",
+          "problem": ("expected rows of 3 or 4 numbers, found rows of different "
+        "lengths")})})),
         (3, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "person 0: keypoints3d",
-         "problem": Phrase("record-points", expected=25, found=Phrase("found-value",
-         value="3"))})})),
+         "problem": "expected 25 keypoints, found 3"})})),
     ],
 )  # fmt: skip
 def test_broken_keypoints_are_a_gap(tmp_path, rows, message):

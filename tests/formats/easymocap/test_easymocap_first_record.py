@@ -3,10 +3,10 @@
 import json
 
 import pytest
-from faults import INF
 from formats.capture_files import body, noticed, opened, points, rows_of, write_frames
 
 from viewer.diagnostics import Phrase
+from viewer.phrases import one_of
 
 INFINITE = json.loads("1e400")
 
@@ -22,25 +22,25 @@ def fault_in(parts, path):
     ("changes", "message"),
     [
         ({"shapes": [[], []]}, ("F002.record", None, {"item": "person 0: shapes",
-         "problem": Phrase("record-odd", expected=2, found=Phrase("found-empty-list"))})),
+         "problem": "expected 2 numbers, found an empty list among them"})),
         ({"shapes": [[None]]}, ("F002.record", None, {"item": "person 0: shapes",
-         "problem": Phrase("record-odd", expected=1, found=Phrase("found-nothing"))})),
+         "problem": "expected 1 number, found None among them"})),
         ({"shapes": [[INFINITE]]}, ("F003.record", None, {"item": "person 0: shapes",
-         "problem": Phrase("not-finite", found=INF)})),
+         "problem": "expected finite numbers, found inf"})),
         ({"shapes": "x"}, ("F002.record", None, {"item": "person 0: shapes",
-         "problem": Phrase("record-numbers", found=Phrase("found-value", value="'x'"))})),
+         "problem": "expected numbers, found 'x'"})),
         ({"shapes": {}}, ("F002.record", None, {"item": "person 0: shapes",
-         "problem": Phrase("record-numbers", found=Phrase("found-no-named"))})),
+         "problem": "expected numbers, found an empty dict"})),
         ({"expression": [["a"]]}, ("F002.record", None, {"item": "person 0: expression",
-         "problem": Phrase("record-odd", expected=1, found=Phrase("found-value", value="'a'"))})),
+         "problem": "expected 1 number, found 'a' among them"})),
         ({"expression": [[INFINITE] * 3]}, ("F003.record", None, {"item": "person 0: expression",
-         "problem": Phrase("not-finite", found=INF)})),
+         "problem": "expected finite numbers, found inf"})),
         ({"poses": [[None] * 69]}, ("F002.record", None, {"item": "person 0: poses",
-         "problem": Phrase("record-odd", expected=69, found=Phrase("found-nothing"))})),
+         "problem": "expected 69 numbers, found None among them"})),
         ({"poses": [[INFINITE] * 165]}, ("F003.record", None, {"item": "person 0: poses",
-         "problem": Phrase("not-finite", found=INF)})),
+         "problem": "expected finite numbers, found inf"})),
         ({"Th": [[1.0]], "shapes": [[1.0]]}, ("F002.record", None, {"item": "person 0: Th",
-         "problem": Phrase("record-count", expected=3, found=1)})),
+         "problem": "expected 3 numbers, found 1"})),
     ],
 )  # fmt: skip
 def test_number_of_values_is_that_of_valid_records(tmp_path, changes, message):
@@ -62,7 +62,7 @@ def test_number_of_hand_values_is_that_of_valid_records(tmp_path, key):
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [1]
     line, (_, _, values) = fault_in(parts, folder / "000000.json")
-    problem = Phrase("record-odd", expected=1, found=Phrase("found-nothing"))
+    problem = "expected 1 number, found None among them"
     assert (line, values) == (1, {"item": f"person 0: {key}", "problem": problem})
 
 
@@ -89,7 +89,11 @@ def test_number_of_keypoints_is_that_of_valid_records(tmp_path, rows):
     assert sum(rows for rows, _ in counts) == 1 and {count for _, count in counts} == {25}
     line, (_, _, values) = fault_in(parts, folder / "000000.json")
     assert (line, values["item"]) == (1, "person 0: keypoints3d")
-    assert values["problem"].key in ("record-rows", "record-other-rows", "record-no-rows")
+    assert values["problem"].sentence in (
+        "expected rows of 3 or 4 numbers, found {found}",
+        "expected rows of 3 or 4 numbers, found rows of different lengths",
+        "expected rows of 3 or 4 finite numbers, found none",
+    )
 
 
 def test_undetected_keypoints_determine_the_number_of_keypoints(tmp_path):
@@ -104,14 +108,16 @@ def test_accepted_pose_lengths_are_listed(tmp_path):
     _, parts, _ = opened(tmp_path)
     _, (_, _, values) = fault_in(parts, folder / "000000.json")
     lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
-    problem = Phrase("record-lengths", expected=lengths, found=7)
+    problem = Phrase(
+        "expected {expected} numbers, found {found}", expected=one_of(lengths), found=7
+    )
     assert values == {"item": "person 0: poses", "problem": problem}
 
 
 def test_empty_record_is_reported_without_keys(tmp_path):
     write_frames(tmp_path / "smpl", {0: [{}], 1: [body(0)]})
     _, parts, _ = opened(tmp_path)
-    problem = Phrase("record-no-keys", expected=("poses", "keypoints3d"))
+    problem = "expected poses or keypoints3d, found no keys"
     faults = [values.get("problem") for _, _, values in noticed(parts)]
     assert ("F002.record", None, {"item": "person 0", "problem": problem}) in faults
 
@@ -121,7 +127,7 @@ def test_unusual_number_of_pose_values_in_the_first_record_makes_it_a_gap(tmp_pa
     folder = write_frames(tmp_path / "smpl", frames)
     capture, parts, _ = opened(tmp_path)
     assert (capture.model, rows_of(parts, 0)) == ("SMPL", [*range(1, 12)])
-    problem = Phrase("record-lengths", expected=[72], found=78)
+    problem = "expected 72 numbers, found 78"
     values = {"item": "person 0: poses", "problem": problem}
     assert fault_in(parts, folder / "000000.json") == (1, ("F002.record", None, values))
 

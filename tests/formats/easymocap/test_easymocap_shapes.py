@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from faults import NAN
 from formats.capture_files import body, noticed, opened, rows_of, waves, write_frames
 from numpy.testing import assert_array_equal
 
-from viewer.diagnostics import Phrase
 from viewer.formats.easymocap.bodies import hold, last_given
 
 ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
@@ -79,7 +77,10 @@ def test_last_valid_shapes_are_repeated(tmp_path):
                 "problem": (
                     "F003.record",
                     None,
-                    {"item": "person 0: shapes", "problem": Phrase("not-finite", found=NAN)},
+                    {
+                        "item": "person 0: shapes",
+                        "problem": "expected finite numbers, found nan",
+                    },
                 )
             },
         ),

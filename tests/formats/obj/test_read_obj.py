@@ -7,7 +7,6 @@ import pytest
 from faults import Fault, refusal_of
 
 import viewer
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, detect, obj
 from viewer.media.png import encode_png
@@ -306,20 +305,20 @@ def test_file_with_only_points_is_read_with_a_warning() -> None:
         ("", ('F002.obj-mesh', None, {'looks': 'an empty file'})),
         ("\0" * 9, ('F002.obj-mesh', None, {'looks': 'zeros'})),
         ("vt 0 0\n", ('F002.obj-mesh', 1, {'looks': None})),
-        ("v 0 0\n", ('F002.width', 1, {'item': Phrase('obj-v', index=0), 'expected': 3,
+        ("v 0 0\n", ('F002.width', 1, {'item': "v of vertex 0", 'expected': 3,
          'found': 2})),
-        ("v 0 0 0\nv\n", ('F002.width', 2, {'item': Phrase('obj-v', index=1), 'expected': 3,
+        ("v 0 0 0\nv\n", ('F002.width', 2, {'item': "v of vertex 1", 'expected': 3,
          'found': 0})),
         ("v 0 0 0 0 0\n",
          ('F002.obj-vertex', 1, {'found': 5})),
-        ("\nv 0 up 0\n", ('F002.number', 2, {'item': Phrase('obj-v', index=0), 'found': b'up'})),
-        ("v 0 nan 0\n", ('F003.number', 1, {'item': Phrase('obj-v', index=0), 'found': b'nan'})),
-        ("v 0 1e39 0\n", ('F003.too-large', 1, {'item': Phrase('obj-v', index=0),
+        ("\nv 0 up 0\n", ('F002.number', 2, {'item': "v of vertex 0", 'found': b'up'})),
+        ("v 0 nan 0\n", ('F003.number', 1, {'item': "v of vertex 0", 'found': b'nan'})),
+        ("v 0 1e39 0\n", ('F003.too-large', 1, {'item': "v of vertex 0",
          'found': b'1e39'})),
-        ("v 0 0,5 0\n", ('F002.number', 1, {'item': Phrase('obj-v', index=0), 'found': b'0,5'})),
-        (SQUARE + "vn 0 1\n", ('F002.width', 5, {'item': Phrase('obj-vn', index=0), 'expected': 3,
+        ("v 0 0,5 0\n", ('F002.number', 1, {'item': "v of vertex 0", 'found': b'0,5'})),
+        (SQUARE + "vn 0 1\n", ('F002.width', 5, {'item': "vn 0", 'expected': 3,
          'found': 2})),
-        (SQUARE + "vt\n", ('F002.width', 5, {'item': Phrase('obj-vt', index=0), 'expected': 1,
+        (SQUARE + "vt\n", ('F002.width', 5, {'item': "vt 0", 'expected': 1,
          'found': 0})),
         (SQUARE + "f\n", ('F002.obj-face', 5, {'least': 3, 'found': 0})),
         (SQUARE + "f 1 2 0\n", ('F002.obj-zero', 5, {})),

@@ -267,29 +267,32 @@ def test_chumpy_handle_is_read() -> None:
 def test_other_chumpy_expressions_are_not_computed(module: str, name: str) -> None:
     built = created(module, name, mapping(a=ch(array(ROWS)), b=ch(array(ROWS))))
     archive = opened(saved(v=built, w=ch(built), x=select(built, [0], 1), good=array(ROWS)))
-    what = Phrase("unread-expression", name=f"{module}.{name}")
+    what = Phrase("{name} expression", name=f"{module}.{name}")
     assert [archive.get(key) for key in "vwx"] == [Opaque(what)] * 3
     assert_array_equal(archive.array("good").values(), ROWS)
     with pytest.raises(FormatError) as caught:
         archive.array("v", ("V", 3))
     key, _, values = fault_of(caught.value.diagnostic)
-    assert (key, values["found"]) == ("F002.value", Phrase("found-unread", what=what))
+    assert (key, values["found"]) == (
+        "F002.value",
+        Phrase("an unsupported value ({what})", what=what),
+    )
 
 
 def test_object_arrays_are_opaque() -> None:
     given = {"v": np.array({"L_Hip": 1}, dtype=object), "w": np.array([[1], None], dtype=object)}
     for protocol in (2, 5):
         archive = opened(pickle.dumps(given, protocol))
-        assert [archive.get(key) for key in "vw"] == [Opaque(Phrase("unread-objects"))] * 2
+        assert [archive.get(key) for key in "vw"] == [Opaque("object array")] * 2
 
 
 @pytest.mark.parametrize(
     ("given", "what"),
     [
-        (np.zeros(2, "f4,i4"), Phrase("unread-records")),
-        (np.zeros(2, "V8"), Phrase("unread-records")),
-        (np.zeros(2, complex), Phrase("unread-dtype", dtype="c16")),
-        (np.zeros(2, "M8[s]"), Phrase("unread-dtype", dtype="M8")),
+        (np.zeros(2, "f4,i4"), "structured array"),
+        (np.zeros(2, "V8"), "structured array"),
+        (np.zeros(2, complex), "array of type c16"),
+        (np.zeros(2, "M8[s]"), "array of type M8"),
     ],
     ids=["record", "void", "complex", "date"],
 )
@@ -312,7 +315,7 @@ def test_invalid_code_points_are_refused() -> None:
     assert line == (
         "F002.archive-value",
         None,
-        {"item": "v", "problem": Phrase("array-letter", found=2147483647)},
+        {"item": "v", "problem": "invalid Unicode code point 2147483647 in a string"},
     )
 
 

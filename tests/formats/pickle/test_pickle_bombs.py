@@ -44,10 +44,10 @@ PATIENCE = 5.0  # in seconds; far more than needed, even on a busy machine
 
 def is_too_long(fault: Fault) -> bool:
     """Return whether a pickle was refused for its number of opcodes."""
-    return fault[2]["problem"] == Phrase("pickle-steps", most=1_000_000)
+    return fault[2]["problem"] == "expected at most 1000000 opcodes in a pickle, found more"
 
 
-ENDLESS = Opaque(Phrase("unread-endless"))
+ENDLESS = Opaque("circular data")
 
 
 def cost(action: Callable[[], Any]) -> int:
@@ -67,24 +67,24 @@ def cost(action: Callable[[], Any]) -> int:
     ("body", "line"),
     [
         (array_of((1 << 40,), b"12345678"), ("F002.pickle", None,
-         {"problem": Phrase("array-bytes", shape=(1099511627776,), dtype="float64", found=8)})),
+         {"problem": "expected 1099511627776 float64, found 8 bytes"})),
         (array_of((1 << 20,) * 4, bytes(8)), ("F002.pickle", None,
-         {"problem": Phrase("array-bytes", shape=(1048576, 1048576, 1048576, 1048576),
-         dtype="float64", found=8)})),
-        (array_of((0, 1 << 61), b""), ("F002.pickle", None, {"problem": Phrase("array-bytes",
-         shape=(0, 2305843009213693952), dtype="float64", found=0)})),
-        (array_of((2,), b"12345678"), ("F002.pickle", None, {"problem": Phrase("array-bytes",
-         shape=(2,), dtype="float64", found=8)})),
-        (array_of((1,), b"123456789"), ("F002.pickle", None, {"problem": Phrase("array-bytes",
-         shape=(1,), dtype="float64", found=9)})),
-        (array_of((), b""), ("F002.pickle", None, {"problem": Phrase("array-bytes", shape=(),
-         dtype="float64", found=0)})),
-        (array_of((1, 0), b"12345678"), ("F002.pickle", None, {"problem": Phrase("array-bytes",
-         shape=(1, 0), dtype="float64", found=8)})),
+         {"problem": ("expected 1048576 x 1048576 x 1048576 x 1048576 float64, "
+        "found 8 bytes")})),
+        (array_of((0, 1 << 61), b""), ("F002.pickle", None,
+         {"problem": "expected 0 x 2305843009213693952 float64, found 0 bytes"})),
+        (array_of((2,), b"12345678"), ("F002.pickle", None,
+         {"problem": "expected 2 float64, found 8 bytes"})),
+        (array_of((1,), b"123456789"), ("F002.pickle", None,
+         {"problem": "expected 1 float64, found 9 bytes"})),
+        (array_of((), b""), ("F002.pickle", None,
+         {"problem": "expected a single float64, found 0 bytes"})),
+        (array_of((1, 0), b"12345678"), ("F002.pickle", None,
+         {"problem": "expected 1 x 0 float64, found 8 bytes"})),
         (array_of((1,), b"12345678", "i4", ">"), ("F002.pickle", None,
-         {"problem": Phrase("array-bytes", shape=(1,), dtype="int32", found=8)})),
+         {"problem": "expected 1 int32, found 8 bytes"})),
         (array_of((1 << 40,), b"abcd", "S4", "|"), ("F002.pickle", None,
-         {"problem": Phrase("array-bytes", shape=(1099511627776,), dtype="bytes32", found=4)})),
+         {"problem": "expected 1099511627776 bytes32, found 4 bytes"})),
     ],
 )  # fmt: skip
 def test_shapes_that_do_not_match_their_bytes_are_refused(body: bytes, line: Fault) -> None:
@@ -107,7 +107,7 @@ def test_shapes_beyond_the_limits_of_numpy_are_refused(sides: tuple[int, ...]) -
     assert line == (
         "F002.pickle",
         None,
-        {"problem": Phrase("pickle-array-state", found=Phrase("noun-other", kind="tuple"))},
+        {"problem": "expected the state of an array, found a tuple"},
     )
 
 
@@ -115,33 +115,40 @@ def test_shapes_beyond_the_limits_of_numpy_are_refused(sides: tuple[int, ...]) -
     ("changes", "line"),
     [
         ({"sides": (1 << 31, 3)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-size", most=134217728, shape=(2147483648, 3))})),
+         "problem": ("expected at most 134217728 rows and columns, found "
+        "2147483648 x 3")})),
         ({"sides": (2, 1 << 27)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-starts", expected=134217729, shape=(2, 134217728), found=4)})),
+         "problem": ("expected 134217729 index pointers in a sparse 2 x "
+        "134217728 matrix, found 4")})),
         ({"sides": (2, 1 << 61)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-size", most=134217728, shape=(2, 2305843009213693952))})),
+         "problem": ("expected at most 134217728 rows and columns, found 2 x "
+        "2305843009213693952")})),
         ({"indices": (0, 2, 0)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-range", last=1, low=0, high=2)})),
+         "problem": "expected indices 0 to 1 in a sparse matrix, found 0 to 2"})),
         ({"indices": (0, -1, 0)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-range", last=1, low=-1, high=0)})),
+         "problem": "expected indices 0 to 1 in a sparse matrix, found -1 to 0"})),
         ({"indices": (0, 1)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-count", expected=3, found=2)})),
+         "problem": "expected 3 indices in a sparse matrix, found 2"})),
         ({"indptr": (0, 2, 1, 3)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-order", count=3)})),
+         "problem": ("expected index pointers in ascending order from 0 to 3 in "
+        "a sparse matrix, found them unsorted")})),
         ({"indptr": (0, 1, 1, 4)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-order", count=3)})),
+         "problem": ("expected index pointers in ascending order from 0 to 3 in "
+        "a sparse matrix, found them unsorted")})),
         ({"indptr": (1, 1, 1, 3)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-order", count=3)})),
+         "problem": ("expected index pointers in ascending order from 0 to 3 in "
+        "a sparse matrix, found them unsorted")})),
         ({"indptr": (0, 1, 3)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-starts", expected=4, shape=(2, 3), found=3)})),
+         "problem": "expected 4 index pointers in a sparse 2 x 3 matrix, found 3"})),
         ({"indptr": (), "sides": (2, 0)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-starts", expected=1, shape=(2, 0), found=0)})),
+         "problem": "expected 1 index pointers in a sparse 2 x 0 matrix, found 0"})),
         ({"data": ((1.0, 2.0, 3.0),)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-shapes")})),
+         "problem": ("data, indices and index pointers of a sparse matrix must "
+        "be one-dimensional")})),
         ({"shape_key": "form"}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-no-shape")})),
+         "problem": "expected a sparse matrix with a shape, found none"})),
         ({"sides": (1, 2, 3)}, ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("sparse-no-shape")})),
+         "problem": "expected a sparse matrix with a shape, found none"})),
     ],
 )  # fmt: skip
 def test_inconsistent_sparse_matrices_are_refused(changes: Any, line: Fault) -> None:
@@ -159,8 +166,8 @@ def test_sparse_shape_is_checked_before_densifying() -> None:
         None,
         {
             "item": "v",
-            "expected": Phrase("wanted-numbers", shape=(24, 3)),
-            "found": Phrase("found-sparse", shape=(134217728, 3)),
+            "expected": "24 x 3 numbers",
+            "found": "a sparse 134217728 x 3 matrix",
         },
     )
 
@@ -171,7 +178,7 @@ def test_sparse_matrix_without_its_arrays_is_refused() -> None:
     assert refusal(saved(v=body)) == (
         "F002.archive-value",
         None,
-        {"item": "v", "problem": Phrase("sparse-no-part", part="data")},
+        {"item": "v", "problem": "expected a sparse matrix with data, found none"},
     )
 
 
@@ -186,19 +193,17 @@ def selection(indices: list[int], *sides: int) -> bytes:
     ("data", "line"),
     [
         (selection([0, 6], 2), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("pickle-selection-range", last=5, low=0, high=6)})),
+         "problem": "expected indices 0 to 5, found 0 to 6"})),
         (selection([-1, 0], 2), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("pickle-selection-range", last=5, low=-1, high=0)})),
+         "problem": "expected indices 0 to 5, found -1 to 0"})),
         (selection([0, 1], 1 << 40), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("pickle-selection", expected="1099511627776",
-         name="chumpy.reordering.Select", found=2)})),
+         "problem": ("expected 1099511627776 indices in "
+        "chumpy.reordering.Select, found 2")})),
         (selection([0, 1], *[1 << 61] * 32), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("pickle-selection",
-         expected="407897962615157369808412540087403635887…", name="chumpy.reordering.Select",
-         found=2)})),
+         "problem": ("expected 407897962615157369808412540087403635887… indices "
+        "in chumpy.reordering.Select, found 2")})),
         (selection([0, 1], 3, 1), ("F002.archive-value", None, {"item": "v",
-         "problem": Phrase("pickle-selection", expected="3", name="chumpy.reordering.Select",
-         found=2)})),
+         "problem": "expected 3 indices in chumpy.reordering.Select, found 2"})),
     ],
 )  # fmt: skip
 def test_selections_out_of_range_are_refused(data: bytes, line: Fault) -> None:
@@ -209,14 +214,14 @@ def test_selection_of_long_strings_is_not_evaluated() -> None:
     long = array_of((1,), b"x" * 100_000, "S100000", "|")
     state = mapping(a=long, idxs=array(np.zeros(100_000, np.uint8)), preferred_shape=shape(100_000))
     archive = opened(saved(v=created("chumpy.reordering", "Select", state)))
-    assert archive.get("v") == Opaque(Phrase("unread-indices", name="chumpy.reordering.Select"))
+    assert archive.get("v") == Opaque("chumpy.reordering.Select with unsupported indices")
 
 
 @pytest.mark.parametrize("name", ["Ch", "ChHandle"])
 def test_expression_that_contains_itself_is_not_expanded(name: str) -> None:
     body = named("chumpy.ch", name) + b")\x81q\x01}" + text("x") + b"h\x01sb"
     found = opened(saved(v=body)).get("v")
-    assert found == Opaque(Phrase("unread-expression-endless", name=f"chumpy.ch.{name}"))
+    assert found == Opaque(Phrase("circular {name} expression", name=f"chumpy.ch.{name}"))
 
 
 def test_containers_that_contain_themselves_are_not_expanded() -> None:
@@ -243,9 +248,7 @@ WRAPPERS = {
 def test_nesting_100_000_deep_is_not_expanded(kind: str) -> None:
     before, after = WRAPPERS[kind]
     found = opened(saved(v=before * 100_000 + b"N" + after * 100_000)).get("v")
-    assert found == ENDLESS or found == Opaque(
-        Phrase("unread-expression-endless", name="chumpy.ch.Ch")
-    )
+    assert found == ENDLESS or found == Opaque("circular chumpy.ch.Ch expression")
 
 
 def doubled(first: bytes, step: Callable[[bytes], bytes], count: int) -> bytes:
@@ -313,7 +316,7 @@ def test_endless_opcodes_terminate(step: bytes) -> None:
     assert refusal(data) == (
         "F002.pickle-step",
         None,
-        {"problem": Phrase("pickle-steps", most=1000000), "at": 1000001},
+        {"problem": "expected at most 1000000 opcodes in a pickle, found more", "at": 1000001},
     )
 
 
@@ -325,24 +328,25 @@ def test_huge_declared_lengths_do_not_allocate_memory() -> None:
 @pytest.mark.parametrize(
     ("key", "found"),
     [
-        (b"N", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-nothing"))})),
-        (b"G" + struct.pack(">d", 0.5), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-number"))})),
-        (whole(1 << 60), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-number"))})),
-        (b")", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-other", kind="tuple"))})),
-        (b"]", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-other", kind="list"))})),
-        (b"\x88", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-number"))})),
-        (array(np.ones(1)), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-array"))})),
+        (b"N", ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found None"})),
+        (b"G" + struct.pack(">d", 0.5), ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found a number"})),
+        (whole(1 << 60), ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found a number"})),
+        (b")", ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found a tuple"})),
+        (b"]", ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found a list"})),
+        (b"\x88", ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found a number"})),
+        (array(np.ones(1)), ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found an array"})),
         (named("chumpy.ch", "Ch") + b")\x81", ("F002.pickle", None,
-         {"problem": Phrase("pickle-as-key", found=Phrase("noun-object", name="chumpy.ch.Ch"))})),
-        (payload(b"x" * 70_000), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
-         found=Phrase("noun-text"))})),
+         {"problem": ("expected a string or a number as a key, found an instance "
+        "of chumpy.ch.Ch")})),
+        (payload(b"x" * 70_000), ("F002.pickle", None,
+         {"problem": "expected a string or a number as a key, found a string"})),
     ],
 )  # fmt: skip
 def test_keys_other_than_strings_are_refused(key: bytes, found: Fault) -> None:
@@ -353,17 +357,16 @@ def test_keys_other_than_strings_are_refused(key: bytes, found: Fault) -> None:
 @pytest.mark.parametrize(
     ("body", "found"),
     [
-        (b"]", ("F002.pickle-named", None, {"found": Phrase("noun-other", kind="list")})),
-        (b")", ("F002.pickle-named", None, {"found": Phrase("noun-other", kind="tuple")})),
-        (b"N", ("F002.pickle-named", None, {"found": Phrase("noun-nothing")})),
-        (whole(3), ("F002.pickle-named", None, {"found": Phrase("noun-number")})),
-        (text("x"), ("F002.pickle-named", None, {"found": Phrase("noun-text")})),
-        (b"C\x01x", ("F002.pickle-named", None, {"found": Phrase("noun-bytes")})),
-        (array(np.ones(1)), ("F002.pickle-named", None, {"found": Phrase("noun-array")})),
-        (matrix(), ("F002.pickle-named", None, {"found": Phrase("noun-object",
-         name="scipy.sparse.csc.csc_matrix")})),
-        (named("numpy", "ndarray"), ("F002.pickle-named", None, {"found": Phrase("noun",
-         name="numpy.ndarray")})),
+        (b"]", ("F002.pickle-named", None, {"found": "a list"})),
+        (b")", ("F002.pickle-named", None, {"found": "a tuple"})),
+        (b"N", ("F002.pickle-named", None, {"found": "None"})),
+        (whole(3), ("F002.pickle-named", None, {"found": "a number"})),
+        (text("x"), ("F002.pickle-named", None, {"found": "a string"})),
+        (b"C\x01x", ("F002.pickle-named", None, {"found": "bytes"})),
+        (array(np.ones(1)), ("F002.pickle-named", None, {"found": "an array"})),
+        (matrix(), ("F002.pickle-named", None,
+         {"found": "an instance of scipy.sparse.csc.csc_matrix"})),
+        (named("numpy", "ndarray"), ("F002.pickle-named", None, {"found": "numpy.ndarray"})),
         (b"}K\x05Ns", ("F002.pickle-key", None, {"found": 5})),
     ],
 )  # fmt: skip

@@ -57,5 +57,9 @@ def test_sparse_entries_outside_the_matrix_are_refused(places: tuple[list[int], 
     with pytest.raises(FormatError) as refused:
         opened(saved(v=entries(rows, columns, is_new=True))).sparse("v")
     count = len(places[0])
-    key = "sparse-range" if count == 3 else "sparse-count"
-    assert refused.value.diagnostic.values["problem"].key == key
+    key = (
+        "expected indices 0 to {last} in a sparse matrix, found {low} to {high}"
+        if count == 3
+        else "expected {expected} indices in a sparse matrix, found {found}"
+    )
+    assert refused.value.diagnostic.values["problem"].sentence == key

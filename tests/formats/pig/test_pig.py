@@ -21,7 +21,6 @@ from formats.pig_text import (
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.diagnostics.diagnostic import Phrase
 from viewer.formats import save_image
 from viewer.rig.mesh import split_seams
 from viewer.rig.pose import rest_pose
@@ -176,7 +175,7 @@ def test_scale_of_0_or_less_is_reported(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=np.array([0.0] * 12 + [-2])), figure, pose)
-    fault = Phrase("scale-not-positive", found=-2.0)
+    fault = "scale: expected a positive number, found -2"
     assert told(notes) == [("F007.scale-kept", {"fault": fault, "scale": 1.0})]
 
 

@@ -11,6 +11,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, detect, ply
 from viewer.media.png import encode_png
+from viewer.phrases import brief
 
 VERTEX = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 FACE = "element face 2\nproperty list uchar int vertex_indices\n"
@@ -36,7 +37,7 @@ def silent(data):
 
 
 def vertex(row: int) -> Phrase:
-    return Phrase("ply-row", element="vertex", row=row)
+    return Phrase("{element} {row}", element=brief("vertex"), row=row)
 
 
 def unused(*names: str) -> Fault:
@@ -288,14 +289,14 @@ def changed(old: str, new: str) -> str:
         (changed("3 0 1 2\n", "3 0 1 2 3\n"), ("F002.ply-more", 14, {"expected": 4, "found": 5})),
         (
             changed("3 0 1 2\n", "1.5 0 1 2\n"),
-            ("F002.ply-list", 14, {"item": Phrase("ply-row", element="face", row=0), "found": 1.5}),
+            ("F002.ply-list", 14, {"item": "face 0", "found": 1.5}),
         ),
         (
             changed("3 0 1 2\n", "-1 0 1 2\n"),
             (
                 "F002.ply-list",
                 14,
-                {"item": Phrase("ply-row", element="face", row=0), "found": -1.0},
+                {"item": "face 0", "found": -1.0},
             ),
         ),
         (
@@ -337,7 +338,7 @@ def test_invalid_binary_files_are_reported_with_location_and_reason() -> None:
     assert (key, line, values["names"]) == ("F003.ply-finite", None, "x y z")
     assert values["item"] == vertex(1) and np.isnan(values["found"])
     negative = data[: start + 48] + b"\xff" + data[start + 49 :]
-    face = Phrase("ply-row", element="face", row=0)
+    face = "face 0"
     assert refusal(negative) == ("F002.ply-list", None, {"item": face, "found": -1})
 
 

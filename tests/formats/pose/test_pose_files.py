@@ -12,7 +12,6 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.diagnostics import Phrase
 from viewer.errors import UnsupportedFormatError
 from viewer.formats import Source, pose
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -231,7 +230,7 @@ def test_unknown_keys_are_reported_except_motion_keys():
             1,
             {
                 "keys": [
-                    Phrase("pose-key-near", name="body_poses", near="did you mean body_pose?"),
+                    "body_poses (did you mean body_pose?)",
                     "comment",
                 ]
             },

@@ -11,7 +11,6 @@ from faults import fault_of, told, warnings_of
 from numpy.testing import assert_array_equal
 
 import viewer
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import pose
 from viewer.formats._source import Source
@@ -110,39 +109,34 @@ def test_keys_of_rotations_are_ignored_without_rotations():
     ("values", "message"),
     [
         ({"joint_names": None}, ("F002.pose-array", 1, {"item": "joint_names",
-         "expected": Phrase("pose-names"), "found": Phrase("found-nothing")})),
+         "expected": "names", "found": "None"})),
         ({"joint_names": [1]}, ("F002.pose-array", 1, {"item": "joint_names",
-         "expected": Phrase("pose-names"), "found": Phrase("found-value", value="1")})),
+         "expected": "names", "found": "1"})),
         ({"joint_names": "a"}, ("F002.pose-list", 1, {"item": "joint_names", "found": 0})),
         ({"joint_names": ["a", "b"]}, ("F002.pose-array", 1, {"item": "joint_turns",
-         "expected": Phrase("wanted-numbers", shape=(2, 4)), "found": Phrase("pose-shape",
-         shape=(1, 4))})),
+         "expected": "2 x 4 numbers", "found": "1 x 4"})),
         ({"joint_turns": [[0, 0, 1]]}, ("F002.pose-array", 1, {"item": "joint_turns",
-         "expected": Phrase("wanted-numbers", shape=(1, 4)), "found": Phrase("pose-shape",
-         shape=(1, 3))})),
+         "expected": "1 x 4 numbers", "found": "1 x 3"})),
         ({"joint_turns": 1}, ("F002.pose-array", 1, {"item": "joint_turns",
-         "expected": Phrase("wanted-numbers", shape=(1, 4)), "found": Phrase("pose-one-number")})),
+         "expected": "1 x 4 numbers", "found": "a single number"})),
         ({"joint_turns": "a"}, ("F002.pose-array", 1, {"item": "joint_turns",
-         "expected": Phrase("pose-numbers"), "found": Phrase("found-value", value="'a'")})),
+         "expected": "numbers", "found": "'a'"})),
         ({"joint_turns": [[0, 0], [1]]}, ("F002.pose-array", 1, {"item": "joint_turns",
-         "expected": Phrase("pose-numbers"), "found": Phrase("pose-ragged")})),
+         "expected": "numbers", "found": "ragged lists"})),
         ({"joint_turns": [[0, 0, 0, 0]]}, ("F002.pose-quaternion", 1, {"item": "joint_turns",
          "joint": "a"})),
         ({"joint_turns": [[0, 0, 0, 1e300]]}, ("F003.pose-number", 1, {"item": "joint_turns",
          "found": 1e300})),
         ({"joint_shifts": [[0, 0]]}, ("F002.pose-array", 1, {"item": "joint_shifts",
-         "expected": Phrase("wanted-numbers", shape=(1, 3)), "found": Phrase("pose-shape",
-         shape=(1, 2))})),
+         "expected": "1 x 3 numbers", "found": "1 x 2"})),
         ({"joint_rotations": [[0, 0, 1]]}, ("F002.pose-array", 1, {"item": "joint_rotations",
-         "expected": Phrase("wanted-numbers", shape=(1, 4)), "found": Phrase("pose-shape",
-         shape=(1, 3))})),
+         "expected": "1 x 4 numbers", "found": "1 x 3"})),
         ({"joint_rotations": [[0, 0, 0, 0]]}, ("F002.pose-quaternion", 1,
          {"item": "joint_rotations", "joint": "a"})),
         ({"up": "x"}, ("F002.pose-up", 1, {"found": "x"})),
-        ({"up": 3}, ("F002.pose-word", 1, {"item": "up", "found": Phrase("found-value",
-         value="3")})),
+        ({"up": 3}, ("F002.pose-word", 1, {"item": "up", "found": "3"})),
         ({"dof_layout": [1]}, ("F002.pose-word", 1, {"item": "dof_layout",
-         "found": Phrase("found-list", n=1)})),
+         "found": "a list of length 1"})),
     ],
 )  # fmt: skip
 def test_invalid_rotations_are_refused(values, message):

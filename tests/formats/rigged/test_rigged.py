@@ -10,7 +10,6 @@ from faults import NAN, fault_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, detect, read
 from viewer.formats.rigged import figure_arrays, save
@@ -186,8 +185,8 @@ BROKEN = {
             None,
             {
                 "item": "viewer_rig",
-                "expected": Phrase("wanted-numbers-single"),
-                "found": Phrase("found-text"),
+                "expected": "a single number",
+                "found": "a string",
             },
         ),
     ),
@@ -198,7 +197,7 @@ BROKEN = {
         (
             "F003.finite",
             None,
-            {"item": "positions", "found": NAN, "at": Phrase("row-vertex", index=0)},
+            {"item": "positions", "found": NAN, "at": "vertex 0"},
         ),
     ),
     "triangles": (
@@ -212,8 +211,8 @@ BROKEN = {
             None,
             {
                 "item": "parents",
-                "expected": Phrase("wanted-numbers", shape=(2,)),
-                "found": Phrase("found-array", shape=(3,), dtype="int64"),
+                "expected": "2 numbers",
+                "found": "3 int64",
             },
         ),
     ),
@@ -248,8 +247,8 @@ BROKEN = {
             None,
             {
                 "item": "correctives",
-                "expected": Phrase("wanted-numbers", shape=(9, None, 3)),
-                "found": Phrase("found-array", shape=(18, 4, 3), dtype="float64"),
+                "expected": "9 x any x 3 numbers",
+                "found": "18 x 4 x 3 float64",
             },
         ),
     ),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from formats.skel_text import GOOD, INF, assert_good, read, silent
 
-from viewer.diagnostics import Phrase
 from viewer.rig.pose import rest_pose
 
 
@@ -167,7 +166,7 @@ def test_minimum_above_maximum_is_ignored_with_a_warning():
     )
     assert skeleton.dof_limits[6:].tolist() == [[-INF, INF]] * 3
     assert skeleton.rest_dofs[6:].tolist() == [9, 9, 9]
-    joint = Phrase("joint", name="b")
+    joint = "joint b"
     values = {"n": 2, "axis": "x", "low": 5.0, "high": 4.0, "joint": joint}
     assert warnings == [("S003.ignored", 4, values)]
 

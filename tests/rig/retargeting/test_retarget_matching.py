@@ -133,7 +133,9 @@ def test_mapping_matches_names_without_rules() -> None:
         bones(mine, ("left_elbow", "left_wrist")), bones(theirs, ("x14", "x15")), atol=EXACT
     )
     names = ("pelvis", "x0"), ("left_shoulder", "x13"), ("left_elbow", "x14"), ("left_wrist", "x15")
-    pairs = [Phrase("joint-by-joint", joint=joint, partner=partner) for joint, partner in names]
+    pairs = [
+        Phrase("{joint} by {partner}", joint=joint, partner=partner) for joint, partner in names
+    ]
     values = {"motion": "strange", "figure": "body", "n": 4, "all": 20, "pairs": pairs}
     (matched, resting, *_) = told(notes)
     assert matched == ("F007.joints-matched-as-follows", values)

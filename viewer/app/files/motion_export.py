@@ -17,7 +17,8 @@ from viewer.app.core.widgets import checkbox, choice, disabled, explain, note_it
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -35,7 +36,7 @@ from viewer.export._motion_paths import files_at, is_together, motion_paths, par
 from viewer.export._options import SAFE_NAMES
 from viewer.export.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
-from viewer.phrases import printable
+from viewer.phrases import agree, all_of, counted, printable
 from viewer.progress import part_of_work, report
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.points import PointClip
@@ -197,7 +198,7 @@ def save_motion(
         state.error = why
         return
     try:
-        motions, counted, left_out = _motions(state, path, everyone)
+        motions, selected, left_out = _motions(state, path, everyone)
         kind = suited_exporter(path, motions[0].actor.figure)
         files = motion_files(state, path, everyone)
         # The dialog has already asked whether to replace existing files.
@@ -222,7 +223,7 @@ def save_motion(
     def write() -> list[str]:
         with part_of_work(title), all_or_none(files if path.suffix else []):
             parts = _parts(scene, motions, still, path, options)
-            notes = export(Selection(parts, scene, counted), path, options=options)
+            notes = export(Selection(parts, scene, selected), path, options=options)
             if path.suffix:
                 report(1, 1)  # as in save_in_background
             return [*map(str, [*notes, *left_out])]
@@ -236,22 +237,32 @@ def _motions(
     """Return the motions to write, all actors that count in names, and notes about omitted ones."""
     actors = _moving_actors(state) if everyone else [state.actor]
     paths = [path] * len(actors) if _is_one_file(path) else motion_paths(path, actors)
-    motions, counted, notes = list[_Motion](), [*actors], list[Diagnostic]()
+    motions, selected, notes = list[_Motion](), [*actors], list[Diagnostic]()
     for index, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
-            notes.append(Diagnostic("X003.absent-in-range", values={"figure": actor.name}))
+            notes.append(
+                Diagnostic(
+                    "X003.absent-in-range: {figure}: absent throughout the range, not exported",
+                    values={"figure": actor.name},
+                )
+            )
             continue
         # Edits made during the export must not change the written motion.
-        copied = counted[index] = actor.copy()
+        copied = selected[index] = actor.copy()
         copied.figure = with_edited_keys(state.of(Animations), actor)
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None
             release_springs(copied)
             springs = actor.figure.require_skeleton().springs
             count = 0 if springs is None else springs.n_joints
-            values = {"figure": actor.name, "n": count}
-            notes.append(Diagnostic("X003.springs", values=values))
+            values = {
+                "figure": actor.name,
+                "n": counted(count, "spring joint"),
+                "have": agree(count, "has", "have"),
+                "remedy": Remedy("can write", "--bake-springs writes"),
+            }
+            notes.append(Diagnostic(wording.SPRINGS, values=values))
         is_keyed = isinstance(actor.clip, Clip | TransformClip)
         rate = state.clock.frame_rate if is_keyed else None
         saved = () if frames is not None else _written_keys(state, actor, file)
@@ -261,8 +272,13 @@ def _motions(
     points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
     if everyone and points:
         names = [actor.name for actor in points]
-        notes.append(Diagnostic("X003.points", values={"names": names}))
-    return motions, counted, notes
+        notes.append(
+            Diagnostic(
+                "X003.points: captured points are not exported: {names}",
+                values={"names": all_of(names)},
+            )
+        )
+    return motions, selected, notes
 
 
 def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ...]:

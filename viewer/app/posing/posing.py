@@ -224,7 +224,7 @@ def paste_pose(state: AppState) -> None:
         cleaned = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
         source = Source("clipboard", cleaned.encode("utf-8", "replace"))
         if not text.strip():
-            raise source.fault("F002.pose-clipboard")
+            raise source.fault("F002.pose-clipboard: expected a pose, found no text")
         record = pose.read(source)
         notes = apply_pose(source.path, record, actor, drop_excess=False)
     except ViewerError as problem:

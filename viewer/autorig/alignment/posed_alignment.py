@@ -28,7 +28,9 @@ from viewer.autorig.alignment.surface_alignment import (
 )
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics.remedy import Remedy
+from viewer.phrases import rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -153,13 +155,39 @@ def _if_better(
     bent, name = found.most_rotated
     gap = {"gap": _gap(after, before)}
     if after > (_PART_KEPT if is_part else _KEPT) * before:
-        return replace(kept, lines=(Diagnostic("R003.not-fitted", values=gap),))
+        return replace(
+            kept,
+            lines=(
+                Diagnostic(
+                    "R003.not-fitted: pose: not fitted, because {gap} would remain", values=gap
+                ),
+            ),
+        )
     if after <= _POOR:
-        return replace(found, lines=(*found.lines, Diagnostic("R003.gap", values=gap)))
+        return replace(found, lines=(*found.lines, Diagnostic(wording.GAP, values=gap)))
     if bent > _BENT:
         values = {**gap, "joint": name, "angle": float(np.degrees(bent))}
-        return replace(kept, lines=(Diagnostic("R004.not-fitted", values=values),))
-    return replace(found, lines=(*found.lines, Diagnostic("R004.gap", values=gap)))
+        return replace(
+            kept,
+            lines=(
+                Diagnostic(
+                    "R004.not-fitted: pose: not fitted, because {joint} would rotate by "
+                    "{angle:.0f} "
+                    "degrees and {gap} would remain; use a template of the same kind as the target",
+                    values=values,
+                ),
+            ),
+        )
+    return replace(
+        found,
+        lines=(
+            *found.lines,
+            Diagnostic(
+                "R004.gap: poor fit: {gap}; use a template of the same kind as the target",
+                values=gap,
+            ),
+        ),
+    )
 
 
 def _fitted(job: _Job, start: Alignment) -> PosedAlignment:
@@ -216,8 +244,11 @@ def _stretched(
         kept,
         alignment=alignment,
         lines=(
-            Diagnostic("R003.proportions", values={"scales": _scales(alignment.similarity)}),
-            Diagnostic("R003.gap", values={"gap": _gap(after, before)}),
+            Diagnostic(
+                "R003.proportions: proportions: template stretched by {scales}, pose kept",
+                values={"scales": _scales(alignment.similarity)},
+            ),
+            Diagnostic(wording.GAP, values={"gap": _gap(after, before)}),
         ),
     )
     return found if _is_closer(found, kept) else None
@@ -234,8 +265,24 @@ def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
     gap, other = (100.0 * misfit(one.alignment, False) for one in (stretched, kept))
     similarity = stretched.alignment.similarity
     is_own = (similarity.factors == 1.0).all()
-    key = "R004.stretched-along-its-axes" if is_own else "R004.stretched-along-the-target"
-    return Diagnostic(key, values={"scales": _scales(similarity), "gap": gap, "kept": other})
+    key = (
+        "R004.stretched-along-its-axes: the template fits much better if stretched by "
+        "{scales} ({gap:.2f} % of the size apart instead of {kept:.2f} %): fit proportions "
+        "if the target was stretched"
+        if is_own
+        else "R004.stretched-along-the-target: the template fits much better if stretched by "
+        "{scales} ({gap:.2f} % of the size apart instead of {kept:.2f} %): use {remedy} if "
+        "the target was stretched"
+    )
+    return Diagnostic(
+        key,
+        values={
+            "scales": _scales(similarity),
+            "gap": gap,
+            "kept": other,
+            "remedy": Remedy("another Scale", "--scale axes"),
+        },
+    )
 
 
 def _stretch(similarity: Similarity) -> float:
@@ -248,13 +295,21 @@ def _scales(similarity: Similarity) -> Phrase:
     is_own = bool((similarity.factors == 1.0).all())
     scales = similarity.scale * (similarity.own_factors if is_own else similarity.factors)
     x, y, z = scales.tolist()
-    key = "scales-along-its-axes" if is_own else "scales-along-the-target"
-    return Phrase(key, x=x, y=y, z=z)
+    key = (
+        "{x}, {y}, {z} along its own x, y and z"
+        if is_own
+        else "{x}, {y}, {z} along the target's x, y and z"
+    )
+    return Phrase(key, x=rounded(x, 4), y=rounded(y, 4), z=rounded(z, 4))
 
 
 def _gap(after: float, before: float) -> Phrase:
     """Return the fitting errors after and before a fit as text."""
-    return Phrase("gap", after=100.0 * after, before=100.0 * before)
+    return Phrase(
+        "a gap of {after:.2f} % of the size ({before:.2f} % before)",
+        after=100.0 * after,
+        before=100.0 * before,
+    )
 
 
 def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
@@ -269,7 +324,13 @@ def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
         "limb": joint_label(skeleton, longest),
         "change": 100.0 * float(np.expm1(found.grown[0, longest])),
     }
-    return (Diagnostic("R003.pose", values=values),)
+    return (
+        Diagnostic(
+            "R003.pose: pose: template joints rotated to fit, by up to {angle:.0f} degrees "
+            "({joint}); limb lengths changed by up to {change:+z.0f} % ({limb})",
+            values=values,
+        ),
+    )
 
 
 def _most_rotated(found: Fitted) -> tuple[float, str]:

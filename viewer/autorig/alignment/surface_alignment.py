@@ -22,7 +22,9 @@ from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
+from viewer.phrases import rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats, Ints, frozen
 
@@ -251,11 +253,11 @@ def _is_rotation(linear: Floats) -> bool:
 
 
 _HOW = {
-    "in place": "aligned-in-place",
-    "search": "aligned-by-search",
-    "landmarks": "aligned-by-landmarks",
-    "given": "aligned-as-given",
-    "fit": "aligned-by-fit",
+    "in place": "the template is scaled and rotated about the shared origin",
+    "search": "found by matching closest points",
+    "landmarks": "from the landmarks",
+    "given": "as given",
+    "fit": "found by fitting pose and proportions",
 }
 
 
@@ -265,24 +267,46 @@ def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
     angle = np.degrees(np.arccos(np.clip((np.trace(similarity.rotation) - 1.0) / 2.0, -1.0, 1.0)))
     how = Phrase(_HOW[alignment.how])
     if alignment.how == "in place" and similarity.scale == 1.0 and angle == 0.0:
-        how = Phrase("aligned-as-it-is")
+        how = Phrase("the target already coincides with the template")
     factors: Phrase | str = ""
-    for numbers, key in ((similarity.factors, "factors"), (similarity.own_factors, "own-factors")):
+    for numbers, axes in (
+        (similarity.factors, "x, y, z"),
+        (similarity.own_factors, "the template's x, y, z"),
+    ):
         if (numbers != 1.0).any():
-            factors = Phrase(key, **_by_axis(numbers))
+            shown = {axis: rounded(value, 4) for axis, value in _by_axis(numbers).items()}
+            factors = Phrase(f" (along {axes}: {{x}}, {{y}}, {{z}})", **shown)
     values = {
         "how": how,
-        "scale": float(similarity.scale),
+        "scale": rounded(float(similarity.scale), 6),
         "factors": factors,
         "angle": float(angle),
     }
     errors = {"error": 100.0 * alignment.error, "away": 100.0 * alignment.away}
     lines = [
-        Diagnostic("R001.alignment", values={**values, **_by_axis(similarity.shift)}),
-        Diagnostic("R001.error", values=errors),
+        Diagnostic(
+            "R001.alignment: alignment: {how}; scale {scale}{factors}, rotation {angle:.2f} "
+            "degrees, translation ({x:z.4g}, {y:z.4g}, {z:z.4g})",
+            values={**values, **_by_axis(similarity.shift)},
+        ),
+        Diagnostic(
+            "R001.error: alignment error: {error:.2f} % of the target's size (RMS of the best "
+            "90 %), {away:.2f} % from template to target",
+            values=errors,
+        ),
     ]
     if alignment.error > _BAD:
-        lines.append(Diagnostic("R002.error", values={"limit": 100.0 * _BAD}))
+        lines.append(
+            Diagnostic(
+                "R002.error: unreliable alignment, with an error above {limit:g} %: specify "
+                "{remedy}, or pose the template like the target ({remedy2})",
+                values={
+                    "limit": 100.0 * _BAD,
+                    "remedy": Remedy("Up, Facing or landmarks", "--up, --facing or --landmarks"),
+                    "remedy2": Remedy("Pose it", "--template-pose"),
+                },
+            )
+        )
     return lines
 
 

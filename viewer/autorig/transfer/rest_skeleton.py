@@ -208,7 +208,10 @@ def _rotate_roots(
     left = wanted[~ball] @ np.swapaxes(held, 1, 2)
     pose.rotations[others] = matrix_to_quaternion(left)
     lines = [
-        Diagnostic("R008.limits-widened", values={"joint": joint_label(skeleton, int(joint))})
+        Diagnostic(
+            "R008.limits-widened: limits of {joint} widened to include the target's pose",
+            values={"joint": joint_label(skeleton, int(joint))},
+        )
         for joint in roots[ball][beyond]
     ]
     return replace(skeleton, dof_limits=limits), lines

@@ -7,6 +7,7 @@ import numpy as np
 from viewer.autorig.correspondence import Matches
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.phrases import agree, counted
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.skin import Skin
@@ -79,7 +80,12 @@ def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
     negative = int((skin.weights < 0.0).sum())
     if not negative:
         return ()
-    return (Diagnostic("R005.negative-weights", values={"n": negative}),)
+    return (
+        Diagnostic(
+            "R005.negative-weights: {n} of the template treated as 0",
+            values={"n": counted(negative, "negative weight")},
+        ),
+    )
 
 
 def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnostic, ...]:
@@ -95,13 +101,38 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnost
         "ratio": ratio,
         "inpainted": int(inpainted.sum()),
     }
-    lines = [Diagnostic("R005.matched", values=values)]
+    lines = [
+        Diagnostic(
+            "R005.matched: matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
+            values=values,
+        )
+    ]
     if ratio < _FEW:
-        lines.append(Diagnostic("R006.matched", values={"limit": _FEW}))
+        lines.append(
+            Diagnostic(
+                "R006.matched: less than {limit:.0%} of the target matches the template: check the "
+                "alignment or allow a larger distance",
+                values={"limit": _FEW},
+            )
+        )
     if len(found.inside_out):
-        lines.append(Diagnostic("R005.reversed", values={"n": len(found.inside_out)}))
+        lines.append(
+            Diagnostic(
+                "R005.reversed: {n} of the target {are} wound opposite to the template: matched "
+                "with reversed normals",
+                values={
+                    "n": counted(len(found.inside_out), "part"),
+                    "are": agree(len(found.inside_out), "is", "are"),
+                },
+            )
+        )
     if method != "direct":
-        lines.append(Diagnostic("R005.solver", values={"method": method}))
+        lines.append(
+            Diagnostic(
+                "R005.solver: weights inpainted with the fallback solver: {method}",
+                values={"method": method},
+            )
+        )
     return tuple(lines)
 
 
@@ -110,9 +141,10 @@ def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
     order = np.argsort(-rigid.counts, kind="stable")
     lines = [
         Diagnostic(
-            "R007.part",
+            "R007.part: the part of {n} at vertex {vertex} has no match in the template: it "
+            "moves rigidly, mostly with joint {joint}",
             values={
-                "n": int(rigid.counts[island]),
+                "n": counted(int(rigid.counts[island]), "vertex"),
                 "vertex": int(rigid.vertices[island]),
                 "joint": int(rigid.joints[island]),
             },
@@ -121,5 +153,10 @@ def rigid_lines(rigid: RigidIslands) -> tuple[Diagnostic, ...]:
     ]
     more = len(order) - _LISTED
     if more > 0:
-        lines.append(Diagnostic("R007.more-parts", values={"n": more}))
+        lines.append(
+            Diagnostic(
+                "R007.more-parts: {n} also {move} rigidly",
+                values={"n": counted(more, "smaller part"), "move": agree(more, "moves", "move")},
+            )
+        )
     return tuple(lines)

@@ -163,7 +163,12 @@ def nearest_weights(
         points=None,
         backwards=np.zeros(len(near), dtype=bool),
         rigid=RigidIslands(empty, empty, empty, np.zeros(0)),
-        lines=(Diagnostic("R005.nearest", values={"n": int(near.sum()), "all": len(near)}),),
+        lines=(
+            Diagnostic(
+                "R005.nearest: nearest vertex within the limit for {n} of {all} vertices",
+                values={"n": int(near.sum()), "all": len(near)},
+            ),
+        ),
     )
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import ViewerError
 from viewer.export import exporters_at
-from viewer.phrases import printable
+from viewer.phrases import agree, counted, printable
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
 from viewer.rig.scene import Scene
@@ -44,6 +45,20 @@ def bake_springs(bakes: bool, fps: float | None, scene: Scene, output: Path) -> 
         if bakes:
             actor.clip = with_baked_springs(actor, fps)
             actor.springs, actor.animation = None, -1
-        key = "X005.springs-baked" if bakes else "X003.springs"
-        notes.append(Diagnostic(key, values={"figure": actor.name, "n": count}))
+        key = (
+            "X005.springs-baked: {figure}: simulated rotations of {n} are written"
+            if bakes
+            else wording.SPRINGS
+        )
+        notes.append(
+            Diagnostic(
+                key,
+                values={
+                    "figure": actor.name,
+                    "n": counted(count, "spring joint"),
+                    "have": agree(count, "has", "have"),
+                    "remedy": Remedy("can write", "--bake-springs writes"),
+                },
+            )
+        )
     return notes

@@ -131,7 +131,11 @@ def _clips(
     # Figures of one file share its animations.
     problems = dict.fromkeys(map(str, refused))
     notes = left_out_notes(scene, actors) + [
-        Diagnostic("X003.invalid-animation", values={"problem": each}) for each in problems
+        Diagnostic(
+            "X003.invalid-animation: {problem}; this animation is not written",
+            values={"problem": each},
+        )
+        for each in problems
     ]
     return Selection(parts, scene), options, notes
 

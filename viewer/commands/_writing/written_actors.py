@@ -8,6 +8,7 @@ from viewer.commands._frames import Frames
 from viewer.commands._one_pose import asks_one_pose, posed_actors
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import all_of
 from viewer.rig.captures.points import PointClip
 from viewer.rig.scene import Actor, Scene
 
@@ -18,10 +19,20 @@ def left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
     still = [actor.name for actor in left if actor.clip is None]
     points = [actor.name for actor in left if isinstance(actor.clip, PointClip)]
     moves = any(actor.clip is not None for actor in written)
-    key = "X003.no-motion" if moves else "X003.no-joints"
+    key = (
+        "X003.no-motion: {figure}: no motion, not written"
+        if moves
+        else "X003.no-joints: {figure}: no joints, not written"
+    )
     notes = [Diagnostic(key, values={"figure": name}) for name in still]
     if points:
-        notes.append(Diagnostic("X003.keypoints", values={"names": points}))
+        notes.append(
+            Diagnostic(
+                "X003.keypoints: keypoints next to bodies are not written ({names}): to write "
+                "them, open only the keypoints3d folder",
+                values={"names": all_of(points)},
+            )
+        )
     return notes
 
 

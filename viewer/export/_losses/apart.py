@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._losses.skinned import Rows, Side, body_rows, vertices
+from viewer.phrases import Shown, brief, optional
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -34,7 +35,11 @@ _ROUNDING = 2e-6  # fraction of the size: rounding in single precision along a c
 _EPSILON = 2.0**-22  # two steps of single precision, relative to a coordinate
 _SIZED = 256  # frames used to measure the distance of a motion from the origin
 _FAR = 5.0  # maximum factor on the tolerance far from the origin
-_NO_REASONS: dict[str, object] = {"causes": [], "estimate": "", "rate": 0.0}
+_NO_REASONS: dict[str, object] = {
+    "causes": Shown("", []),
+    "estimate": "",
+    "rate": Shown("", 0.0),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +204,7 @@ def extent_of(found: Apart) -> Phrase | str:
     """Return the number of compared frames; empty if all were compared."""
     if found.looked == found.frames:
         return ""
-    return Phrase("compared-frames", n=found.looked, all=found.frames)
+    return Phrase("vertices compared in {n} of {all} frames", n=found.looked, all=found.frames)
 
 
 def apart_notes(
@@ -208,7 +213,7 @@ def apart_notes(
     found: Apart,
     first_frame: int | None,
     sources: Sequence[int] | NDArray[np.integer] | None = None,
-    vertices: str = "mesh-vertices",
+    vertices: str = "vertices",
     original: str = "",
 ) -> list[Diagnostic]:
     """Return a note about the errors of a file, or an empty list if there are none.
@@ -222,27 +227,40 @@ def apart_notes(
     ``original``: phrase for the original; the motion or pose if empty.
     """
 
-    def farthest(kind: str, far: Farthest, **place: object) -> Phrase:
+    def farthest(what: str, far: Farthest, **place: object) -> Phrase:
         values = {"distance": far.distance, "unit": figure.unit, **place}
         if first_frame is not None:
-            kind, values = f"{kind}-in-frame", values | {"frame": first_frame + far.frame}
-        return Phrase(kind, length=length_text(figure, far.distance), **values)
+            what, values = f"{what}, frame {{frame}}", values | {"frame": first_frame + far.frame}
+        return Phrase(
+            f"up to {{length}} ({what})", length=length_text(figure, far.distance), **values
+        )
 
     parts: dict[str, object] = {}
     if found.joints is not None and figure.skeleton is not None:
         name = joint_label(figure.skeleton, found.joints.index)
-        parts["joint"] = farthest("farthest-joint", found.joints, joint=name)
+        parts["joint"] = farthest("{joint}", found.joints, joint=brief(name))
     if found.vertices is not None:
         index = found.vertices.index
         vertex = index if sources is None else int(sources[index])
         parts["vertices"] = Phrase(vertices)
-        parts["vertex"] = farthest("farthest-vertex", found.vertices, vertex=vertex)
+        parts["vertex"] = farthest("vertex {vertex}", found.vertices, vertex=vertex)
     if not parts:
         return []
-    whole = "the-original-pose" if first_frame is None else "the-original-motion"
-    key = "both" if len(parts) == 3 else "joints" if "joint" in parts else "vertices"
-    values = {"original": Phrase(original or whole), **parts, "extent": extent_of(found)}
-    return [Diagnostic("X002." + key, path, values={**values, **_NO_REASONS})]
+    whole = "the pose" if first_frame is None else "the motion"
+    key = (
+        "X002.both: joints differ from {original} by {joint}; {vertices} by {vertex}"
+        if len(parts) == 3
+        else "X002.joints: joints differ from {original} by {joint}"
+        if "joint" in parts
+        else "X002.vertices: {vertices} differ from {original} by {vertex}"
+    )
+    values = {
+        "original": Phrase(original or whole),
+        **parts,
+        "extent": optional(" ({})", extent_of(found)),
+    }
+    key += "{extent}{causes}{estimate}{rate}"
+    return [Diagnostic(key, path, values={**values, **_NO_REASONS})]
 
 
 def with_values(notes: list[Diagnostic], **values: object) -> list[Diagnostic]:

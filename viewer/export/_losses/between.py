@@ -23,6 +23,7 @@ from viewer.export._losses.skinned import (
     figure_side,
     linear_as_opened,
 )
+from viewer.phrases import Shown, counted, optional
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import SHORTEST, Channel, Clip
@@ -75,7 +76,9 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
     def found(times: Floats) -> Frames:
         return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
 
-    return with_values(between_losses(path, animation, found, how), rate=rate)
+    return with_values(
+        between_losses(path, animation, found, how), rate=Shown(f": written at {rate:g} fps", rate)
+    )
 
 
 def between_losses(
@@ -112,7 +115,7 @@ def between_losses(
         )
         times = worst.times
         if worst.is_estimate:
-            estimate = Phrase("estimated-times", n=worst.looked)
+            estimate = Phrase("an estimate from {n}", n=counted(worst.looked, "time"))
     else:
         times = _own_times(animation, animation.motion)
         times = times if also is None else np.union1d(times, also)
@@ -123,7 +126,7 @@ def between_losses(
     if not wanted.present.any():
         return []
     notes = frames_losses(path, replace(animation, frames=wanted), read, how, is_between=True)
-    return with_values(notes, estimate=estimate)
+    return with_values(notes, estimate=optional(" ({})", estimate))
 
 
 def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:

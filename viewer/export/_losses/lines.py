@@ -76,7 +76,9 @@ class PartLosses:
             for each in (self._joints, self._vertices)
         )
         found = Apart(joints, vertices, self._n_compared, self._n_compared)
-        return apart_notes(path, figure, found, first_frame, vertices="driven-vertices")
+        return apart_notes(
+            path, figure, found, first_frame, vertices="vertices of a skin driven by it"
+        )
 
 
 def frames_losses(
@@ -108,5 +110,5 @@ def frames_losses(
     least = negligible(figure, frames, rows)
     found = apart(expected, found_side, rows, least, rows - first)
     if is_between:
-        return apart_notes(path, figure, found, None, original="motion-between-frames")
+        return apart_notes(path, figure, found, None, original="the motion between frames")
     return apart_notes(path, figure, found, animation.first_frame)

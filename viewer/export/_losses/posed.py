@@ -10,6 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible, with_values
 from viewer.formats import Source, read
+from viewer.phrases import agree, counted, optional
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import still_frames
@@ -22,11 +23,19 @@ def requested_causes(figure: Figure, how: Skinning) -> list[Phrase]:
     """Return the requested changes of a figure, which are causes of errors of its vertices."""
     found = []
     if figure.is_attached and how.max_influences:
-        found.append(Phrase("requested-influences", n=how.max_influences))
+        n = how.max_influences
+        found.append(
+            Phrase(
+                "only the {influences} of each vertex {are} written, as requested",
+                n=n,
+                influences=agree(n, "strongest influence", f"{n} strongest influences"),
+                are=agree(n, "is", "are"),
+            )
+        )
     elif figure.is_attached and how.normalize:
-        found.append(Phrase("requested-normalization"))
+        found.append(Phrase("weights are scaled to a sum of 1, as requested"))
     if figure.correctives is not None and not how.correctives:
-        found.append(Phrase("requested-correctives"))
+        found.append(Phrase("pose correctives are left out, as requested"))
     return found
 
 
@@ -85,7 +94,7 @@ class PoseLosses:
         if self._vertices is None:
             return notes
         requested = requested_causes(self._figure, self._how)
-        return with_values(notes, causes=requested + (causes or []))
+        return with_values(notes, causes=optional(": {}", requested + (causes or [])))
 
 
 def look_at_mesh(
@@ -103,8 +112,18 @@ def look_at_mesh(
         losses.look(actor.pose, found.positions, frame=frame)
     if is_same and np.array_equal(found.triangles, mesh.triangles):
         return []
-    values = {"n": found.n_triangles, "all": mesh.n_triangles, "vertices": found.n_vertices}
-    return [Diagnostic("X002.topology", source.path, values=values)]
+    values = {
+        "n": counted(found.n_triangles, "triangle"),
+        "all": counted(mesh.n_triangles, "triangle"),
+        "vertices": counted(found.n_vertices, "vertex"),
+    }
+    return [
+        Diagnostic(
+            "X002.topology: {n} on {vertices} were read back instead of the {all} of the figure",
+            source.path,
+            values=values,
+        )
+    ]
 
 
 def mesh_losses(actor: Actor, how: Skinning, source: Source) -> list[Diagnostic]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.export._exporter import SampledParts, Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
@@ -23,6 +24,8 @@ from viewer.export.bvh.body import BLOCK, Conversion, Space, rest_matrices, shap
 from viewer.export.bvh.reading import FileLosses
 from viewer.export.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.formats import all_or_none, save_parts
+from viewer.phrases import agree, brief, counted, optional
+from viewer.phrases import listed as listed_text
 from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -319,17 +322,21 @@ class _File:
         writer, options = self._writer, self._writer.options
         is_known = writer.figure.unit in METRES
         values = {
-            "joints": len(writer.names),
-            "rest": Phrase("rest-pose") if options.rest_frame else "",
+            "joints": counted(len(writer.names), "joint"),
+            "rest": optional("{} and ", Phrase("the rest pose") if options.rest_frame else ""),
             "frames": frames_phrase(writer.first.first_frame + self._span[0], self._n_frames),
             "rate": writer.first.frame_rate,
             "unit": UNIT_NAMES[options.unit or _DEFAULT_UNIT]
             if is_known
-            else Phrase("figure-unit"),
+            else Phrase("the figure's unit"),
             "up": options.up or "y",
             "order": options.rotation_order.upper(),
         }
-        return Diagnostic("X001.bvh", self.path, values=values)
+        return Diagnostic(
+            "X001.bvh: {joints}, {rest}{frames} at {rate:g} fps, {unit}, {up} up, channels {order}",
+            self.path,
+            values=values,
+        )
 
 
 def _remarks(writer: _Writer) -> list[Diagnostic]:
@@ -338,24 +345,60 @@ def _remarks(writer: _Writer) -> list[Diagnostic]:
     frames, notes = animation.frames, list[Diagnostic]()
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:
-        notes.append(Diagnostic("X005.common-root", values={"joint": skeleton.names[0]}))
+        notes.append(
+            Diagnostic(
+                "X005.common-root: several roots: a common parent joint {joint} was added",
+                values={"joint": brief(skeleton.names[0])},
+            )
+        )
     notes += _names_notes(skeleton.names, writer.names)
     notes += gaps_note(frames.present, animation.first_frame, options.closing)
     if figure.unit not in METRES and options.unit:
-        notes.append(Diagnostic("X005.unit-unknown", values={"figure": figure.name}))
+        notes.append(
+            Diagnostic(
+                "X005.unit-unknown: lengths are unchanged: the unit of {figure} is unknown",
+                values={"figure": figure.name},
+            )
+        )
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(writer.moves)]
     if moving:
-        values = {"n": len(moving), "names": moving}
-        notes.append(Diagnostic("X005.position-channels", values=values))
+        values = {
+            "n": counted(len(moving), "joint"),
+            "names": listed_text(moving, 8),
+            "translate": agree(len(moving), "translates and has", "translate and have"),
+        }
+        notes.append(
+            Diagnostic(
+                "X005.position-channels: {n} below the root {translate} position channels: {names}",
+                values=values,
+            )
+        )
     if shape_changes(frames):
         first = writer.reference + animation.first_frame
-        notes.append(Diagnostic("X005.shape-changes", values={"frame": first}))
-    notes += joint_scales_note(frames, animation.figure.require_skeleton(), "X003.bvh-joint-scales")
+        notes.append(
+            Diagnostic(
+                "X005.shape-changes: the shape changes over time: bone lengths are those of frame "
+                "{frame}",
+                values={"frame": first},
+            )
+        )
+    notes += joint_scales_note(
+        frames,
+        animation.figure.require_skeleton(),
+        "X003.bvh-joint-scales: BVH cannot animate scales of joints ({low:g} to {high:g}): "
+        "only the positions of joints follow them",
+    )
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:
         low, high, first_scale = map(float, (scales.min(), scales.max(), scales[0]))
         sizes = {"low": low, "high": high, "first": first_scale}
-        notes.append(Diagnostic("X005.scale-changes", values=sizes))
+        notes.append(
+            Diagnostic(
+                "X005.scale-changes: the figure's scale changes from {low:g} to {high:g}: bone "
+                "lengths are written with {first:g}",
+                values=sizes,
+            )
+        )
     return notes
 
 
@@ -363,15 +406,33 @@ def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnosti
     """Return notes about names that were changed, and about those that few programs read."""
     notes = []
     pairs = [
-        Phrase("renamed", old=_visible(old), new=_visible(new))
+        Phrase("{old} to {new}", old=_visible(old), new=_visible(new))
         for old, new in zip(names, written, strict=True)
         if old != new
     ]
     if pairs:
-        notes.append(Diagnostic("X005.joints-renamed", values={"n": len(pairs), "pairs": pairs}))
+        notes.append(
+            Diagnostic(
+                "X005.joints-renamed: {n} changed: {pairs}",
+                values={"n": counted(len(pairs), "joint name"), "pairs": listed_text(pairs, 8)},
+            )
+        )
     odd = [_visible(name) for name in odd_names(written)]
     if odd:
-        notes.append(Diagnostic("X005.odd-names", values={"n": len(odd), "names": odd}))
+        notes.append(
+            Diagnostic(
+                "X005.odd-names: some programs cannot read {n} that {are} empty or repeated, or "
+                "{have} spaces or characters outside ASCII: {names}; {remedy} changes {them}",
+                values={
+                    "n": counted(len(odd), "joint name"),
+                    "names": listed_text(odd, 8),
+                    "are": agree(len(odd), "is", "are"),
+                    "have": agree(len(odd), "has", "have"),
+                    "remedy": Remedy("Safe names in the Export motion dialog", "--safe-names"),
+                    "them": agree(len(odd), "it", "them"),
+                },
+            )
+        )
     return notes
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Part, Selection
 from viewer.export._gaps import frames_phrase, runs
 from viewer.export._left_out import motion_notes, other_animations_note, rate_note
@@ -41,6 +41,7 @@ from viewer.export.gltf.sampled import (
     written_part,
 )
 from viewer.formats import all_or_none, save_bytes
+from viewer.phrases import agree, all_of, counted, file_size, listed, optional, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraPath, CameraView
 from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
@@ -119,20 +120,39 @@ def _written(
 ) -> Diagnostic:
     """Return the note about a written file."""
     animations = {index for each in added for index in each.kept}
-    values: dict[str, Any] = {"size": size, "n": len(animations)}
-    cameras = [Phrase("written-cameras", n=n_views)] if n_views else []
+    values: dict[str, Any] = {"size": file_size(size), "n": counted(len(animations), "animation")}
+    cameras = [Phrase("{n}", n=counted(n_views, "camera"))] if n_views else []
     if len(actors) > 1:
-        values |= {"figures": [actor.name for actor in actors], "n_figures": len(actors)}
+        values |= {
+            "figures": listed([actor.name for actor in actors]),
+            "n_figures": counted(len(actors), "figure"),
+        }
         if animations:
-            cameras.append(Phrase("written-animations", n=len(animations)))
-        return Diagnostic("X001.gltf-figures", path, values={**values, "others": cameras})
-    key = "X001.gltf" if added[0].clips is None else "X001.gltf-animations"
-    return Diagnostic(key, path, values={**values, "counts": added[0].built.counts + cameras})
+            cameras.append(Phrase("{n}", n=counted(len(animations), "animation")))
+        return Diagnostic(
+            "X001.gltf-figures: {n_figures}: {figures}{others}, {size}",
+            path,
+            values={**values, "others": optional("; {}", cameras)},
+        )
+    key = (
+        "X001.gltf: {counts}, {size}"
+        if added[0].clips is None
+        else "X001.gltf-animations: {counts}, {n} with {their} own keys, {size}"
+    )
+    return Diagnostic(
+        key,
+        path,
+        values={
+            **values,
+            "counts": all_of(added[0].built.counts + cameras),
+            "their": agree(len(animations), "its", "their"),
+        },
+    )
 
 
 def _of_figure(actor: Actor, note: Diagnostic) -> Diagnostic:
     values = {"figure": actor.name, "remark": replace(note, path=None)}
-    return Diagnostic(f"{note.code}.of-figure", note.path, values=values)
+    return Diagnostic(f"{note.code}.of-figure: {{figure}}: {{remark}}", note.path, values=values)
 
 
 def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagnostic]:
@@ -156,13 +176,15 @@ def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagno
     rows = zip(paths, spans, saved, built, documents, strict=True)
     for file, span, data, made, document in rows:
         values = {
-            "counts": made.counts,
+            "counts": all_of(made.counts),
             "frames": frames_phrase(animation.first_frame + span[0], span[1] - span[0]),
             "rate": animation.frame_rate,
-            "size": len(data[file]),
+            "size": file_size(len(data[file])),
         }
         notes += [
-            Diagnostic("X001.gltf-motion", file, values=values),
+            Diagnostic(
+                "X001.gltf-motion: {counts}, {frames} at {rate:g} fps, {size}", file, values=values
+            ),
             *_beside(data, file, document),
         ]
         notes += _quantization(file, made, animation.figure)
@@ -225,13 +247,19 @@ def _motions_written(
 ) -> Diagnostic:
     """Return the note about a file of several moving figures."""
     values = {
-        "n_figures": len(actors),
-        "figures": [actor.name for actor in actors],
-        "seconds": seconds,
-        "others": [Phrase("written-cameras", n=n_views)] if n_views else [],
-        "size": size,
+        "n_figures": counted(len(actors), "figure"),
+        "figures": listed([actor.name for actor in actors]),
+        "seconds": rounded(seconds, 4),
+        "others": optional(
+            "; {}", [Phrase("{n}", n=counted(n_views, "camera"))] if n_views else []
+        ),
+        "size": file_size(size),
     }
-    return Diagnostic("X001.gltf-motions", path, values=values)
+    return Diagnostic(
+        "X001.gltf-motions: {n_figures}: {figures}; one animation of {seconds} s{others}, {size}",
+        path,
+        values=values,
+    )
 
 
 def _unplaced(data: Mapping[Path, bytes], placing: Sequence[int]) -> GltfFile:
@@ -271,10 +299,22 @@ def _beside(data: dict[Path, bytes], path: Path, document: Document) -> list[Dia
     """Return notes about the file of arrays, and about numbers that JSON cannot store."""
     others = {file: len(content) for file, content in data.items() if file != path}
     notes = [
-        Diagnostic("X001.gltf-arrays", file, values={"size": size}) for file, size in others.items()
+        Diagnostic("X001.gltf-arrays: array data, {size}", file, values={"size": file_size(size)})
+        for file, size in others.items()
     ]
     if document.n_omitted:
-        notes.append(Diagnostic("X003.json-numbers", path, values={"n": document.n_omitted}))
+        notes.append(
+            Diagnostic(
+                "X003.json-numbers: {n} of the original file {are} omitted, or 0 in lists: JSON "
+                "cannot store {them}",
+                path,
+                values={
+                    "n": counted(document.n_omitted, "infinite or undefined number"),
+                    "are": agree(document.n_omitted, "is", "are"),
+                    "them": agree(document.n_omitted, "it", "them"),
+                },
+            )
+        )
     return notes
 
 
@@ -286,38 +326,77 @@ def _quantization(path: Path, built: Built, figure: Figure) -> list[Diagnostic]:
     parts = []
     if "positions" in errors:
         length = length_text(figure, errors["positions"])
-        parts.append(Phrase("quantized-positions", length=length))
-    for kind, factor in (("normals", 180.0 / np.pi), ("uvs", 1.0), ("weights", 1.0)):
+        parts.append(Phrase("{length} in positions", length=length))
+    for kind, factor, text in (
+        ("normals", 180.0 / np.pi, "{error} degrees in normals"),
+        ("uvs", 1.0, "{error} in texture coordinates"),
+        ("weights", 1.0, "{error} in weights"),
+    ):
         if kind in errors:
-            parts.append(Phrase(f"quantized-{kind}", error=f"{factor * errors[kind]:.2g}"))
-    return [Diagnostic("X002.quantized", path, values={"parts": parts})]
+            parts.append(Phrase(text, error=f"{factor * errors[kind]:.2g}"))
+    return [
+        Diagnostic(
+            "X002.quantized: quantised with rounding errors of up to {parts}",
+            path,
+            values={"parts": all_of(parts)},
+        )
+    ]
 
 
 def _remarks(body: Body, up: str) -> list[Diagnostic]:
     """Return notes about coordinate space and shape for users of the file."""
     figure, notes = body.figure, list[Diagnostic]()
     if up == "z":
-        notes.append(Diagnostic("X005.z-up"))
+        notes.append(
+            Diagnostic(
+                "X005.z-up: z is up: a node above the figure rotates it by -90 degrees about x"
+            )
+        )
     if METRES.get(figure.unit, 1.0) != 1.0:
         values = {"unit": UNIT_NAMES[figure.unit], "factor": METRES[figure.unit]}
-        notes.append(Diagnostic("X005.unit-scaled", values=values))
+        notes.append(
+            Diagnostic(
+                "X005.unit-scaled: lengths are in {unit}: a node above the figure scales them to "
+                "metres by {factor:g}",
+                values=values,
+            )
+        )
     elif figure.unit not in METRES:
-        notes.append(Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name}))
+        notes.append(Diagnostic(wording.UNIT_UNKNOWN_METRES, values={"figure": figure.name}))
     if figure.mesh is not None:
         notes += material_losses(figure.mesh)
     if figure.mesh is not None and figure.mesh.n_vertices == 0:
-        notes.append(Diagnostic("X003.empty-mesh"))
+        notes.append(Diagnostic("X003.empty-mesh: the mesh has no vertices and is omitted"))
     if body.shape.baked is not None:
-        notes.append(Diagnostic("X005.shape-baked"))
+        notes.append(Diagnostic("X005.shape-baked: the shape is baked into mesh and joints"))
     if len(body.shape.targets):
         count = len(body.shape.targets)
-        notes.append(Diagnostic("X005.morph-targets", values={"n": count}))
+        notes.append(
+            Diagnostic(
+                "X005.morph-targets: {n}",
+                values={
+                    "n": counted(count, "blend shape", "is a morph target", "are morph targets")
+                },
+            )
+        )
         shapes = figure.blend_shapes
         if shapes is not None and shapes.normal_offsets is None:
-            notes.append(Diagnostic("X005.morph-normals"))
+            notes.append(
+                Diagnostic(
+                    "X005.morph-normals: morph targets change positions only: glTF does not "
+                    "recompute "
+                    "normals"
+                )
+            )
     if body.influences is not None and body.influences.n_fixed:
         unbound = int(body.influences.n_fixed)
-        notes.append(Diagnostic("X005.no-influence", values={"n": unbound}))
+        notes.append(
+            Diagnostic(
+                'X005.no-influence: {n} without influence: bound to the node "fixed", which never '
+                "moves",
+                values={"n": counted(unbound, "vertex")},
+            )
+        )
     return notes
 
 
@@ -378,12 +457,30 @@ def _add_cameras(
         node = document.add("nodes", {**item, **_placed(matrix)})
         document.root["scenes"][0]["nodes"].append(node)
     bent = [view.name for view in views if _is_bent(view)]
-    found = {"X003.camera-lenses": bent, "X003.camera-motions": [*moving]}
-    return [
-        Diagnostic(key, values={"n": len(names), "names": names})
-        for key, names in found.items()
-        if names
-    ]
+    notes = []
+    if bent:
+        values = {"n": len(bent), "names": listed(bent), "are": agree(len(bent), "is", "are")}
+        notes.append(
+            Diagnostic(
+                "X003.camera-lenses: glTF cannot store lens distortion, skew or principal points, "
+                "which {are} omitted: {names}",
+                values=values,
+            )
+        )
+    if moving:
+        n = len(moving)
+        notes.append(
+            Diagnostic(
+                "X003.camera-motions: {n} written at the first frame only, without {their} motion: "
+                "{names}",
+                values={
+                    "n": counted(n, "camera", "is", "are"),
+                    "names": listed([*moving]),
+                    "their": agree(n, "its", "their"),
+                },
+            )
+        )
+    return notes
 
 
 def _is_kept(path: CameraPath, clips: Sequence[TransformClip]) -> bool:

@@ -16,6 +16,7 @@ from viewer.export.gltf.mesh import EXTENSION, Encoding, add_mesh, parts_of, qua
 from viewer.export.gltf.nodes import Locals, Tree, add_nodes
 from viewer.export.gltf.reading import Placed
 from viewer.export.gltf.skin import Influences, Shape, influences_of, inverse_bind_matrices
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import FileRecord
@@ -97,11 +98,15 @@ def add_body(
         meshes, materials = _add_meshes(encoding, body, tree, color)
         scene += _place_meshes(document, body, tree, meshes)
         written, before = sum(len(each.part.sources) for each in meshes), figure.mesh.n_vertices
-        key = "written-vertices" if written == before else "split-vertices"
-        counts = [Phrase(key, n=written, before=before)]
-        counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
+        key = (
+            "{n}"
+            if written == before
+            else "{n} ({before} before they were split along texture seams)"
+        )
+        counts = [Phrase(key, n=counted(written, "vertex"), before=before)]
+        counts.append(Phrase("{n}", n=counted(figure.mesh.n_triangles, "triangle")))
     if figure.skeleton is not None:
-        counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
+        counts.append(Phrase("{n}", n=counted(figure.skeleton.n_joints, "joint")))
     if "scenes" not in document.root:
         document.root["scene"] = document.add("scenes", {**_scene_members(record), "nodes": []})
     document.root["scenes"][0]["nodes"] += scene

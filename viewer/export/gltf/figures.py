@@ -31,6 +31,7 @@ from viewer.export.gltf.losses import (
 from viewer.export.gltf.nodes import locals_of, to_metres
 from viewer.export.gltf.reading import GltfFile, Keys
 from viewer.export.gltf.skin import shape_of
+from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
@@ -150,8 +151,19 @@ def figure_losses(
         notes += _clip_losses(written, figure, added.pose, clips, skinning, body)
         early = [clip.name for clip in clips if first_time(clip) < 0.0]
         if early:
-            values = {"names": early, "n": len(early)}
-            notes.append(Diagnostic("X005.negative-times", values=values))
+            values = {
+                "names": listed(early, 8),
+                "n": counted(len(early), "animation", "begins", "begin"),
+                "are": agree(len(early), "is", "are"),
+            }
+            notes.append(
+                Diagnostic(
+                    "X005.negative-times: {n} before 0, which glTF does not allow, and {are} "
+                    "shifted "
+                    "to begin at 0: {names}",
+                    values=values,
+                )
+            )
         notes += _without_effect(added, added.clips)
     return notes + not_held(figure, body.shape, is_vrm)
 
@@ -166,7 +178,16 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
         if id(clip) not in kept
     ]
     if idle:
-        notes.append(Diagnostic("X003.idle-animations", values={"names": idle, "n": len(idle)}))
+        notes.append(
+            Diagnostic(
+                "X003.idle-animations: {n} no effect on what is written and {are} omitted: {names}",
+                values={
+                    "names": listed(idle),
+                    "n": counted(len(idle), "animation", "has", "have"),
+                    "are": agree(len(idle), "is", "are"),
+                },
+            )
+        )
     moved = [placed.part.targets for placed in added.built.meshes]
     drawn = set(written[np.concatenate(moved)].tolist()) if moved else set[int]()
     keyed = [
@@ -175,8 +196,17 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
     shapes = added.figure.blend_shapes
     lost = sorted({shape for each in keyed for shape in each} - drawn)
     if lost and shapes is not None:
-        values = {"names": _names(shapes, lost), "n": len(lost)}
-        notes.append(Diagnostic("X003.idle-shapes", values=values))
+        values = {
+            "names": listed(_names(shapes, lost)),
+            "n": counted(len(lost), "blend shape"),
+            "change": agree(len(lost), "changes", "change"),
+        }
+        notes.append(
+            Diagnostic(
+                "X003.idle-shapes: keys of {n} that {change} no vertex are omitted: {names}",
+                values=values,
+            )
+        )
     return notes
 
 
@@ -246,18 +276,25 @@ def _clip_losses(
     place: Phrase | str = ""
     if found.clips[row] >= 0:
         name = clips[int(found.clips[row])].name or f"animation {int(found.clips[row]) + 1}"
-        place = Phrase("animation-time", name=name, time=round(float(found.times[row]), 4))
+        place = Phrase("{name} at {time:zg} s", name=name, time=round(float(found.times[row]), 4))
     values = {
-        "vertices": Phrase("mesh-vertices" if written.meshes else "joint-positions"),
-        "n": len(clips),
+        "vertices": Phrase("vertices" if written.meshes else "joints"),
+        "n": counted(len(clips), "animation"),
         "length": length_text(figure, float(distances[row])),
         "distance": float(distances[row]),
         "unit": figure.unit,
-        "place": place,
-        "times": len(found.times),
-        "causes": causes,
+        "place": optional(" ({})", place),
+        "times": counted(len(found.times), "time"),
+        "causes": optional(": {}", causes),
     }
-    notes = [Diagnostic("X002.animations", written.path, values=values)]
+    notes = [
+        Diagnostic(
+            "X002.animations: {vertices} differ by up to {length}{place}, compared at {times} "
+            "in {n}{causes}",
+            written.path,
+            values=values,
+        )
+    ]
     return notes + first_set_note(expected, read, figure, rows, least, body.influences)
 
 

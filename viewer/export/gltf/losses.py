@@ -17,6 +17,7 @@ from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figur
 from viewer.export.gltf.nodes import Tree
 from viewer.export.gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
 from viewer.export.gltf.skin import PER_SET, Influences, Shape
+from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames
@@ -78,7 +79,7 @@ def gltf_losses(
     if found.vertices is not None:
         causes = causes_of(figure, frames, rows, how, shape, influences, least)
     notes = apart_notes(written.path, figure, found, first_frame, sources)
-    notes = with_values(notes, causes=causes)
+    notes = with_values(notes, causes=optional(": {}", causes))
     return notes + first_set_note(expected, read, figure, rows, least, influences)
 
 
@@ -131,15 +132,28 @@ def first_set_note(
     found = apart(expected, read(1), rows, least)
     most, worst = int(influences.most), found.vertices
     if worst is None:
-        return [Diagnostic("X005.influences", values={"most": most})]
+        return [
+            Diagnostic(
+                "X005.influences: up to {most} influences per vertex, all of them written, "
+                "strongest first",
+                values={"most": most},
+            )
+        ]
     values = {
         "most": most,
         "length": length_text(figure, worst.distance),
         "distance": worst.distance,
         "unit": figure.unit,
-        "extent": extent_of(found),
+        "extent": optional(" ({})", extent_of(found)),
     }
-    return [Diagnostic("X002.first-influences", values=values)]
+    return [
+        Diagnostic(
+            "X002.first-influences: up to {most} influences per vertex, all of them written, "
+            "strongest first; programs that read only the first four are wrong by up to "
+            "{length}{extent}",
+            values=values,
+        )
+    ]
 
 
 def causes_of(
@@ -156,24 +170,36 @@ def causes_of(
     if influences is not None and (influences.n_scaled or influences.n_negative):
         found.append(_weights_phrase(influences))
     if influences is not None and how.method != "lbs":
-        found.append(Phrase("nonlinear-skinning", method=METHODS[how.method].title))
+        found.append(
+            Phrase(
+                "{method} skinning is not supported: glTF uses linear blending",
+                method=METHODS[how.method].title,
+            )
+        )
     if influences is not None and figure.correctives is not None:
-        found.append(Phrase("unsupported-correctives"))
+        found.append(Phrase("pose correctives are not supported"))
     weights = frames.shape_weights
     weights = weights if len(weights) == 1 else weights[rows]
     if shape.baked is not None and np.ptp(weights, axis=0).any():
-        found.append(Phrase("unsupported-shape-change"))
+        found.append(Phrase("the shape changes over time, which is not supported"))
     mesh = shape.figure.require_mesh()
     coarse = np.abs(mesh.positions - mesh.positions.astype(np.float32)).max(initial=0.0)
     if coarse > least:
-        found.append(Phrase("single-precision"))
+        found.append(Phrase("the mesh is too far from its origin for glTF's single precision"))
     return found
 
 
 def _weights_phrase(influences: Influences) -> Phrase:
     n, negative = int(influences.n_scaled), int(influences.n_negative)
-    key = "weights-both" if n and negative else "weights-unnormalized" if n else "weights-negative"
-    return Phrase(key, n=n, negative=negative)
+    key = (
+        "weights of {n} do not add up to 1 and weights of {negative} are negative: omitted "
+        "and the others scaled, as glTF requires"
+        if n and negative
+        else "weights of {n} do not add up to 1: scaled, as glTF requires"
+        if n
+        else "weights of {negative} are negative: omitted and the others scaled, as glTF requires"
+    )
+    return Phrase(key, n=counted(n, "vertex"), negative=counted(negative, "vertex"))
 
 
 def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnostic]:
@@ -186,34 +212,68 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     mixed = 0 if shapes is None else sum(shapes.is_expression(row) for row in rows)
     unused = len(rows) - mixed
     if shape.baked is not None:
-        lost.append(Phrase("part-baked-shapes", n=figure.n_shapes))
+        lost.append(Phrase("{n} (baked into the mesh)", n=counted(figure.n_shapes, "blend shape")))
     elif unused > 0:
-        lost.append(Phrase("part-blend-shapes", n=unused))
+        lost.append(Phrase("{n}", n=counted(unused, "blend shape")))
     if mixed and shape.baked is None and not is_vrm:
-        lost.append(Phrase("part-expressions", n=mixed))
+        lost.append(
+            Phrase("{n} (combinations of morph targets, as in VRM)", n=counted(mixed, "expression"))
+        )
     lost += [] if is_vrm else _lost_looks(figure)
     if skeleton is not None and skeleton.humanoid is not None and not is_vrm:
-        lost.append(Phrase("part-humanoid"))
+        lost.append(Phrase("the humanoid bone map"))
     if skeleton is not None and skeleton.springs is not None and not is_vrm:
-        lost.append(Phrase("part-springs", n=skeleton.springs.n_chains))
+        lost.append(Phrase("{n}", n=counted(skeleton.springs.n_chains, "spring chain")))
     if figure.record is not None and figure.record.vrm is not None and not is_vrm:
-        lost.append(Phrase("part-vrm-meta"))
+        lost.append(Phrase("authors and licence of the VRM character"))
     if figure.correctives is not None:
-        lost.append(Phrase("part-correctives"))
+        lost.append(Phrase("pose correctives"))
     lost += extra_parts(figure)
     if skeleton is not None and skeleton.constraints and not is_vrm:
-        lost.append(Phrase("part-constraints", n=len(skeleton.constraints)))
+        lost.append(
+            Phrase(
+                "{n} (the joints have their rotations)",
+                n=counted(len(skeleton.constraints), "constraint"),
+            )
+        )
     if skeleton is not None and _is_limited(skeleton):
-        lost.append(Phrase("part-limits"))
+        lost.append(Phrase("joint limits"))
     members = () if figure.record is None else figure.record.unkept()
     if figure.record is not None and len(figure.record.skin_names) > 1:
         members = (*members, *(["skins.name"] if any(figure.record.skin_names) else []))
-    values = {"names": members, "n": len(members)}
+    values = {
+        "names": listed(members),
+        "n": counted(len(members), "member"),
+        "are": agree(len(members), "is", "are"),
+    }
     notes = not_held_note("glTF", lost)
-    notes += [Diagnostic("X003.file-members", values=values)] if members else []
+    notes += (
+        [
+            Diagnostic(
+                "X003.file-members: {n} of the original file {are} not copied: {names}",
+                values=values,
+            )
+        ]
+        if members
+        else []
+    )
     nodes = () if figure.record is None else figure.record.lost_nodes
-    values = {"names": nodes, "n": len(nodes)}
-    return notes + ([Diagnostic("X003.file-nodes", values=values)] if nodes else [])
+    values = {
+        "names": listed(nodes, 12),
+        "n": counted(len(nodes), "node"),
+        "are": agree(len(nodes), "is", "are"),
+    }
+    return notes + (
+        [
+            Diagnostic(
+                "X003.file-nodes: {n} of the original file without a joint, mesh or camera {are} "
+                "not copied: {names}",
+                values=values,
+            )
+        ]
+        if nodes
+        else []
+    )
 
 
 def _lost_looks(figure: Figure) -> list[Phrase]:
@@ -222,10 +282,12 @@ def _lost_looks(figure: Figure) -> list[Phrase]:
     materials = () if figure.mesh is None else figure.mesh.materials
     n_toon = sum(material.shade_color is not None for material in materials)
     if n_toon:
-        found.append(Phrase("part-toon", n=n_toon))
+        found.append(
+            Phrase("toon shading of {n} (unlit in the file)", n=counted(n_toon, "material"))
+        )
     if shapes is not None and shapes.material_binds is not None:
         count = len(shapes.material_binds.n_materials)
-        found.append(Phrase("part-material-binds", n=count))
+        found.append(Phrase("material changes by {n}", n=counted(count, "expression")))
     return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.export.gltf.document import Document, text_of
 from viewer.media.png import encode_png
+from viewer.phrases import brief
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.material import MINIFICATIONS, Material, Texture
 from viewer.rig.mesh import Mesh
@@ -166,12 +167,24 @@ def material_losses(mesh: Mesh) -> list[Diagnostic]:
     """Return notes about material properties of a mesh that glTF cannot store."""
     lost = []
     for material in mesh.materials:
-        values = {"material": material.name or "unnamed"}
+        values = {"material": brief(material.name or "unnamed")}
         metallic, roughness = material.metallic_texture, material.roughness_texture
         if metallic and roughness and not _same_place(metallic, roughness):
-            lost.append(Diagnostic("X005.metallic-placement", values=values))
+            lost.append(
+                Diagnostic(
+                    "X005.metallic-placement: material {material}: its metallic map uses the "
+                    "placement "
+                    "of its roughness map",
+                    values=values,
+                )
+            )
         if any(_placement(one.matrix)[1] > _SHEAR for one in material.textures.values()):
-            lost.append(Diagnostic("X003.texture-shear", values=values))
+            lost.append(
+                Diagnostic(
+                    "X003.texture-shear: material {material}: the shear of its textures is omitted",
+                    values=values,
+                )
+            )
     return lost
 
 

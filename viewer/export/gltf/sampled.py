@@ -22,6 +22,8 @@ from viewer.export.gltf.materials import Color
 from viewer.export.gltf.nodes import locals_of
 from viewer.export.gltf.reading import GltfFile, frame_keys
 from viewer.export.gltf.skin import shape_of
+from viewer.phrases import agree, counted
+from viewer.phrases import listed as listed_text
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import figure_pose
@@ -174,6 +176,14 @@ def motion_remarks(sampled: Sampled, options: ExportOptions) -> list[Diagnostic]
     moves = np.flatnonzero(moving(own, frames) & (skeleton.parents >= 0))
     if len(moves):
         names = [joint_label(skeleton, int(joint)) for joint in moves]
-        values = {"n": len(names), "names": names}
-        notes.append(Diagnostic("X005.joints-translate", values=values))
+        values = {
+            "n": counted(len(names), "joint"),
+            "names": listed_text(names, 8),
+            "translate": agree(len(names), "translates", "translate"),
+        }
+        notes.append(
+            Diagnostic(
+                "X005.joints-translate: {n} below the root {translate}: {names}", values=values
+            )
+        )
     return notes

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export import gltf
 from viewer.export._exporter import Part, Selection
 from viewer.export._options import ExportOptions, VrmMeta
@@ -33,6 +33,8 @@ from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
 from viewer.formats._vrm.parts import listed, part, value_of
 from viewer.formats._vrm.springs import EXTENDED
+from viewer.phrases import agree, all_of, counted, rounded
+from viewer.phrases import listed as listed_text
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
@@ -65,7 +67,14 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     if record is not None:
         record, names = _repaired(record, bones)
         if names:
-            notes.append(Diagnostic("X005.vrm-repaired", values={"names": names, "n": len(names)}))
+            notes.append(
+                Diagnostic(
+                    "X005.vrm-repaired: corrected, because the VRM file violated the "
+                    "specification: "
+                    "{names}",
+                    values={"names": listed_text(names), "n": len(names)},
+                )
+            )
         if record.version == 1 or not given.upgrades:
             _require_meta(record, given, figure.name)
     if record is not None and record.version == 0 and given.upgrades:
@@ -73,7 +82,17 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         still = replace(still, figure=figure, pose=figure_pose(figure))
         _require_author(record, given, figure.name)
         if lost:
-            notes.append(Diagnostic("X003.vrm-upgrade", values={"names": lost, "n": len(lost)}))
+            notes.append(
+                Diagnostic(
+                    "X003.vrm-upgrade: {n} of the VRM 0.x file {have} no counterpart in VRM 1.0: "
+                    "{names}",
+                    values={
+                        "names": listed_text(lost, 8),
+                        "n": counted(len(lost), "member"),
+                        "have": agree(len(lost), "has", "have"),
+                    },
+                )
+            )
     if record is not None:
         extend = partial(_add_kept, record, given)
         return gltf.write_poses(Selection([Part(still)]), path, options, extend) + notes
@@ -83,7 +102,13 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     figure, angle = in_t_pose(standing(figure, pose, bones), bones)
     still = replace(still, figure=figure, pose=figure_pose(figure))
     if angle > _STRAIGHT:
-        notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
+        notes.append(
+            Diagnostic(
+                "X005.t-pose: the rest pose is a T-pose, as VRM requires: joints are rotated by up "
+                "to {degrees} degrees",
+                values={"degrees": rounded(float(np.degrees(angle)))},
+            )
+        )
     notes += _unit_notes(actor.figure)
     extend = partial(_add_made, bones, added_meta)
     return gltf.write_poses(Selection([Part(still)]), path, options, extend) + notes
@@ -172,9 +197,9 @@ def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
 def _unit_notes(figure: Figure) -> list[Diagnostic]:
     """Return a note about lengths that are converted, or whose unit is unknown."""
     if figure.unit not in METRES:
-        return [Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name})]
+        return [Diagnostic(wording.UNIT_UNKNOWN_METRES, values={"figure": figure.name})]
     if METRES[figure.unit] != 1.0:
-        return [Diagnostic("X005.unit-converted", values={"unit": UNIT_NAMES[figure.unit]})]
+        return [Diagnostic(wording.UNIT_CONVERTED, values={"unit": UNIT_NAMES[figure.unit]})]
     return []
 
 
@@ -183,12 +208,21 @@ def _left_out(actor: Actor) -> list[Diagnostic]:
     notes, figure = [], actor.figure
     if actor.clip is not None or figure.animations:
         n = max(len(figure.animations), 1)
-        notes.append(Diagnostic("X003.vrm-motions", values={"n": n}))
+        notes.append(
+            Diagnostic(
+                "X003.vrm-motions: {n} omitted: VRM files store no motion; write motions as .glb",
+                values={"n": counted(n, "animation", "is", "are")},
+            )
+        )
     elif actor.pose is not None:
         own = figure_pose(figure)
         own.shape_weights = actor.pose.shape_weights
         if pose_key(own) != pose_key(actor.pose):
-            notes.append(Diagnostic("X003.vrm-pose"))
+            notes.append(
+                Diagnostic(
+                    "X003.vrm-pose: the current pose is omitted: VRM files store the rest pose"
+                )
+            )
     return notes
 
 
@@ -251,7 +285,13 @@ def _add_made(
     _add(document, body, built, extensions)
     notes = [_written(extensions["VRMC_vrm"], extensions, 1)]
     if meta["licenseUrl"] != LICENCE:
-        notes.append(Diagnostic("X005.vrm-licence", values={"licence": LICENCE}))
+        notes.append(
+            Diagnostic(
+                "X005.vrm-licence: programs may refuse a VRM 1.0 file with a licence other than "
+                "{licence}",
+                values={"licence": LICENCE},
+            )
+        )
     return notes
 
 
@@ -282,10 +322,13 @@ def _written(data: Mapping[str, Any], extensions: Mapping[str, Any], version: in
         kinds = ("preset", "custom")
         n_expressions = sum(_size(part(data, "expressions", kind)) for kind in kinds)
         n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
-    parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=n_expressions)]
-    parts.append(Phrase("vrm-springs", n=n_chains))
-    values = {"version": "0.x" if version == 0 else "1.0", "parts": parts}
-    return Diagnostic("X001.vrm", values=values)
+    parts = [
+        Phrase("{n}", n=counted(len(bones), "human bone")),
+        Phrase("{n}", n=counted(n_expressions, "expression")),
+    ]
+    parts.append(Phrase("{n}", n=counted(n_chains, "spring chain")))
+    values = {"version": "0.x" if version == 0 else "1.0", "parts": all_of(parts)}
+    return Diagnostic("X001.vrm: VRM {version}: {parts}", values=values)
 
 
 def _size(data: Any) -> int:
@@ -293,10 +336,36 @@ def _size(data: Any) -> int:
     return len(data) if isinstance(data, list | dict) else 0
 
 
+_LOST = {
+    "bones": "human bone",
+    "annotations": "first-person setting",
+    "morph-binds": "morph target bind",
+    "material-binds": "material bind",
+    "textures": "texture",
+    "colliders": "collider",
+    "spring-joints": "spring joint",
+    "centers": "spring centre",
+}
+"""Names of references that could not be kept."""
+
+
 def _lost(lost: Counter[str]) -> list[Diagnostic]:
     """Return a note about references that could not be kept, if there are any."""
-    parts = [Phrase(f"lost-{kind}", n=count) for kind, count in sorted(lost.items()) if count]
-    return [Diagnostic("X003.vrm-lost", values={"parts": parts})] if parts else []
+    parts = [
+        Phrase("{n}", n=counted(count, _LOST[kind]))
+        for kind, count in sorted(lost.items())
+        if count
+    ]
+    return (
+        [
+            Diagnostic(
+                "X003.vrm-lost: references of the VRM file to parts that are not written: {parts}",
+                values={"parts": all_of(parts)},
+            )
+        ]
+        if parts
+        else []
+    )
 
 
 def _constraint_items(

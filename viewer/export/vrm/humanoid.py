@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import counted, listed
 from viewer.rig.figure import Figure
 from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 from viewer.rig.retargeting.joint_names import joint_meanings
@@ -40,8 +41,17 @@ def human_bones(figure: Figure) -> dict[str, int]:
             del found[bone]
     missing = [bone for bone in REQUIRED_BONES if bone not in found]
     if missing:
-        values = {"figure": figure.name, "names": missing, "n": len(missing)}
-        raise RigError(Diagnostic("F004.vrm-bones", values=values))
+        values = {
+            "figure": figure.name,
+            "names": listed(missing, 12),
+            "n": counted(len(missing), "required human bone"),
+        }
+        raise RigError(
+            Diagnostic(
+                "F004.vrm-bones: {figure} cannot be written as VRM: {n} not found: {names}",
+                values=values,
+            )
+        )
     return found
 
 

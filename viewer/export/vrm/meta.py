@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.export._options import VrmMeta
 from viewer.export.gltf.document import text_of
@@ -24,7 +25,21 @@ def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
     Raises RigError if the authors or the licence are missing.
     """
     if not any(meta.authors) or not meta.licence:
-        raise RigError(Diagnostic("F004.vrm-meta", values={"figure": figure, "licence": LICENCE}))
+        raise RigError(
+            Diagnostic(
+                "F004.vrm-meta: {figure} cannot be written as VRM without author and licence: "
+                "{remedy}",
+                values={
+                    "figure": figure,
+                    "licence": LICENCE,
+                    "remedy": Remedy(
+                        "use viewer convert",
+                        f"add --vrm-author NAME and --vrm-licence URL, such as {LICENCE} (the "
+                        f"strictest permissions)",
+                    ),
+                },
+            )
+        )
     return {
         "name": text_of(meta.name or figure),
         "authors": [text_of(author) for author in meta.authors if author],

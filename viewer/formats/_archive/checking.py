@@ -7,23 +7,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Part, Phrase
+from viewer.diagnostics import Part, Phrase, wording
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._placeholders import neutral_corners
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST
+from viewer.phrases import listed, optional, rounded
 from viewer.rig.arrays import Bools, Deferred, Floats, Ints
 
 _ROWS = {
-    "positions": "row-vertex",
-    "weights": "row-vertex",
-    "triangles": "row-triangle",
-    "bindings": "row-joint",
-    "joints": "row-joint",
+    "positions": "vertex {index}",
+    "weights": "vertex {index}",
+    "triangles": "triangle {index}",
+    "bindings": "joint {index}",
+    "joints": "joint {index}",
 }
-"""Phrase key for a row, by part of a figure or motion."""
+"""A row, by part of a figure or motion."""
 
 
 def archive_of(source: Source) -> Archive:
@@ -53,7 +54,7 @@ def finite(
     of = rows if places is None else places[rows]
     message, found = _problem(numbers, bad)
     if part:
-        found["at"] = Phrase(_ROWS[part], index=int(of[0]))
+        found["at"] = optional(" at {}", Phrase(_ROWS[part], index=int(of[0])))
     archive.refuse(
         f"{'W003' if part == 'weights' else 'F003'}.{message}",
         item=key,
@@ -104,9 +105,10 @@ def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
         return found
     place = np.argwhere(far)[0]
     archive.leave_gap(
-        "F003.motion-reach",
+        "F003.motion-reach: {item}: expected numbers within ±{limit}, found {found:g} in "
+        "frame {frame}",
         item=key,
-        limit=FARTHEST,
+        limit=rounded(FARTHEST, 2),
         found=float(found[tuple(place)]),
         frame=int(place[0]),
     )
@@ -132,9 +134,11 @@ def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
     found = float(numbers[tuple(first)])
     values: dict[str, Any] = {
         "found": found,
-        "at": Phrase("element", indices=first) if first else "",
+        "at": optional(" at {}", Phrase("{indices}", indices=listed(first)) if first else ""),
     }
-    return ("limit", {**values, "limit": LARGEST}) if np.isfinite(found) else ("finite", values)
+    if np.isfinite(found):
+        return wording.TOO_FAR, {**values, "limit": rounded(LARGEST, 2)}
+    return wording.NOT_FINITE, values
 
 
 def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int) -> Ints:
@@ -147,7 +151,7 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
         return values.astype(np.int32)
     fits = (values >= 0) & (values < n_vertices) & (values == np.floor(values))
     archive.refuse(
-        "F002.vertex-range",
+        wording.VERTEX_RANGE,
         item=key,
         count=int((~fits).sum()),
         part="triangles",

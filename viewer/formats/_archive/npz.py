@@ -26,12 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, item_count, shaped
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
 from viewer.formats._source import InvalidValueError, Source
-from viewer.phrases import printable
+from viewer.phrases import axes, printable
 from viewer.rig.arrays import Deferred
 
 _MAX_AXES = 32
@@ -43,7 +44,7 @@ _ITEM = re.compile(
     rb"'(?P<key>descr|fortran_order|shape)'\s*:\s*"
     rb"(?:'(?P<descr>[^'\\]{1,20})'|(?P<order>True|False)|\((?P<shape>[0-9L,\s]*)\))"
 )
-_OBJECTS = Opaque(Phrase("unread-objects"))
+_OBJECTS = Opaque(Phrase("object array"))
 _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 
 
@@ -117,7 +118,12 @@ def open_npy(
         value: Value = header
     else:
         if storage.size > source.max_size:
-            raise source.fault("F001.too-large", most=source.max_size, size=storage.size)
+            raise source.fault(
+                wording.TOO_LARGE,
+                most=source.max_size,
+                size=storage.size,
+                remedy=Remedy("", " (see --max-size)"),
+            )
         value = header.deferred(partial(_load_file, storage, key, header))
     return Archive(source, "npy", (key,), {key: value}.__getitem__)
 
@@ -129,7 +135,7 @@ def _key(member: zipfile.ZipInfo) -> str:
 def _open_member(directory: ZipDirectory, member: zipfile.ZipInfo) -> Value:
     key = _key(member)
     if not member.filename.endswith(".npy"):
-        return Opaque(Phrase("unread-member"))
+        return Opaque(Phrase("not an array"))
     storage = directory.storage
     with directory.archive.open(member) as stream:
         header = _read_header(storage, key, stream, member.file_size)
@@ -144,16 +150,25 @@ def _read_header(storage: StoredFile, key: str, stream: IO[bytes], size: int) ->
     lead = stream.read(8)
     layout = _LEAD.get(lead[6:8])
     if not lead.startswith(b"\x93NUMPY") or layout is None:
-        raise storage.fault(key, Phrase("npy-lead", found=lead))
+        raise storage.fault(key, Phrase("expected an .npy header, found {found}", found=lead))
     width = struct.calcsize(layout)
     length = int.from_bytes(stream.read(width), "little")
     if length >= _LONGEST_HEADER:
-        raise storage.fault(key, Phrase("npy-header-length", found=length))
+        raise storage.fault(
+            key, Phrase("expected a header smaller than 64 KiB, found {found} bytes", found=length)
+        )
     text = stream.read(length)
     if len(text) < length:
-        raise storage.fault(key, Phrase("npy-header-cut", expected=length, found=len(text)))
+        raise storage.fault(
+            key,
+            Phrase(
+                "expected a header of {expected} bytes, found {found}",
+                expected=length,
+                found=len(text),
+            ),
+        )
     if _RECORD.search(text):
-        return Opaque(Phrase("unread-records"))
+        return Opaque(Phrase("structured array"))
     return _parse_header(storage, key, text, 8 + width + length, size)
 
 
@@ -165,16 +180,32 @@ def _parse_header(
     shape = _parse_shape(found.get(b"shape"))
     descr, order = found.get(b"descr"), found.get(b"fortran_order")
     if rest != b"{}" or shape is None or descr is None or order is None:
-        raise storage.fault(key, Phrase("npy-header", found=text[:80]))
+        raise storage.fault(
+            key,
+            Phrase(
+                "expected a header with descr, fortran_order and shape, found {found}",
+                found=text[:80],
+            ),
+        )
     code = descr.decode("latin-1")
     dtype = array_dtype(code)
     if dtype is None:
         is_object = code.endswith("O")
-        return Opaque(Phrase("unread-objects") if is_object else Phrase("unread-dtype", dtype=code))
+        return Opaque(
+            Phrase("object array") if is_object else Phrase("array of type {dtype}", dtype=code)
+        )
     n_items = item_count(shape, dtype.itemsize)
     if n_items is None or n_items * dtype.itemsize != size - offset:
         left = max(size - offset, 0)
-        raise storage.fault(key, Phrase("array-bytes", shape=shape, dtype=dtype.name, found=left))
+        raise storage.fault(
+            key,
+            Phrase(
+                "expected {shape} {dtype}, found {found} bytes",
+                shape=axes(shape),
+                dtype=dtype.name,
+                found=left,
+            ),
+        )
     return _Header(dtype, shape, order == b"True", n_items, offset)
 
 
@@ -240,7 +271,7 @@ def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
 
 
 def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
-    return storage.fault(key, Phrase("npy-damaged", reason=printable(problem, 100)))
+    return storage.fault(key, Phrase(wording.NPY_DAMAGED, reason=printable(problem, 100)))
 
 
 def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> NDArray[Any]:
@@ -249,7 +280,9 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
     try:
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
-        raise storage.fault(key, Phrase("npy-memory", size=size)) from None
+        raise storage.fault(
+            key, Phrase("not enough memory: {size} bytes needed", size=size)
+        ) from None
     _fill(storage, key, flat, stream)
     try:
         return shaped(flat, header.shape, header.is_fortran)
@@ -265,6 +298,6 @@ def _fill(storage: StoredFile, key: str, flat: NDArray[Any], stream: IO[bytes]) 
     while done < size:
         chunk = stream.read(min(_CHUNK, size - done))
         if not chunk:
-            raise storage.fault(key, Phrase("npy-cut", expected=size, found=done))
+            raise storage.fault(key, Phrase(wording.NPY_CUT, expected=size, found=done))
         room[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
         done += len(chunk)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.values import Archive, Value
 from viewer.formats._archive.zip import MAX_RATIO, SMALL, Data, FileWindow
 from viewer.formats._source import Source
@@ -103,14 +104,19 @@ def open_archive(source: Source) -> Archive:
     if head.startswith(_NPY):
         return open_npy(source, _open_objects)
     if head.startswith(_LFS):
-        raise source.fault("F002.archive-pointer")
+        raise source.fault(
+            "F002.archive-pointer: expected a pickle, .npz or .npy file, found a Git LFS "
+            "pointer (`git lfs pull` fetches the file)"
+        )
     if _is_compressed(head):
         return _open_pickle(source, unpacked(source))
     if head.lstrip()[:1] in (b"{", b"["):
         return _open_json(source)
     if not is_archive(head):
         looks = source.looks_like() or "an unknown format"
-        raise source.fault("F002.archive", found=looks)
+        raise source.fault(
+            "F002.archive: expected a pickle, .npz or .npy file, found {found}", found=looks
+        )
     return _open_pickle(source, _pickle_data(source))
 
 
@@ -123,12 +129,12 @@ def _open_json(source: Source) -> Archive:
         whole = json.loads(text)
     except json.JSONDecodeError as problem:
         offset = len(text[: problem.pos].encode())
-        raise source.fault("F002.json", offset, reason=printable(problem.msg, 100)) from None
+        raise source.fault(wording.JSON, offset, reason=printable(problem.msg, 100)) from None
     except RecursionError:
-        raise source.fault("F002.json-nesting", deepest_place(text)) from None
+        raise source.fault(wording.JSON_NESTING, deepest_place(text)) from None
     except ValueError:  # decoding can raise no other error
         place = long_number_place(text)
-        raise source.fault("F002.capture-digits", place, most=MOST_DIGITS) from None
+        raise source.fault(wording.CAPTURE_DIGITS, place, most=MOST_DIGITS) from None
     return named_archive(source, "json", len(source.data), whole)
 
 
@@ -198,20 +204,39 @@ def unpacked(source: Source) -> bytes:
     head = source.peek(64)
     for name, kind in _UNSUPPORTED.items():
         if kind.match(head):
-            raise source.fault("F002.packed-method", method=name)
+            raise source.fault(
+                "F002.packed-method: expected a pickle compressed with zlib, gzip, bz2, xz or "
+                "lzma, found {method}: save it again by `joblib.dump(joblib.load(FILE), FILE, "
+                "compress=0)`",
+                method=name,
+            )
     method = next(name for name, kind in _KINDS.items() if kind.match(head))
     data, unpacker = source.data, _UNPACKERS[method]()
     most = min(source.max_size, max(SMALL, MAX_RATIO * len(data)))
     try:
         begin = _UNPACKERS[method]().decompress(data, 20)
         if begin and not _PICKLE_START.match(begin):
-            raise source.fault("F002.packed-kind", method=method, found=begin)
+            raise source.fault(
+                "F002.packed-kind: expected a pickle in the {method} data, found {found}",
+                method=method,
+                found=begin,
+            )
         found = unpacker.decompress(data, most + 1)
         if len(found) <= most and not unpacker.eof:
             raise EOFError("truncated")
     except _DAMAGE as problem:
         reason = printable(problem, 100)
-        raise source.fault("F002.packed", method=method, reason=reason) from None
+        raise source.fault(
+            "F002.packed: expected valid {method} data, found damaged data ({reason})",
+            method=method,
+            reason=reason,
+        ) from None
     if len(found) > most:
-        raise source.fault("F002.packed-size", method=method, most=most, size=len(data))
+        raise source.fault(
+            "F002.packed-size: expected at most {most} bytes in {size} bytes of {method} data, "
+            "found more",
+            method=method,
+            most=most,
+            size=len(data),
+        )
     return bytes(found)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive, describe
 from viewer.formats._source import Source
-from viewer.phrases import printable
+from viewer.phrases import listed, optional, printable
 
 
 def archive_format(source: Source, formats: Mapping[str, Collection[str]]) -> str:
@@ -32,23 +32,36 @@ def archive_format(source: Source, formats: Mapping[str, Collection[str]]) -> st
     if _is_video_mocap(archive):
         return "video_mocap"
     if not keys:
-        raise source.fault("F002.empty-archive")
+        raise source.fault("F002.empty-archive: expected a model, motion or pose, found no keys")
     if archive.kind == "npy" and keys == ("arr_0",) and archive.shape(keys[0]):
         shape = archive.shape(keys[0])
         known = next((text for sizes, text in _ARRAYS if shape[-len(sizes) :] == sizes), None)
         found = describe(archive.get(keys[0]))
         hint = Phrase(known) if known else ""
-        raise source.fault("F002.unnamed-array", found=found, hint=hint)
-    raise source.fault("F002.unknown-archive", found=[printable(key, 40) for key in keys])
+        raise source.fault(
+            "F002.unnamed-array: expected arrays with names, as in .npz or .pkl, found a "
+            "single array ({found}){hint}",
+            found=found,
+            hint=optional(", {}", hint),
+        )
+    raise source.fault(
+        "F002.unknown-archive: expected a model, motion or pose, found unknown keys: "
+        "{found} (viewer help formats lists what can be opened)",
+        found=listed([printable(key, 40) for key in keys], 12),
+    )
 
 
 # Arrays of text-to-motion work, by the sizes of their last axes.
 _ARRAYS = (
-    ((263,), "array-humanml"),
-    ((251,), "array-humanml"),
-    ((322,), "array-motionx"),
-    ((22, 3), "array-joints"),
-    ((21, 3), "array-joints"),
+    ((263,), wording.ARRAY_HUMANML),
+    ((251,), wording.ARRAY_HUMANML),
+    (
+        (322,),
+        "probably motions of Motion-X, which are not read: save its columns under the "
+        "names of SMPL-X (global_orient, body_pose, transl, betas …)",
+    ),
+    ((22, 3), wording.ARRAY_JOINTS),
+    ((21, 3), wording.ARRAY_JOINTS),
 )
 _OF_EASYMOCAP = ("Rh", "Th", "keypoints3d", "annots")
 

@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Part, Phrase
+from viewer.diagnostics import Part, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys, nearest_place
-from viewer.phrases import printable
+from viewer.phrases import axes, counted, printable
 from viewer.rig.arrays import Deferred
 
-_WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
-"""Suffixes of the keys of phrases about arrays, by numpy's kind letters."""
+_WANTED = {"biuf": "number", "iuf": "number", "iu": "integer", "SU": "string"}
+"""Names of the elements of arrays, by numpy's kind letters."""
 _DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
 _MAX_SIDE = 1 << 27  # maximum rows or columns of a sparse matrix; meshes have far fewer vertices
 _MAX_AXES = 32
@@ -65,11 +65,23 @@ class Sparse:
     def __post_init__(self) -> None:
         parts = (self.data, self.indices, self.indptr)
         if any(part.ndim != 1 for part in parts) or self.data.dtype.kind not in "biuf":
-            raise InvalidValueError(Phrase("sparse-shapes"))
+            raise InvalidValueError(
+                Phrase(
+                    "data, indices and index pointers of a sparse matrix must be one-dimensional"
+                )
+            )
         if self.indices.dtype.kind not in "iu" or self.indptr.dtype.kind not in "iu":
-            raise InvalidValueError(Phrase("sparse-indices"))
+            raise InvalidValueError(
+                Phrase("expected integer indices in a sparse matrix, found non-integers")
+            )
         if not all(0 <= side <= _MAX_SIDE for side in self.shape):
-            raise InvalidValueError(Phrase("sparse-size", most=_MAX_SIDE, shape=self.shape))
+            raise InvalidValueError(
+                Phrase(
+                    "expected at most {most} rows and columns, found {shape}",
+                    most=_MAX_SIDE,
+                    shape=axes(self.shape),
+                )
+            )
         if self.layout == "coo":
             self._check_indices(self.indices, self.shape[0])
             self._check_indices(self.indptr, self.shape[1])
@@ -81,9 +93,9 @@ class Sparse:
         if len(self.indptr) != along + 1:
             raise InvalidValueError(
                 Phrase(
-                    "sparse-starts",
+                    "expected {expected} index pointers in a sparse {shape} matrix, found {found}",
                     expected=along + 1,
-                    shape=self.shape,
+                    shape=axes(self.shape),
                     found=len(self.indptr),
                 )
             )
@@ -91,19 +103,39 @@ class Sparse:
         # Unsigned differences wrap around, so compare instead of subtracting.
         ordered = bool((self.indptr[1:] >= self.indptr[:-1]).all())
         if not ordered or int(self.indptr[0]) != 0 or int(self.indptr[-1]) != count:
-            raise InvalidValueError(Phrase("sparse-order", count=count))
+            raise InvalidValueError(
+                Phrase(
+                    "expected index pointers in ascending order from 0 to {count} in a sparse "
+                    "matrix, "
+                    "found them unsorted",
+                    count=count,
+                )
+            )
         self._check_indices(self.indices, across)
 
     def _check_indices(self, indices: NDArray[Any], across: int) -> None:
         """Check the rows or columns of all stored values."""
         count = len(self.data)
         if len(indices) != count:
-            raise InvalidValueError(Phrase("sparse-count", expected=count, found=len(indices)))
+            raise InvalidValueError(
+                Phrase(
+                    "expected {expected} indices in a sparse matrix, found {found}",
+                    expected=count,
+                    found=len(indices),
+                )
+            )
         if count == 0:
             return
         low, high = int(indices.min()), int(indices.max())
         if low < 0 or high >= across:
-            raise InvalidValueError(Phrase("sparse-range", last=across - 1, low=low, high=high))
+            raise InvalidValueError(
+                Phrase(
+                    "expected indices 0 to {last} in a sparse matrix, found {low} to {high}",
+                    last=across - 1,
+                    low=low,
+                    high=high,
+                )
+            )
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
         """Return row, column and value of every stored entry.
@@ -177,7 +209,7 @@ class Archive:
         """
         if key not in self._values:
             if key not in self.keys:
-                raise self.fault("F002.no-key", item=key)
+                raise self.fault("F002.no-key: {item}: key not found", item=key)
             self._values[key] = self._load(key)
         return self._values[key]
 
@@ -214,7 +246,7 @@ class Archive:
             value = self._listed(key)
         if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
             found = describe(self.get(key))
-            raise self.fault("F002.value", item=key, expected=_wanted(shape, kinds), found=found)
+            raise self.fault(wording.VALUE, item=key, expected=_wanted(shape, kinds), found=found)
         return _widened(value)
 
     def shape(self, key: str) -> tuple[int, ...]:
@@ -241,7 +273,7 @@ class Archive:
             if _fits(shape, value.shape):
                 return replace(value, data=_in_double(value.data))
             raise self.fault(
-                "F002.value", item=key, expected=_wanted(shape, "biuf"), found=describe(value)
+                wording.VALUE, item=key, expected=_wanted(shape, "biuf"), found=describe(value)
             )
         dense = self.array(key, (None, None) if shape is None else shape).values()
         rows, columns = np.nonzero(dense)
@@ -255,7 +287,11 @@ class Archive:
         """
         found = texts_in(self.objects(key))
         if len(found) != 1:
-            raise self.fault("F002.text", item=key, found=describe(self.get(key)))
+            raise self.fault(
+                "F002.text: {item}: expected a string, found {found}",
+                item=key,
+                found=describe(self.get(key)),
+            )
         return found[0]
 
     def objects(self, key: str) -> Value:
@@ -317,24 +353,28 @@ def describe(value: Value) -> Phrase:
     if isinstance(value, Deferred):
         return _described_array(value)
     if isinstance(value, Sparse):
-        return Phrase("found-sparse", shape=value.shape)
+        return Phrase("a sparse {shape} matrix", shape=axes(value.shape))
     if isinstance(value, Opaque):
-        return Phrase("found-unread", what=value.what)
+        return Phrase("an unsupported value ({what})", what=value.what)
     if isinstance(value, list | tuple):
-        return Phrase("found-list", n=len(value)) if value else Phrase("found-empty-list")
+        return Phrase("a list of length {n}", n=len(value)) if value else Phrase("an empty list")
     if isinstance(value, dict):
-        return Phrase("found-named", n=len(value)) if value else Phrase("found-no-named")
+        return (
+            Phrase("a dict of {n}", n=counted(len(value), "value"))
+            if value
+            else Phrase("an empty dict")
+        )
     if isinstance(value, bytes):
-        return Phrase("found-bytes", n=len(value))
+        return Phrase("{n} bytes", n=len(value))
     if value is None:
-        return Phrase("found-nothing")
-    return Phrase("found-value", value=printable(repr(value), 40))
+        return Phrase("None")
+    return Phrase("{value}", value=printable(repr(value), 40))
 
 
 def _described_array(array: Deferred) -> Phrase:
     if array.dtype.kind not in "SU":
-        return Phrase("found-array", shape=array.shape, dtype=array.dtype.name)
-    return Phrase("found-texts", shape=array.shape) if array.shape else Phrase("found-text")
+        return Phrase("{shape} {dtype}", shape=axes(array.shape), dtype=array.dtype.name)
+    return Phrase("{shape} strings", shape=axes(array.shape)) if array.shape else Phrase("a string")
 
 
 def texts_in(value: Value) -> list[str]:
@@ -351,11 +391,15 @@ def texts_in(value: Value) -> list[str]:
 
 def _wanted(shape: Axes | None, kinds: str) -> Phrase:
     if kinds not in _WANTED:
-        return Phrase("wanted-kind", shape=tuple(shape or ()), kinds=kinds)
-    noun = f"wanted-{_WANTED[kinds]}"
+        return Phrase("{shape} values of kind {kinds}", shape=axes(tuple(shape or ())), kinds=kinds)
+    noun = _WANTED[kinds]
     if shape is None:
-        return Phrase(f"{noun}-any")
-    return Phrase(noun, shape=tuple(shape)) if shape else Phrase(f"{noun}-single")
+        return Phrase(f"an array of {noun}s")
+    return (
+        Phrase(f"{{shape}} {noun}s", shape=axes(tuple(shape)))
+        if shape
+        else Phrase(f"a single {noun}")
+    )
 
 
 def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
@@ -461,5 +505,7 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
     if array.dtype.kind == "U" and array.size:
         last = int(array.reshape(-1).view(np.uint32).max())
         if last > _LAST_LETTER:
-            raise InvalidValueError(Phrase("array-letter", found=last))
+            raise InvalidValueError(
+                Phrase("invalid Unicode code point {found} in a string", found=last)
+            )
     return array

@@ -14,7 +14,8 @@ from contextlib import contextmanager
 from typing import IO, cast, overload
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import Source
@@ -67,20 +68,49 @@ class ZipDirectory:
         source, size = self.source, self.storage.size
         for name, count in Counter(map(key_of, self.members)).items():
             if count > 1:
-                raise source.fault("F002.npz-twice", item=printable(name, 60), found=count)
+                raise source.fault(
+                    "F002.npz-twice: {item}: expected a single entry with this name, found {found}",
+                    item=printable(name, 60),
+                    found=count,
+                )
         for member in self.members:
             name, method = printable(key_of(member), 60), member.compress_type
             if member.flag_bits & _ENCRYPTED:
-                raise source.fault("F002.npz-encrypted", item=name)
+                raise source.fault(
+                    "F002.npz-encrypted: {item}: expected stored or deflated data, found "
+                    "encrypted data",
+                    item=name,
+                )
             if method in _METHODS:
-                raise source.fault("F002.npz-method-name", item=name, method=_METHODS[method])
+                raise source.fault(
+                    "F002.npz-method-name: {item}: expected stored or deflated data, found "
+                    "{method}",
+                    item=name,
+                    method=_METHODS[method],
+                )
             if method not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise source.fault("F002.npz-method", item=name, method=method)
+                raise source.fault(
+                    "F002.npz-method: {item}: expected stored or deflated data, found compression "
+                    "method {method}",
+                    item=name,
+                    method=method,
+                )
         total = sum(member.file_size for member in self.members)
         if total > source.max_size:
-            raise source.fault("F001.too-large", most=source.max_size, size=total)
+            raise source.fault(
+                wording.TOO_LARGE,
+                most=source.max_size,
+                size=total,
+                remedy=Remedy("", " (see --max-size)"),
+            )
         if total > max(SMALL, MAX_RATIO * size):
-            raise source.fault("F002.npz-ratio", most=MAX_RATIO, found=total, size=size)
+            raise source.fault(
+                "F002.npz-ratio: expected a compression ratio of at most {most}, found {found} "
+                "bytes in {size}",
+                most=MAX_RATIO,
+                found=total,
+                size=size,
+            )
 
 
 @contextmanager
@@ -94,7 +124,10 @@ def open_directory(source: Source) -> Iterator[ZipDirectory]:
         with storage.open() as file, zipfile.ZipFile(file) as archive:
             yield ZipDirectory(source, storage, archive, archive.infolist())
     except DAMAGE as problem:
-        raise source.fault("F002.npz", reason=printable(problem, 100)) from None
+        raise source.fault(
+            "F002.npz: expected a valid .npz file, found a damaged one ({reason})",
+            reason=printable(problem, 100),
+        ) from None
 
 
 class _Reader(io.BufferedReader):
@@ -150,13 +183,15 @@ class StoredFile:
         status = os.fstat(file.fileno())
         if (status.st_size, status.st_mtime_ns) != self._stamp:
             file.close()
-            raise FormatError(Diagnostic("F002.changed", self.path))
+            raise FormatError(
+                Diagnostic("F002.changed: changed since it was opened: open it again", self.path)
+            )
         return file
 
     def fault(self, key: str, problem: Phrase) -> FormatError:
         """Return an error that states the file and the key."""
         values = {"item": printable(key, 60), "problem": problem}
-        return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
+        return FormatError(Diagnostic(wording.ARCHIVE_VALUE, self.path, values=values))
 
 
 def _reason(problem: Exception) -> object:
@@ -209,7 +244,9 @@ class FileWindow:
             while start < stop:
                 piece = file.read(min(_PIECE, stop - start))
                 if not piece:
-                    raise self._storage.fault("", Phrase("npy-cut", expected=stop, found=start))
+                    raise self._storage.fault(
+                        "", Phrase(wording.NPY_CUT, expected=stop, found=start)
+                    )
                 pieces.append(piece)
                 start += len(piece)
         return b"".join(pieces)

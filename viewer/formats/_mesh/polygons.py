@@ -194,7 +194,15 @@ def filled_normals(
         places = np.flatnonzero(zero)
         first = int(places[0])
         offset = source.offset_of("normals", first) if source.knows("normals") else None
-        source.warn("M007.computed", offset, 1, "positions", places, n=len(places), vertex=first)
+        source.warn(
+            "M007.computed: {n} (first: vertex {vertex}): recomputed from the triangles",
+            offset,
+            1,
+            "positions",
+            places,
+            n=counted(len(places), "zero-length normal"),
+            vertex=first,
+        )
     missing = zero | np.isnan(longest)
     if not missing.any():
         return normals
@@ -205,7 +213,7 @@ def polygon_text(counts: NDArray[np.integer], n_triangles: int) -> str:
     """Return polygon counts by size: ``"2 quads, 1 with 5 or more corners"``."""
     sizes = [counted(int((counts == size).sum()), name) for size, name in _SIZES.items()]
     large = int((counts > 4).sum())
-    parts = [text for text in sizes if not text.startswith("0 ")]
+    parts = [str(text) for text in sizes if not text.startswith("0 ")]
     parts += [f"{large} with 5 or more corners"] * (large > 0)
     return f"{', '.join(parts)}: {counted(n_triangles, 'triangle')} in all"
 

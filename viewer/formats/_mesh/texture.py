@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import read_bytes
 from viewer.formats._references import referenced_path, refused_text
@@ -19,13 +20,18 @@ def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | N
     """
     path = referenced_path(source.path.parent, name)
     if path is None:
-        source.warn("F005.texture-refused", offset, name=name, reason=refused_text(name))
+        source.warn(
+            "F005.texture-refused: texture {name} {reason}",
+            offset,
+            name=name,
+            reason=refused_text(name),
+        )
         return None
     source.also_read.append(path)
     try:
         return decode_picture(path, read_bytes(path))
     except FormatError as problem:
-        source.warn("F005.texture", offset, problem=problem.diagnostic)
+        source.warn(wording.TEXTURE, offset, problem=problem.diagnostic)
         return None
 
 

@@ -19,13 +19,14 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import item_count
 from viewer.formats._archive.zip import Data
 from viewer.formats._pickle import names
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.formats._source import InvalidValueError, Source
+from viewer.phrases import axes, listed, quoted
 
 # Maximum number of items; a body model needs a few hundred, a motion in plain lists about 100,000.
 # Results of trackers, which write a dict per frame and person, need one for every eight bytes.
@@ -90,13 +91,17 @@ class Machine(pickle._Unpickler):
             while (code := self.next_step()) != _STOP:
                 step = _STEPS.get(code)
                 if step is None:
-                    raise self.fail(Phrase("pickle-step", found=bytes([code])))
+                    raise self.fail(
+                        Phrase(
+                            "expected a pickle opcode, found {found}", found=quoted(bytes([code]))
+                        )
+                    )
                 step(self)
             return self.stack.pop()
         except UnicodeError:
-            raise self.fail(Phrase("pickle-bytes")) from None
+            raise self.fail(Phrase(wording.PICKLE_BYTES)) from None
         except InvalidValueError as problem:
-            raise self.source.fault("F002.pickle", problem=problem.problem) from None
+            raise self.source.fault("F002.pickle: {problem}", problem=problem.problem) from None
         except _DAMAGE:
             raise self.misfit() from None
 
@@ -113,7 +118,9 @@ class Machine(pickle._Unpickler):
         """Deduct a number of items from the budget; reject a pickle that exceeds it."""
         self._budget -= count
         if self._budget < 0:
-            raise self.fail(Phrase("pickle-steps", most=self._most))
+            raise self.fail(
+                Phrase("expected at most {most} opcodes in a pickle, found more", most=self._most)
+            )
 
     def nested(self, data: Data, start: int, end: int) -> Machine:
         """Return a machine for a pickle inside this one; it continues with the same budget.
@@ -121,7 +128,9 @@ class Machine(pickle._Unpickler):
         Raises ``FormatError`` if pickles are nested too deeply.
         """
         if self.depth >= _DEEPEST:
-            raise self.fail(Phrase("pickle-nested", most=_DEEPEST))
+            raise self.fail(
+                Phrase("expected at most {most} nested pickles, found more", most=_DEEPEST)
+            )
         inner = Machine(self.source, data, start, end)
         inner.depth, inner._budget, inner._most = self.depth + 1, self._budget, self._most
         return inner
@@ -164,9 +173,17 @@ class Machine(pickle._Unpickler):
         start = self.at
         end = self.data.find(b"\n", start, self.end)
         if end < 0:
-            raise self.fail(Phrase("pickle-line-end"))
+            raise self.fail(
+                Phrase("expected the end of a line, found the end of the file (truncated?)")
+            )
         if longest is not None and end - start > longest:
-            raise self.fail(Phrase("pickle-line", most=longest, found=end - start))
+            raise self.fail(
+                Phrase(
+                    "expected at most {most} characters in a line, found {found}",
+                    most=longest,
+                    found=end - start,
+                )
+            )
         self.at = end + 1
         return start, end
 
@@ -174,19 +191,35 @@ class Machine(pickle._Unpickler):
 
     def fail(self, problem: Phrase) -> FormatError:
         """Return an error with the offset of the current opcode."""
-        return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
+        return self.source.fault(
+            "F002.pickle-step: {problem} at byte {at}", problem=problem, at=self._step_at
+        )
 
     def misfit(self) -> FormatError:
         """Return the error for an opcode that does not fit the values before it."""
-        return self.fail(Phrase("pickle-misfit", found=bytes([self.data[self._step_at]])))
+        return self.fail(
+            Phrase(
+                "expected an opcode that fits the values before it, found {found}",
+                found=quoted(bytes([self.data[self._step_at]])),
+            )
+        )
 
     def cut_short(self, wanted: int, found: int) -> FormatError:
         """Return the error for a length that exceeds the rest of the file."""
-        return self.fail(Phrase("pickle-cut", expected=wanted, found=found))
+        return self.fail(
+            Phrase(
+                "expected {expected} more bytes, found {found} (truncated?)",
+                expected=wanted,
+                found=found,
+            )
+        )
 
     def damaged_line_ends(self) -> FormatError:
         """Return the error for a file damaged by a text-mode transfer."""
-        return self.source.fault("F002.pickle-line-ends")
+        return self.source.fault(
+            "F002.pickle-line-ends: expected a pickle, found Windows line endings: damaged in "
+            "transfer, download it again in binary mode"
+        )
 
     # What the unpickler would import, make or load.
 
@@ -197,7 +230,7 @@ class Machine(pickle._Unpickler):
     def persistent_load(self, pid: object) -> object:
         """Replace a persistent id by its value, if files of this kind define one."""
         if self.persistent is None:
-            raise InvalidValueError(Phrase("pickle-refused", found=Phrase("noun-persistent")))
+            raise InvalidValueError(Phrase(wording.PICKLE_REFUSED, found=Phrase("a persistent id")))
         return self.persistent(pid)
 
     def _instantiate(self, klass: object, args: list[object]) -> None:
@@ -213,7 +246,7 @@ def _span(width: int, coding: str | None = None, *, is_signed: bool = False) -> 
 
 def _refused(key: str) -> _Step:
     def refuse(machine: Machine) -> None:
-        raise InvalidValueError(Phrase("pickle-refused", found=Phrase(key)))
+        raise InvalidValueError(Phrase(wording.PICKLE_REFUSED, found=Phrase(key)))
 
     return refuse
 
@@ -221,7 +254,7 @@ def _refused(key: str) -> _Step:
 def _protocol(machine: Machine) -> None:
     protocol = machine.number(1)
     if protocol > _LAST_PROTOCOL:
-        raise machine.fail(Phrase("pickle-protocol", found=protocol))
+        raise machine.fail(Phrase("expected pickle protocol 0 to 5, found {found}", found=protocol))
 
 
 def _frame(machine: Machine) -> None:
@@ -233,7 +266,13 @@ def _frame(machine: Machine) -> None:
 def _long_integer(machine: Machine) -> None:
     size = machine.number(4, is_signed=True)
     if not 0 <= size <= _MAX_INTEGER:
-        raise machine.fail(Phrase("pickle-long", most=_MAX_INTEGER, found=size))
+        raise machine.fail(
+            Phrase(
+                "expected an integer of at most {most} bytes, found {found}",
+                most=_MAX_INTEGER,
+                found=size,
+            )
+        )
     machine.append(machine.number(size, is_signed=True))
 
 
@@ -249,7 +288,9 @@ def _quoted(machine: Machine) -> None:
         return
     # Pairs of backslashes are matched first, so that every other backslash begins an escape.
     if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
-        raise machine.fail(Phrase("pickle-escape"))
+        raise machine.fail(
+            Phrase("expected a string as written by Python 2, found an unknown escape")
+        )
     data = codecs.escape_decode(text[1:-1])[0]
     machine.append(Span(data, 0, len(data), "latin-1"))
 
@@ -302,7 +343,9 @@ def _loaded_bytes(machine: Machine, function: StandIn, arguments: object) -> obj
         case (Span(coding=None | "latin-1") as data,) if machine.load_bytes is not None:
             return machine.load_bytes(machine, data)
     found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
-    raise InvalidValueError(Phrase("pickle-arguments", name=function.name, found=found))
+    raise InvalidValueError(
+        Phrase(wording.PICKLE_ARGUMENTS, name=function.name, found=listed(found))
+    )
 
 
 def _new(machine: Machine) -> None:
@@ -346,9 +389,9 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
     kind, padding = state.get("subclass"), state.get("numpy_array_alignment_bytes")
     is_usual = isinstance(kind, StandIn) and kind.role == "ndarray"
     if not is_usual or not is_sizes(shape) or not isinstance(dtype, Dtype):
-        raise InvalidValueError(Phrase("joblib-wrapper", name=wrapper.of.name))
+        raise InvalidValueError(Phrase(wording.JOBLIB_WRAPPER, name=wrapper.of.name))
     if not isinstance(order, Span) or order.raw() not in (b"C", b"F"):
-        raise InvalidValueError(Phrase("joblib-wrapper", name=wrapper.of.name))
+        raise InvalidValueError(Phrase(wording.JOBLIB_WRAPPER, name=wrapper.of.name))
     if dtype.code.startswith("O"):
         return _objects(machine)
     if padding is not None:
@@ -358,7 +401,13 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
     if found is None or n_items is None:
         # The size of the elements is unknown, and therefore also the position at which the pickle
         # continues.
-        raise InvalidValueError(Phrase("joblib-dtype", dtype=dtype.what(), shape=shape))
+        raise InvalidValueError(
+            Phrase(
+                "expected an array of numbers or strings, found {shape} of {dtype}",
+                dtype=dtype.what(),
+                shape=axes(shape),
+            )
+        )
     start = machine.skip(n_items * found.itemsize)
     array = Array()
     array.fill(shape, dtype, order.raw() == b"F", Span(machine.data, start, machine.at))
@@ -372,7 +421,7 @@ def _objects(machine: Machine) -> object:
     machine.at = inner.at
     machine.rejoin(inner)
     if not isinstance(found, Array):
-        raise InvalidValueError(Phrase("joblib-objects"))
+        raise InvalidValueError(Phrase("expected an array of objects, found a different value"))
     return found
 
 
@@ -409,7 +458,7 @@ _STEPS: dict[int, Callable[[Any], None]] = {
     0x81: _new,
     0x92: _new_with_keywords,
     # Opcodes that reach outside the file
-    ord("P"): _refused("noun-persistent"),
-    **dict.fromkeys((0x82, 0x83, 0x84), _refused("noun-extension")),
-    **dict.fromkeys((0x97, 0x98), _refused("noun-buffer")),
+    ord("P"): _refused("a persistent id"),
+    **dict.fromkeys((0x82, 0x83, 0x84), _refused("an extension code")),
+    **dict.fromkeys((0x97, 0x98), _refused("an out-of-band buffer")),
 }

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeGuard
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.formats._archive.values import Opaque
 from viewer.formats._pickle.tensors import CALLS as TORCH_CALLS
 from viewer.formats._pickle.tensors import ROLES as TORCH_ROLES
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.formats._source import InvalidValueError
-from viewer.phrases import printable
+from viewer.phrases import listed, printable
 
 __all__ = ["SPARSE", "as_key", "build", "call", "create", "find"]
 
@@ -87,9 +87,21 @@ def find(module: str, name: str) -> StandIn:
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
     role = _ROLES.get((module, name))
     if module.startswith("joblib.numpy_pickle") and name in _OLD_WRAPPERS:
-        raise InvalidValueError(Phrase("joblib-old", name=full))
+        raise InvalidValueError(
+            Phrase(
+                "expected arrays in the file, found {name}, which stores them in separate files: "
+                "load and save it again with joblib 0.10 or later",
+                name=full,
+            )
+        )
     if role is None:
-        raise InvalidValueError(Phrase("pickle-global", name=full))
+        raise InvalidValueError(
+            Phrase(
+                'expected arrays and plain data, found the global "{name}", which is not allowed; '
+                "nothing was executed",
+                name=full,
+            )
+        )
     return StandIn(full, role)
 
 
@@ -99,7 +111,11 @@ def call(function: object, arguments: object) -> tuple[object, int]:
     ``function``: a ``StandIn``; anything else is refused.
     """
     if not isinstance(function, StandIn) or function.role not in (*_CALLS, *TORCH_CALLS):
-        raise InvalidValueError(Phrase("pickle-call", found=noun(function)))
+        raise InvalidValueError(
+            Phrase(
+                "expected a call of a known function, found a call of {found}", found=noun(function)
+            )
+        )
     if isinstance(arguments, tuple) and len(arguments) <= _MOST_ARGUMENTS:
         made = _called(function.role, arguments)
         if made is not _WRONG:
@@ -107,7 +123,9 @@ def call(function: object, arguments: object) -> tuple[object, int]:
             sizes = [len(each) for each in arguments if isinstance(each, list | Span)]
             return made, sum(sizes) if copies else 0
     found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
-    raise InvalidValueError(Phrase("pickle-arguments", name=function.name, found=found))
+    raise InvalidValueError(
+        Phrase(wording.PICKLE_ARGUMENTS, name=function.name, found=listed(found))
+    )
 
 
 def _called(role: str, arguments: tuple[object, ...]) -> object:
@@ -120,7 +138,9 @@ def _called(role: str, arguments: tuple[object, ...]) -> object:
 def create(of: object, arguments: object) -> Instance:
     """Return a new object of a class, whose state is set later by ``build``."""
     if not isinstance(of, StandIn) or of.role not in _CLASSES or arguments != ():
-        raise InvalidValueError(Phrase("pickle-create", found=noun(of)))
+        raise InvalidValueError(
+            Phrase("expected a new instance of a known class, found {found}", found=noun(of))
+        )
     return Instance(of)
 
 
@@ -132,11 +152,17 @@ def build(target: object, state: object) -> None:
         _build_dtype(target, state)
     elif isinstance(target, Instance):
         if not isinstance(state, dict):
-            problem = Phrase("pickle-state", name=target.of.name, found=noun(state))
+            problem = Phrase(
+                "expected a dict as the state of {name}, found {found}",
+                name=target.of.name,
+                found=noun(state),
+            )
             raise InvalidValueError(problem)
         target.state = state
     else:
-        raise InvalidValueError(Phrase("pickle-build", found=noun(target)))
+        raise InvalidValueError(
+            Phrase("expected an object that accepts a state, found {found}", found=noun(target))
+        )
 
 
 def as_key(value: object) -> str | bytes | int:
@@ -152,7 +178,9 @@ def as_key(value: object) -> str | bytes | int:
         return value.raw() if value.coding is None else value.text()
     if type(value) is int and abs(value) < _LARGEST_KEY:
         return value
-    raise InvalidValueError(Phrase("pickle-as-key", found=noun(value)))
+    raise InvalidValueError(
+        Phrase("expected a string or a number as a key, found {found}", found=noun(value))
+    )
 
 
 def _is_text(value: object, text: str) -> bool:
@@ -287,7 +315,9 @@ def _build_array(target: Array, state: object) -> None:
                 target.what, target.items = dtype.what(), payload
                 target.shape, target.is_fortran = shape, bool(order)
                 return
-    raise InvalidValueError(Phrase("pickle-array-state", found=noun(state)))
+    raise InvalidValueError(
+        Phrase("expected the state of an array, found {found}", found=noun(state))
+    )
 
 
 def _build_dtype(target: Dtype, state: object) -> None:
@@ -295,11 +325,15 @@ def _build_dtype(target: Dtype, state: object) -> None:
         case (3 | 4, order, sub, names, fields, size, int(), int(), *_) if len(state) <= 9:
             letter = _short(order)
             if letter is None or letter not in _ORDERS:
-                raise InvalidValueError(Phrase("pickle-byte-order", found=noun(order)))
+                raise InvalidValueError(
+                    Phrase("expected the byte order of an array, found {found}", found=noun(order))
+                )
             if any(part is not None for part in (sub, names, fields)):
                 target.code = "V"  # records may have any size
             target.order = letter
             dtype = target.dtype()
             if dtype is None or size in (-1, dtype.itemsize):
                 return
-    raise InvalidValueError(Phrase("pickle-dtype-state", found=noun(state)))
+    raise InvalidValueError(
+        Phrase("expected the state of a dtype, found {found}", found=noun(state))
+    )

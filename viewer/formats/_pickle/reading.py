@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Sparse, Value
 from viewer.formats._pickle.machine import Machine
@@ -33,7 +33,7 @@ from viewer.formats._pickle.tensors import Storage, Tensor
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.formats._source import InvalidValueError, Source
 from viewer.formats._text.json_places import Keys
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Deferred
 
 
@@ -41,7 +41,9 @@ def warn_of_rest(machine: Machine) -> None:
     """Record a note about bytes after the end of a pickle."""
     rest = machine.end - machine.at
     if rest:
-        machine.source.warn("F006.pickle-rest", n=rest)
+        machine.source.warn(
+            "F006.pickle-rest: ignored {n} after the end of the pickle", n=counted(rest, "byte")
+        )
 
 
 def named_archive(source: Source, kind: str, size: int, whole: object) -> Archive:
@@ -145,13 +147,18 @@ def _named(source: Source, whole: object) -> dict[str, object]:
     """Return the values by name; numbers are names only of dicts, such as people."""
     found = _items(whole)
     if found is None:
-        raise source.fault("F002.pickle-named", found=noun(whole))
+        raise source.fault(
+            "F002.pickle-named: expected a dict with string keys, found {found}", found=noun(whole)
+        )
     is_lost = any(isinstance(value, dict | list | tuple) for value in found.values())
     for key, value in found.items():
         if is_lost and value is None:
             continue  # a frame without people
         if isinstance(key, int) and not isinstance(value, dict | list | tuple):
-            raise source.fault("F002.pickle-key", found=key)
+            raise source.fault(
+                "F002.pickle-key: expected a dict with string keys, found the key {found}",
+                found=key,
+            )
     return _strings(source, found)
 
 
@@ -161,7 +168,10 @@ def _strings(source: Source, found: Mapping[str | bytes | int, object]) -> dict[
     for key, value in found.items():
         name = key.decode("latin-1") if isinstance(key, bytes) else str(key)
         if name in values:
-            raise source.fault("F002.pickle-twice", item=printable(name, 60))
+            raise source.fault(
+                "F002.pickle-twice: {item}: expected a single value with this name, found two",
+                item=printable(name, 60),
+            )
         values[name] = value
     return values
 
@@ -191,7 +201,7 @@ def resolve(path: Path, size: int, key: str, value: object) -> Value:
     try:
         return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)
     except _EndlessError:
-        return Opaque(Phrase("unread-endless"))
+        return Opaque(Phrase("circular data"))
 
 
 class _Resolver:
@@ -200,7 +210,7 @@ class _Resolver:
 
     def fail(self, problem: Phrase) -> FormatError:
         values = {"item": printable(self.key, 60), "problem": problem}
-        return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
+        return FormatError(Diagnostic(wording.ARCHIVE_VALUE, self.path, values=values))
 
     def value(self, value: object, depth: int) -> Value:
         self.budget -= 1
@@ -225,7 +235,7 @@ class _Resolver:
         try:
             return span.text()
         except UnicodeError:
-            raise self.fail(Phrase("pickle-bytes")) from None
+            raise self.fail(Phrase(wording.PICKLE_BYTES)) from None
 
     def thing(self, value: object) -> Deferred | Sparse | Opaque:
         if isinstance(value, Array):
@@ -233,24 +243,24 @@ class _Resolver:
         if isinstance(value, Tensor):
             return value.deferred(self.fail)
         if isinstance(value, Storage):
-            return Opaque(Phrase("unread-storage"))
+            return Opaque(Phrase("storage of a tensor"))
         if isinstance(value, Instance) and value.of.role == "joblib":
-            return Opaque(Phrase("unread-name", name=value.of.name))
+            return Opaque(Phrase("{name}", name=value.of.name))
         if isinstance(value, Instance) and value.of.role in SPARSE:
             return self.sparse(value)
         if isinstance(value, Instance):
             return self.expression(value, 0)
         if isinstance(value, StandIn | Dtype):
             if isinstance(value, Dtype):
-                return Opaque(Phrase("unread-element-type"))
-            return Opaque(Phrase("unread-name", name=value.name))
-        raise self.fail(Phrase("pickle-other"))
+                return Opaque(Phrase("element type"))
+            return Opaque(Phrase("{name}", name=value.name))
+        raise self.fail(Phrase("unexpected object in the pickle"))
 
     def sparse(self, matrix: Instance) -> Sparse:
         state = matrix.state or {}
         shape = state.get("_shape", state.get("shape"))
         if not is_sizes(shape) or len(shape) != 2:
-            raise self.fail(Phrase("sparse-no-shape"))
+            raise self.fail(Phrase("expected a sparse matrix with a shape, found none"))
         names = ("row", "col") if matrix.of.role == "coo" else ("indices", "indptr")
         coordinates = state.get("coords")  # rows and columns, since SciPy 1.13
         if names[0] == "row" and isinstance(coordinates, tuple) and len(coordinates) == 2:
@@ -265,7 +275,7 @@ class _Resolver:
         array = state.get(name)
         later = array.deferred(self.fail) if isinstance(array, Array) else None
         if later is None:
-            raise self.fail(Phrase("sparse-no-part", part=name))
+            raise self.fail(Phrase("expected a sparse matrix with {part}, found none", part=name))
         return later.values()
 
     def expression(self, value: Instance, depth: int) -> Deferred | Opaque:
@@ -273,9 +283,9 @@ class _Resolver:
         state = value.state or {}
         name = value.of.name
         if depth > _DEEPEST_EXPRESSION:
-            return Opaque(Phrase("unread-expression-endless", name=name))
+            return Opaque(Phrase("circular {name} expression", name=name))
         if value.of.role == "expression":
-            return Opaque(Phrase("unread-expression", name=name))
+            return Opaque(Phrase("{name} expression", name=name))
         inner = state.get("x" if value.of.role == "Ch" else "a")
         if isinstance(inner, Instance) and inner.of.role not in SPARSE:
             found: Deferred | Opaque = self.expression(inner, depth + 1)
@@ -285,7 +295,7 @@ class _Resolver:
             number = np.array(inner)
             found = Deferred((), number.dtype, lambda: number)
         else:
-            found = Opaque(Phrase("unread-chumpy", name=name))
+            found = Opaque(Phrase("{name} without values", name=name))
         if isinstance(found, Opaque) or value.of.role == "Ch":
             return found
         return self.selection(state, found, name)
@@ -297,12 +307,14 @@ class _Resolver:
         idxs, shape = state.get("idxs"), state.get("preferred_shape")
         chosen = idxs.deferred(self.fail) if isinstance(idxs, Array) else None
         if chosen is None or chosen.dtype.kind not in "iu" or whole.dtype.kind not in _NUMBERS:
-            return Opaque(Phrase("unread-indices", name=name))
+            return Opaque(Phrase("{name} with unsupported indices", name=name))
         wanted = shape if is_sizes(shape) else chosen.shape
         count, found = math.prod(wanted), math.prod(chosen.shape)
         if count != found:
             values = {"expected": printable(count, 40), "name": name, "found": found}
-            raise self.fail(Phrase("pickle-selection", **values))
+            raise self.fail(
+                Phrase("expected {expected} indices in {name}, found {found}", **values)
+            )
         return Deferred(wanted, whole.dtype, partial(self.take, whole, chosen, wanted))
 
     def take(self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]) -> NDArray[Any]:
@@ -310,6 +322,11 @@ class _Resolver:
         if indices.size and (int(indices.min()) < 0 or int(indices.max()) >= len(flat)):
             low, high = int(indices.min()), int(indices.max())
             raise self.fail(
-                Phrase("pickle-selection-range", last=len(flat) - 1, low=low, high=high)
+                Phrase(
+                    "expected indices 0 to {last}, found {low} to {high}",
+                    last=len(flat) - 1,
+                    low=low,
+                    high=high,
+                )
             )
         return flat.take(indices.reshape(-1).astype(np.intp)).reshape(shape)

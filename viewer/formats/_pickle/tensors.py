@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.formats._archive.values import item_count, shaped
 from viewer.formats._archive.zip import MAX_RATIO, SMALL
 from viewer.formats._pickle.values import Span, StandIn, is_sizes
 from viewer.formats._source import InvalidValueError
+from viewer.phrases import axes, counted
 from viewer.rig.arrays import Deferred
 
 _STORAGES = {
@@ -67,7 +68,7 @@ class Storage:
         """Return the elements as a type of this size, as stored."""
         if self._bytes is None:
             if self.load is None:
-                raise InvalidValueError(Phrase("tensor-no-storage"))
+                raise InvalidValueError(Phrase(wording.TENSOR_NO_STORAGE))
             self._bytes = np.frombuffer(self.load(), np.uint8)
         dtype = _stored(code).newbyteorder(self.order)
         whole = len(self._bytes) // dtype.itemsize * dtype.itemsize
@@ -92,10 +93,25 @@ class Tensor:
             (side - 1) * stride for side, stride in zip(self.shape, self.strides, strict=True)
         )
         if n_items is None or (n_items and last >= room) or self.offset > room:
-            values = {"shape": self.shape, "strides": self.strides, "offset": self.offset}
-            raise InvalidValueError(Phrase("tensor-range", **values, found=room))
+            values = {"shape": axes(self.shape), "strides": self.strides, "offset": self.offset}
+            raise InvalidValueError(
+                Phrase(
+                    "expected a tensor within {found} of its storage, found {shape} with strides "
+                    "{strides} from element {offset}",
+                    **values,
+                    found=counted(room, "element"),
+                )
+            )
         if n_items * size > max(SMALL, MAX_RATIO * self.storage.size):
-            raise InvalidValueError(Phrase("tensor-ratio", shape=self.shape, most=MAX_RATIO))
+            raise InvalidValueError(
+                Phrase(
+                    "expected a tensor of at most {most} times the size of its storage, found "
+                    "{shape} "
+                    "elements",
+                    shape=axes(self.shape),
+                    most=MAX_RATIO,
+                )
+            )
 
     def deferred(self, fail: Callable[[Phrase], Exception]) -> Deferred:
         """Return the deferred array; bfloat16, which numpy lacks, as float32."""

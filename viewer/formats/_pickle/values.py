@@ -21,6 +21,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import array_dtype, item_count, shaped
 from viewer.formats._archive.zip import Data
 from viewer.formats._source import InvalidValueError
+from viewer.phrases import axes as axes_text
 from viewer.rig.arrays import Deferred
 
 _MOST_AXES = 32
@@ -121,8 +122,8 @@ class Dtype:
 
     def what(self) -> Phrase:
         """Return the reason why it is not evaluated."""
-        known = {"O": Phrase("unread-objects"), "V": Phrase("unread-records")}
-        return known.get(self.code[:1]) or Phrase("unread-dtype", dtype=self.code[:20])
+        known = {"O": Phrase("object array"), "V": Phrase("structured array")}
+        return known.get(self.code[:1]) or Phrase("array of type {dtype}", dtype=self.code[:20])
 
 
 @dataclass(slots=True, eq=False)
@@ -139,7 +140,7 @@ class Array:
     """Order of the stored axes in the array."""
     items: list[object] | None = None
     """Objects of an object array, which is not evaluated otherwise."""
-    what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
+    what: Phrase = field(default_factory=lambda: Phrase("uninitialised array"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
         """Set shape and values, whose sizes in bytes must agree.
@@ -155,7 +156,12 @@ class Array:
         if n_items is None or n_items * found.itemsize != len(packed):
             size = len(packed)
             raise InvalidValueError(
-                Phrase("array-bytes", shape=shape, dtype=found.name, found=size)
+                Phrase(
+                    "expected {shape} {dtype}, found {found} bytes",
+                    shape=axes_text(shape),
+                    dtype=found.name,
+                    found=size,
+                )
             )
         self.shape, self.dtype, self.payload = shape, found, packed
         self.is_fortran = is_fortran
@@ -175,7 +181,9 @@ class Array:
         Raises ``InvalidValueError`` if a string contains invalid code points.
         """
         if self.payload is None or self.dtype is None:
-            raise InvalidValueError(Phrase("array-not-numbers", found=self.what))
+            raise InvalidValueError(
+                Phrase("expected an array of numbers, found {found}", found=self.what)
+            )
         flat = np.empty(0, self.dtype)
         if len(self.payload):  # numpy cannot create a view of zero bytes
             n_items = len(self.payload) // self.dtype.itemsize
@@ -210,15 +218,15 @@ def noun(value: object) -> Phrase:
     ('a list', 'numpy.ndarray')
     """
     if isinstance(value, StandIn):
-        return Phrase("noun", name=value.name)
+        return Phrase("{name}", name=value.name)
     if isinstance(value, Instance):
-        return Phrase("noun-object", name=value.of.name)
+        return Phrase("an instance of {name}", name=value.of.name)
     if isinstance(value, Span):
-        return Phrase("noun-bytes") if value.coding is None else Phrase("noun-text")
+        return Phrase("bytes") if value.coding is None else Phrase("a string")
     if isinstance(value, bool | int | float):
-        return Phrase("noun-number")
+        return Phrase("a number")
     if value is None:
-        return Phrase("noun-nothing")
+        return Phrase("None")
     if isinstance(value, Array):
-        return Phrase("noun-array")
-    return Phrase("noun-other", kind=type(value).__name__.lower())
+        return Phrase("an array")
+    return Phrase("a {kind}", kind=type(value).__name__.lower())

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics.remedy import Remedy
 from viewer.formats._scene_graph.bindings import bind_rigid, bind_skins, inverse_binds
 from viewer.formats._scene_graph.content import REACH, NodeFile, with_ancestors
 from viewer.formats._scene_graph.grouping import Members, group_nodes, is_skinned, scene_order
@@ -25,6 +26,8 @@ from viewer.formats._scene_graph.surfaces import (
     used_materials,
 )
 from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
+from viewer.phrases import agree, counted, quoted, rounded
+from viewer.phrases import listed as listed_text
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.file_record import FileRecord, VrmRecord
@@ -64,8 +67,14 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     if not groups:
         contents = file.contents()
         if contents and not source.diagnostics.errors:
-            raise source.fault("F008.contents", contents=contents)
-        raise source.fault("F002.no-figure")
+            raise source.fault(
+                "F008.contents: expected triangles, a skin or a hierarchy of nodes, found only "
+                "{contents}",
+                contents=listed_text(contents),
+            )
+        raise source.fault(
+            "F002.no-figure: expected meshes, skins or a hierarchy of nodes, found nothing to show"
+        )
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
     order = scene_order(file) if file.cameras else []
@@ -90,7 +99,10 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
 
     views, left_out = views_of(file.tree, order, file.cameras, carriers, animations)
     if left_out:
-        source.warn("F007.orthographic", names=left_out)
+        source.warn(
+            "F007.orthographic: orthographic cameras are not supported: {names}",
+            names=listed_text(left_out),
+        )
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
 
 
@@ -100,7 +112,11 @@ def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> No
     meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
     count = sum(sizes[mesh] for mesh in meshes)
     if count > _MOST_VERTICES:
-        raise source.fault("F002.many-vertices", most=_MOST_VERTICES, found=count)
+        raise source.fault(
+            "F002.many-vertices: expected at most {most} vertices, found {found} over all nodes",
+            most=_MOST_VERTICES,
+            found=count,
+        )
 
 
 def _above(file: NodeFile, cameras: set[int]) -> set[int]:
@@ -161,7 +177,13 @@ def _worlds(joints: Joints, source: Source) -> Floats:
     if far.any():
         joint = int(far.argmax())
         found = worlds[joint].flat[int((~(np.abs(worlds[joint]) <= REACH)).argmax())]
-        raise source.fault("F003.joint-reach", joint=joints.names[joint], limit=REACH, found=found)
+        raise source.fault(
+            "F003.joint-reach: joint {joint}: expected a rest transform within ±{limit}, found "
+            "{found}",
+            joint=quoted(joints.names[joint]),
+            limit=rounded(REACH, 2),
+            found=rounded(found),
+        )
     return worlds
 
 
@@ -183,7 +205,12 @@ def _check_positions(
         if far.any():
             joint = int(piece.influences.joints[far.argmax()])
             name = joints.names[joint]
-            raise source.fault("F003.bind-reach", joint=name, limit=REACH)
+            raise source.fault(
+                "F003.bind-reach: joint {joint}: expected vertices within ±{limit} in the rest "
+                "pose, found larger ones",
+                joint=quoted(name),
+                limit=rounded(REACH, 2),
+            )
 
 
 def _record_of(
@@ -301,10 +328,17 @@ def _note_normals(pieces: list[Piece], source: Source) -> None:
     split = [piece for piece in pieces if piece.shading == "flat"]
     added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
     if added:
-        source.warn("F007.flat-normals", n=len(split), vertices=added)
+        source.warn(
+            "F007.flat-normals: {n} without normals: flat shaded, with {vertices} along the edges",
+            n=counted(len(split), "primitive"),
+            vertices=counted(added, "additional vertex"),
+        )
     smooth = [piece for piece in pieces if piece.shading == "smooth"]
     if smooth:
-        source.warn("F007.smooth-normals", n=len(smooth))
+        source.warn(
+            "F007.smooth-normals: {n} without normals: smoothly shaded",
+            n=counted(len(smooth), "large primitive"),
+        )
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
@@ -313,11 +347,21 @@ def _note_weights(pieces: list[Piece], source: Source) -> None:
     if odd:
         n = sum(piece.influences.n_deviating for piece in odd)
         most = max(piece.influences.deviation for piece in odd)
-        source.warn("W001.divided", _weights_of(odd[0]), n=n, most=most)
+        source.warn(
+            "W001.divided: weights of {n} do not sum to 1 (error up to {most}): divided by "
+            "their sum",
+            _weights_of(odd[0]),
+            n=counted(n, "vertex"),
+            most=rounded(most, 2),
+        )
     unbound = [piece for piece in pieces if piece.influences.n_unbound]
     if unbound:
         n = sum(piece.influences.n_unbound for piece in unbound)
-        source.warn("W004.first-joint", _weights_of(unbound[0]), n=n)
+        source.warn(
+            "W004.first-joint: {n} without weights: attached to the first listed joint",
+            _weights_of(unbound[0]),
+            n=counted(n, "vertex"),
+        )
 
 
 def _weights_of(piece: Piece) -> str | None:
@@ -335,7 +379,13 @@ def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
     others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
     if others:
         names = [file.tree.names[node] or f"node {node}" for node in others]
-        source.warn("F007.animated-others", n=len(names), names=names)
+        source.warn(
+            "F007.animated-others: animations of {n} that {belong} to no figure are omitted: "
+            "{names}",
+            n=counted(len(names), "node"),
+            names=listed_text(names),
+            belong=agree(len(names), "belongs", "belong"),
+        )
 
 
 def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
@@ -346,4 +396,13 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
         if skin.method != "lbs":
             others.setdefault(skin.method, []).append(skin.name)
     for method, names in others.items():
-        source.warn("F007.skinning-method", names=names, n=len(names), method=method)
+        source.warn(
+            "F007.skinning-method: {skins} {names} {ask} for the method {method}: used unless "
+            "{remedy} selects another one",
+            names=listed_text(names),
+            n=len(names),
+            method=method,
+            skins=agree(len(names), "skin", "skins"),
+            ask=agree(len(names), "asks", "ask"),
+            remedy=Remedy("the Skinning panel", "--method"),
+        )

@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Part, Phrase
+from viewer.diagnostics import Part, Phrase, wording
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 
 Places = NDArray[np.int64]
@@ -63,7 +64,9 @@ def read_numbers(source: Source) -> Floats:
         offset = source.word_offset(0, bad)
         word = source.next_word(offset)
         found = b"" if word is None else word.group()
-        raise source.fault(number_key(found), offset, item=Phrase("word", index=bad), found=found)
+        raise source.fault(
+            number_key(found), offset, item=Phrase("word {index}", index=bad), found=quoted(found)
+        )
     return values
 
 
@@ -84,7 +87,11 @@ def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places
     """Read an invalid table word by word, and record the errors."""
     words = read_words(source.data, 0, len(source.data))
     if len(words.offsets) == 0:
-        raise source.fault("F002.table-empty", columns=columns, found=source.looks_like())
+        raise source.fault(
+            "F002.table-empty: expected rows of {columns} numbers, found {found}",
+            columns=columns,
+            found=source.looks_like(),
+        )
     begins, sizes = words.rows()
     fits = sizes == columns
     owners = np.repeat(np.arange(len(begins)), sizes)
@@ -92,15 +99,20 @@ def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places
         raise _word_fault(source, words, int(words.bad[0]), int(owners[words.bad[0]]))
     bad = words.bad
     refuse_words(
-        source, words, bad, lambda word: Phrase("row", index=int(owners[word])), part, owners[bad]
+        source,
+        words,
+        bad,
+        lambda word: Phrase("row {index}", index=int(owners[word])),
+        part,
+        owners[bad],
     )
     wrong = np.flatnonzero(~fits)
     if len(wrong):
         offset, found = int(words.offsets[begins[wrong[0]]]), int(sizes[wrong[0]])
         values = {"expected": columns, "found": found}
         if not fits.any():
-            raise source.fault("F002.table-width", offset, **values)
-        source.refuse("F002.table-width", offset, len(wrong), part, wrong, **values)
+            raise source.fault(wording.TABLE_WIDTH, offset, **values)
+        source.refuse(wording.TABLE_WIDTH, offset, len(wrong), part, wrong, **values)
     rows = np.full((len(begins), columns), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
     return rows, words.offsets[begins]
@@ -109,4 +121,6 @@ def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places
 def _word_fault(source: Source, words: Words, index: int, row: int) -> Exception:
     found = words.word(index)
     offset = int(words.offsets[index])
-    return source.fault(number_key(found), offset, item=Phrase("row", index=row), found=found)
+    return source.fault(
+        number_key(found), offset, item=Phrase("row {index}", index=row), found=quoted(found)
+    )

@@ -12,6 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_infinite, is_too_large, parse_words, word_begins
+from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 
 Places = NDArray[np.int64]
@@ -83,14 +84,15 @@ def refuse_words(
             part,
             places[chosen],
             item=named(first),
-            found=words.word(first),
+            found=quoted(words.word(first)),
         )
 
 
 def number_key(word: bytes, part: Part = "") -> str:
-    """Return the key of the message about a word that is not a finite number."""
+    """Return the message about a word that is not a finite number."""
     if not is_infinite(word):
-        return "F002.number"
-    # A number that is too large is well-formed, so the message states the limit.
-    name = "too-large" if is_too_large(word) else "number"
-    return f"{'W003' if part == 'weights' else 'F003'}.{name}"
+        return "F002.number: {item}: expected a number, found {found}"
+    code = "W003" if part == "weights" else "F003"
+    if is_too_large(word):  # it is well-formed, so the message states the limit
+        return f"{code}.too-large: {{item}}: expected a number within ±3.4e+38, found {{found}}"
+    return f"{code}.number: {{item}}: expected a number, found {{found}}"

@@ -16,12 +16,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.formats._scene_graph.content import NodeFile, path_to_root
 from viewer.formats._scene_graph.joints import make_joints, skeleton_of
 from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
 from viewer.formats._source import Source
 from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.parts import is_index, part
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_of
@@ -44,23 +46,39 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     told = file.extensions[EXTENSION]
     humanoid = read_humanoid(source, file, told, 1, pointer)
     if not humanoid:
-        raise source.fault("F002.vrma-bones", f"{pointer}/humanoid")
+        raise source.fault(
+            "F002.vrma-bones: expected nodes of human bones, found none", f"{pointer}/humanoid"
+        )
     if not file.animations:
-        raise source.fault("F002.vrma-animation")
+        raise source.fault(wording.VRMA_ANIMATION)
     if len(file.animations) > 1:
-        source.warn("F007.vrma-animations", "/animations", n=len(file.animations) - 1)
+        source.warn(
+            "F007.vrma-animations: {n} ignored: only the first is played",
+            "/animations",
+            n=counted(len(file.animations) - 1, "further animation"),
+        )
     if part(told, "lookAt") is not None:
-        source.warn("F007.vrma-look", f"{pointer}/lookAt")
+        source.warn("F007.vrma-look: gaze direction is not shown", f"{pointer}/lookAt")
     (read, *_) = read_once(file.animations)
     figure, clip = _moving(file, read, _with_ancestors(file, humanoid.values()), humanoid)
     if not clip.channels:
-        raise source.fault("F002.vrma-animation")
+        raise source.fault(wording.VRMA_ANIMATION)
     rate = clip.frame_rate
     if not is_regular(clip):
-        source.warn("F007.vrma-rate", "/animations/0", rate=rate)
+        source.warn(
+            "F007.vrma-rate: the keys are at irregular times, so the motion is sampled at "
+            "{rate:g} frames per second",
+            "/animations/0",
+            rate=rate,
+        )
     count = frame_at(clip.end - clip.start, rate) + 1
     if count > _MOST_FRAMES:
-        raise source.fault("F002.vrma-long", "/animations/0", most=_MOST_FRAMES, found=count)
+        raise source.fault(
+            "F002.vrma-long: expected at most {most} frames, found {found}",
+            "/animations/0",
+            most=_MOST_FRAMES,
+            found=count,
+        )
     times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(figure, clip, times)
     return SkeletonMotion(

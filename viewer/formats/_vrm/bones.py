@@ -8,6 +8,7 @@ from typing import Any
 from viewer.formats._scene_graph.content import NodeFile
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, part
+from viewer.phrases import quoted
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
 _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
@@ -23,11 +24,21 @@ def read_humanoid(
     found: dict[str, int] = {}
     for _, bone, node in given_bones(told, version):
         if not is_index(node, file.tree.n_nodes):
-            source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
+            source.warn(
+                "G006.bone-node: human bone {bone}: expected the index of a node, found {found}: "
+                "ignored",
+                f"{pointer}/humanoid/humanBones",
+                bone=quoted(bone),
+                found=node,
+            )
         elif bone in HUMAN_BONES or bone in SPINE_BONES:
             found.setdefault(bone, node)
         else:
-            source.warn("G006.bone", f"{pointer}/humanoid/humanBones", bone=bone)
+            source.warn(
+                "G006.bone: unknown human bone {bone}: ignored",
+                f"{pointer}/humanoid/humanBones",
+                bone=quoted(bone),
+            )
     return found
 
 

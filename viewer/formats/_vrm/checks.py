@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from viewer.diagnostics import wording
 from viewer.formats._source import Source
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.parts import listed, part
+from viewer.phrases import counted, quoted
+from viewer.phrases import listed as listed_text
 from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 
 _MODERN = "1.0"
@@ -27,38 +30,67 @@ def check_character(source: Source, extensions: Mapping[str, Any], version: int)
     key = "VRMC_vrm" if version == 1 else "VRM"
     told, at = extensions[key], f"/extensions/{key}"
     if isinstance(extensions.get("VRM"), dict) and version == 1:
-        source.warn("G008.versions", "/extensions/VRM")
+        source.warn(
+            "G008.versions: expected one version of VRM, found 0.x besides 1.0: only 1.0 is read",
+            "/extensions/VRM",
+        )
     if version == 1:
         stated = told.get("specVersion")
         if stated is None:
-            source.warn("G008.no-version", at)
+            source.warn('G008.no-version: expected specVersion "1.0", found none', at)
         elif stated != _MODERN:
-            source.warn("G008.version", f"{at}/specVersion", found=str(stated))
+            source.warn(
+                'G008.version: expected specVersion "1.0", found {found}: read as 1.0',
+                f"{at}/specVersion",
+                found=quoted(str(stated)),
+            )
     meta = told.get("meta")
     if not isinstance(meta, dict):
-        source.warn("G008.no-meta", at)
+        source.warn("G008.no-meta: expected meta data with authors and licence, found none", at)
     elif version == 1 and (missing := [name for name in _REQUIRED_META if not meta.get(name)]):
-        source.warn("G008.meta", f"{at}/meta", names=missing)
+        source.warn(
+            "G008.meta: expected {names} in the meta data, found none",
+            f"{at}/meta",
+            names=listed_text(missing),
+        )
     _check_bones(source, told, version, f"{at}/humanoid/humanBones")
     for bind, place, name in weighted_binds(told, version):
         if not is_weight(weight := bind["weight"], version):
             most = MOST_WEIGHT[version]
-            source.warn("G008.weight", f"{at}/{place}", name=name, most=most, found=str(weight))
+            source.warn(
+                "G008.weight: expression {name}: expected a weight of 0 to {most:g}, found {found}",
+                f"{at}/{place}",
+                name=quoted(name),
+                most=most,
+                found=str(weight),
+            )
 
 
 def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str) -> None:
     """Check that all required bones occur, each once and with its own node."""
     given = given_bones(told, version)
     if missing := [bone for bone in REQUIRED_BONES if bone not in {bone for _, bone, _ in given}]:
-        source.warn("G008.bones", at, n=len(missing), names=missing)
+        source.warn(
+            "G008.bones: {n} missing: {names}",
+            at,
+            n=counted(len(missing), "required human bone"),
+            names=listed_text(missing),
+        )
     owners: dict[Any, str] = {}
     seen: set[str] = set()
     for place, bone, node in given:
         if bone in seen:
-            source.warn("G008.bone-twice", f"{at}/{place}", bone=bone)
+            source.warn(wording.BONE_TWICE, f"{at}/{place}", bone=quoted(bone))
         elif type(node) is int and node in owners:
             other = owners[node]
-            source.warn("G008.one-node", f"{at}/{place}", bone=bone, other=other, node=node)
+            source.warn(
+                "G008.one-node: human bones {other} and {bone}: expected different nodes, found "
+                "node {node} for both",
+                f"{at}/{place}",
+                bone=quoted(bone),
+                other=quoted(other),
+                node=node,
+            )
         else:
             owners[node] = bone
         seen.add(bone)
@@ -66,7 +98,7 @@ def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str)
         if found.key == "G001.repeated" and version == 1:
             for bone in found.values["names"]:
                 if bone in HUMAN_BONES or bone in SPINE_BONES:
-                    source.warn("G008.bone-twice", f"{at}/{bone}", bone=bone)
+                    source.warn(wording.BONE_TWICE, f"{at}/{bone}", bone=quoted(bone))
 
 
 def is_weight(weight: Any, version: int) -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 from viewer.formats._scene_graph.content import NodeTree, path_to_root
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, part, value_of
+from viewer.phrases import listed
 from viewer.rig.constraints.constraint import Constraint, ConstraintKind
 
 _EXTENSION = "VRMC_node_constraint"
@@ -43,7 +44,11 @@ def read_constraints(tree: NodeTree, source: Source) -> tuple[Constraint, ...]:
         constraint = _constraint(tree, node, told)
         if isinstance(constraint, str):
             pointer = f"{_pointer(node)}/constraint"
-            source.warn("G006.constraint", pointer, expected=constraint)
+            source.warn(
+                "G006.constraint: invalid constraint ignored: expected {expected}",
+                pointer,
+                expected=constraint,
+            )
         elif constraint.weight > 0.0:
             found[node] = constraint
     return _ordered(tree, found, source)
@@ -94,7 +99,12 @@ def _ordered(
             elif following in path:
                 nodes = [*path]
                 cycle = nodes[nodes.index(following) :]
-                source.refuse("F002.constraint-cycle", _pointer(following), nodes=cycle)
+                source.refuse(
+                    "F002.constraint-cycle: expected constraints without cycles, found a cycle of "
+                    "nodes {nodes}",
+                    _pointer(following),
+                    nodes=listed(cycle, 12),
+                )
             elif following not in ordered:
                 path[following] = iter(needed[following])
     return tuple(ordered.values())

@@ -20,6 +20,8 @@ from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.materials import modern_binds, old_binds
 from viewer.formats._vrm.parts import is_index, listed, part, value_of
 from viewer.formats._vrm.springs import read_springs
+from viewer.phrases import listed as listed_text
+from viewer.phrases import quoted
 from viewer.rig.expressions import OLD_PRESETS, OVERRIDES, PROCEDURAL
 from viewer.rig.mesh import PartView
 from viewer.rig.springs.springs import Springs
@@ -140,7 +142,11 @@ def _expressions(
         if binds or changes:
             found.append(replace(_expression(str(name), each, binds), materials=tuple(changes)))
     if undrawn:
-        source.warn("F007.vrm-materials", at, names=undrawn)
+        source.warn(
+            "F007.vrm-materials: material changes by expressions have no effect: {names}",
+            at,
+            names=listed_text(undrawn, 12),
+        )
     return tuple(found)
 
 
@@ -166,7 +172,11 @@ def _binds(
             nodes = [node] if is_index(node, file.tree.n_nodes) else []
         valid = [node for node in nodes if _has_target(file, node, index)]
         if not valid or weight is None:
-            source.warn("G006.bind", pointer, found=index)
+            source.warn(
+                "G006.bind: expected a morph target and its weight, found target {found}: ignored",
+                pointer,
+                found=index,
+            )
             continue
         binds += [(node, index, weight * scale) for node in valid]
     return tuple(binds)
@@ -212,7 +222,12 @@ def _read_part_views(
         nodes = _annotated_nodes(file, each, version)
         if known is None or not nodes:
             at = f"{pointer}/firstPerson/meshAnnotations/{index}"
-            source.warn("G006.first-person", at, found=str(view))
+            source.warn(
+                "G006.first-person: expected a mesh and auto, both, thirdPersonOnly or "
+                "firstPersonOnly, found {found}: ignored",
+                at,
+                found=quoted(str(view)),
+            )
             continue
         found.update(dict.fromkeys(nodes, known))
     return found

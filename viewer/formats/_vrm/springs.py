@@ -26,6 +26,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.formats._scene_graph.content import NodeFile, NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
@@ -120,7 +121,11 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _G
         shape = _shape(part(each, "node"), told_shape, file.tree.n_nodes)
         if shape is None:
             at = f"/extensions/{_EXTENSION}/colliders/{index}"
-            source.warn("G006.collider", at)
+            source.warn(
+                "G006.collider: invalid collider ignored: expected a node, and a sphere or a "
+                "capsule",
+                at,
+            )
         else:
             places[index] = len(shapes)
             shapes.append(shape)
@@ -157,7 +162,7 @@ def _chains(
     for index, spring in enumerate(listed(told, "springs")):
         chain = _chain(file.tree, spring, listed(spring, "joints"), groups)
         if chain is None:
-            source.warn("G006.spring", f"/extensions/{_EXTENSION}/springs/{index}")
+            source.warn(wording.SPRING, f"/extensions/{_EXTENSION}/springs/{index}")
         elif chain:
             yield chain
 
@@ -246,7 +251,7 @@ def _old_chains(
         is_valid = all(is_index(bone, tree.n_nodes) for bone in bones)
         if down is None or None in values or not is_valid:
             at = f"/extensions/VRM/secondaryAnimation/boneGroups/{index}"
-            source.warn("G006.spring", at)
+            source.warn(wording.SPRING, at)
             continue
         stiffness, drag, power, radius = (float(value or 0.0) for value in values)
         center = part(group, "center")

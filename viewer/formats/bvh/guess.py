@@ -6,8 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.formats._source import Source
+from viewer.phrases import Shown, bare, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
@@ -43,12 +45,19 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     rate, and ``33.3333`` for milliseconds, with a warning.
     """
     if frame_time is None:
-        source.warn("F007.bvh-no-time", rate=DEFAULT_RATE)
+        source.warn("F007.bvh-no-time: missing Frame Time: {rate:g} fps assumed", rate=DEFAULT_RATE)
         return DEFAULT_RATE
     seconds = float(frame_time.rstrip(b"fF"))
     if seconds == 0.0 or not is_rate(1.0 / seconds):
         low, high = 1.0 / FASTEST, 1.0 / SLOWEST
-        source.warn("F007.bvh-time", seconds=seconds, low=low, high=high, rate=DEFAULT_RATE)
+        source.warn(
+            "F007.bvh-time: Frame Time: expected {low:g} to {high:,.0f} seconds, found "
+            "{seconds:g}; {rate:g} fps assumed",
+            seconds=seconds,
+            low=low,
+            high=high,
+            rate=DEFAULT_RATE,
+        )
         return DEFAULT_RATE
     is_own = len(frame_time.partition(b".")[2]) >= _DECIMALS
     if _LONGEST <= seconds <= max(_RATES) and not is_own:
@@ -61,9 +70,21 @@ def _mistaken_rate(source: Source, frame_time: bytes, seconds: float) -> float:
     is_standard = _nearest_rate(frame_time, seconds, seconds) in _RATES
     in_milliseconds = _nearest_rate(frame_time, seconds, 1000.0 / seconds)
     if is_standard or seconds.is_integer() or in_milliseconds not in _RATES:
-        source.warn("C017.bvh-rate", found=frame_time, rate=seconds)
+        source.warn(
+            "C017.bvh-rate: Frame Time: expected seconds, found {found}, which looks like a "
+            "frame rate; {rate:g} fps assumed ({remedy} overrides it)",
+            found=bare(frame_time),
+            rate=seconds,
+            remedy=Remedy("Frames per second in the Timeline", "--fps"),
+        )
         return seconds
-    source.warn("C017.bvh-milliseconds", found=frame_time, rate=in_milliseconds)
+    source.warn(
+        "C017.bvh-milliseconds: Frame Time: expected seconds, found {found}, which looks "
+        "like milliseconds; {rate:g} fps assumed ({remedy} overrides it)",
+        found=bare(frame_time),
+        rate=in_milliseconds,
+        remedy=Remedy("Frames per second in the Timeline", "--fps"),
+    )
     return in_milliseconds
 
 
@@ -90,14 +111,19 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     metres = size * METRES["in"]
     is_near = _INCHES[0] < size < _INCHES[1]
     inches = f"; if in inches, {metres:.3g} m" if is_near else ""
-    values = {"size": size, "metres": metres if is_near else 0.0}
+    values = {
+        "size": rounded(size, 4),
+        "metres": Shown(inches, metres if is_near else 0.0),
+    }
     for unit, (low, high) in SIZES.items():
         if low <= size <= high:
             fact = f"{unit}, estimated from the skeleton's size of {size:.4g}{inches}"
-            note = Phrase("unit-from-size", unit=UNIT_NAMES[unit], **values)
+            note = Phrase(
+                "{unit} assumed (skeleton {size} high{metres})", unit=UNIT_NAMES[unit], **values
+            )
             return unit, (("unit", fact),), None if unit == "m" else note
     fact = f"unknown; the skeleton's size is {size:.4g}{inches}"
-    note = Phrase("unit-unknown", **values)
+    note = Phrase("unit unknown (skeleton {size} high{metres})", **values)
     return "", (("unit", fact),), note if size > 0.0 else None
 
 
@@ -126,7 +152,7 @@ def guess_up(
             return "y", (("up", "y, the rest skeleton stands on its legs"),), ()
         _, deep, high = np.ptp(points, axis=0)[[0, 1, 2]]
         if high > _LONG * deep:
-            note = Phrase("up-of-longest", up="z")
+            note = Phrase("{up} up assumed: the rest skeleton is longest along {up}", up="z")
             return "z", (("up", "z, along which the rest skeleton is longest"),), (note,)
         return "y", (), ()
     joints = points[: skeleton.n_joints]
@@ -140,18 +166,38 @@ def guess_up(
         other: Literal["y", "z"] = "z" if up == "y" else "y"
         size = float(np.linalg.norm(heights, axis=1).mean())
         if rest in ("+y", "+z") and _lies(posed, other, up, size):
-            notes = (Phrase("up-against-frames", up=up, axis=stands),)
+            notes = (
+                Phrase(
+                    "{up} up assumed, although the skeleton is upright along {axis} in the frames",
+                    up=up,
+                    axis=stands,
+                ),
+            )
             return up, (("up", f"{up}, from the rest skeleton"),), notes
-        note = Phrase("up-of-frames", up=other, axis=rest or Phrase("up-unclear"))
+        note = Phrase(wording.UP_OF_FRAMES, up=other, axis=rest or Phrase("no axis"))
         return other, (("up", f"{other}, from the frames"),), (note,)
     if up == "z":
-        return "z", (("up", "z, from the rest skeleton"),), (Phrase("up-of-head", up="z"),)
+        return (
+            "z",
+            (("up", "z, from the rest skeleton"),),
+            (Phrase("{up} up assumed: the head is above the feet along {up}", up="z"),),
+        )
     if rest == "+y":
         return "y", (("up", "y, from the rest skeleton"),), ()
     if stands == "+y":
-        note = Phrase("up-of-frames", up="y", axis=rest or Phrase("up-unclear"))
+        note = Phrase(wording.UP_OF_FRAMES, up="y", axis=rest or Phrase("no axis"))
         return "y", (("up", "y, from the frames"),), (note,)
-    told = (Phrase("up-against-rest", up="y", axis=rest),) if rest else ()
+    told = (
+        (
+            Phrase(
+                "{up} up assumed, although the rest skeleton is upright along {axis}",
+                up="y",
+                axis=rest,
+            ),
+        )
+        if rest
+        else ()
+    )
     return "y", (("up", "y, assumed"),), told
 
 

@@ -7,11 +7,12 @@ from dataclasses import field
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
+from viewer.phrases import brief, counted, optional, quoted
 
 CHANNELS = {
     f"{axis}{kind}".encode(): code
@@ -72,25 +73,29 @@ class _Parser:
         """Return the joints and the offset of the motion."""
         self._advance()
         if self.keyword != b"HIERARCHY":
-            raise self._fault("F002.bvh-start", looks=self.source.looks_like())
+            raise self._fault(
+                "F002.bvh-start: expected HIERARCHY, found {found}{looks}",
+                looks=optional(" ({})", self.source.looks_like()),
+            )
         self._advance()
         while self.word is not None and (self.open or self.keyword != b"MOTION"):
             self._item()
         if self.open:
             raise self._still_open()
         if not self.found:
-            raise self._fault("F002.bvh-no-root")
+            raise self._fault("F002.bvh-no-root: expected ROOT, found {found}")
         if self.extra_braces:
-            self.source.warn("F006.extra-braces", n=self.extra_braces)
+            self.source.warn(wording.EXTRA_BRACES, n=self.extra_braces)
         if self.doubled:
             start, _, first = self.doubled[0]
             places = [place for _, place, joint in self.doubled if not joint.is_end]
             self.source.warn(
-                "F006.bvh-offset",
+                "F006.bvh-offset: OFFSET: expected 3 numbers, found 6 in {n} (first: {joint}); the "
+                "last 3 are ignored",
                 start,
                 part="joints",
                 places=places,
-                n=len(self.doubled),
+                n=counted(len(self.doubled), "joint"),
                 joint=called(first),
             )
         return Hierarchy(self.found, -1 if self.word is None else self.word.end())
@@ -102,7 +107,7 @@ class _Parser:
             self._close()
         elif joint is None:
             if keyword != b"ROOT":
-                raise self._fault("F002.bvh-root")
+                raise self._fault("F002.bvh-root: expected ROOT or MOTION, found {found}")
             self._open_joint()
         elif keyword == b"OFFSET":
             self._offset(joint)
@@ -115,9 +120,16 @@ class _Parser:
         elif keyword in (b"MOTION", b"ROOT"):
             raise self._still_open()
         elif joint.is_end:
-            raise self._fault("F002.bvh-end-item", joint=called(joint))
+            raise self._fault(
+                'F002.bvh-end-item: {joint}: expected OFFSET or "}}", found {found}',
+                joint=called(joint),
+            )
         else:
-            raise self._fault("F002.bvh-item", joint=called(joint))
+            raise self._fault(
+                "F002.bvh-item: {joint}: expected OFFSET, CHANNELS, JOINT, End Site or "
+                '"}}", found {found}',
+                joint=called(joint),
+            )
 
     def _open_joint(self, is_end: bool = False) -> None:
         assert self.word is not None  # checked by the caller
@@ -137,7 +149,9 @@ class _Parser:
             joint.name = self.found[parent].name
         if self.word is None or self.word.group() != b"{":
             where = start if self.word is None else self.word.start()
-            raise self.source.fault("F002.opening", where, item=called(joint), found=self._found())
+            raise self.source.fault(
+                wording.OPENING, where, item=called(joint), found=quoted(self._found())
+            )
         self.open.append(len(self.found))
         self.found.append(joint)
         self.n_joints += not is_end
@@ -169,7 +183,10 @@ class _Parser:
         assert self.word is not None  # checked by the caller
         keyword = self.word
         if joint.offset is not None:
-            raise self._fault("F002.bvh-offset-again", joint=called(joint))
+            raise self._fault(
+                "F002.bvh-offset-again: {joint}: expected one OFFSET, found a second one",
+                joint=called(joint),
+            )
         self._advance()
         values: list[float] = []
         while len(values) < 3:
@@ -197,16 +214,25 @@ class _Parser:
         """
         refuse, word = self.source.refuse, self._found()
         places = None if joint.is_end else [self.n_joints - 1]
-        item = Phrase("of", item="OFFSET", owner=called(joint))
+        item = Phrase("{item} of {owner}", item="OFFSET", owner=called(joint))
         here = keyword.start() if self.word is None else self.word.start()
         if isinstance(found, list):
-            more = {"expected": 3, "found": found[0].group()}
-            refuse("F002.more", found[0].start(), 1, "joints", places, item=item, **more)
+            more = {"expected": counted(3, "number"), "found": quoted(found[0].group())}
+            refuse(wording.MORE, found[0].start(), 1, "joints", places, item=item, **more)
         elif word is None or self.keyword in (b"{", b"}", *_ITEMS):
             start = keyword.start()
-            refuse("F002.width", start, 1, "joints", places, item=item, expected=3, found=found)
+            refuse(
+                wording.WIDTH,
+                start,
+                1,
+                "joints",
+                places,
+                item=item,
+                expected=counted(3, "number"),
+                found=found,
+            )
         else:
-            refuse(number_key(word), here, 1, "joints", places, item=item, found=word)
+            refuse(number_key(word), here, 1, "joints", places, item=item, found=quoted(word))
         joint.offset = [0.0, 0.0, 0.0]
         while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             self._advance()
@@ -215,27 +241,42 @@ class _Parser:
         assert self.word is not None  # checked by the caller
         keyword = self.word
         if joint.channels is not None:
-            raise self._fault("F002.bvh-channels-again", joint=called(joint))
+            raise self._fault(
+                "F002.bvh-channels-again: {joint}: expected one CHANNELS, found a second one",
+                joint=called(joint),
+            )
         self._advance()
-        item = Phrase("of", item="CHANNELS", owner=called(joint))
+        item = Phrase("{item} of {owner}", item="CHANNELS", owner=called(joint))
         count = None if self.word is None else to_number(self.word.group())
         if count is None or count != int(count) or count < 0:
-            raise self._fault("F002.count", item=item)
+            raise self._fault(wording.COUNT, item=item)
         stated = self.word
         self._advance()
         codes: list[int] = []
         while self.word is not None and self.keyword not in (b"{", b"}", *_ITEMS):
             code = CHANNELS.get(self.keyword)
             if code is None:
-                raise self._fault("F002.bvh-channel", item=item)
+                raise self._fault(
+                    "F002.bvh-channel: {item}: expected a channel name (Xposition … Zrotation), "
+                    "found {found}",
+                    item=item,
+                )
             if code < 3 and code in codes:
-                raise self._fault("F002.bvh-position-again", item=item)
+                raise self._fault(
+                    "F002.bvh-position-again: {item}: expected each position channel once, found "
+                    "{found} again",
+                    item=item,
+                )
             codes.append(code)
             self._advance()
         if len(codes) != count:
             where = stated.start() if stated else keyword.start()
             raise self.source.fault(
-                "F002.bvh-channel-count", where, item=item, expected=int(count), found=len(codes)
+                "F002.bvh-channel-count: {item}: expected {expected}, found {found}",
+                where,
+                item=item,
+                expected=counted(int(count), "channel name"),
+                found=len(codes),
             )
         joint.channels = codes
 
@@ -249,15 +290,15 @@ class _Parser:
     def _fault(self, key: str, **values: Any) -> FormatError:
         """Return the exception for an error at the current word."""
         where = self.source.end if self.word is None else self.word.start()
-        return self.source.fault(key, where, found=self._found(), **values)
+        return self.source.fault(key, where, found=quoted(self._found()), **values)
 
     def _still_open(self) -> FormatError:
         joint = self.found[self.open[-1]]
         line = self.source.line(joint.start)
-        return self._fault("F002.joint-open", joint=called(joint), line=line)
+        return self._fault(wording.JOINT_OPEN, joint=called(joint), line=line)
 
 
 def called(joint: BvhJoint) -> Phrase:
     """Return the phrase for a joint or End Site in messages."""
-    name = Phrase("joint", name=joint.name) if joint.name else Phrase("unnamed-joint")
-    return Phrase("end-site", joint=name) if joint.is_end else name
+    name = Phrase("joint {name}", name=brief(joint.name)) if joint.name else Phrase("unnamed joint")
+    return Phrase("End Site of {joint}", joint=name) if joint.is_end else name

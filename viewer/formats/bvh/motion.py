@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._frame_gaps import gap_notes, no_frames
 from viewer.formats._placeholders import held_rows
@@ -21,6 +21,7 @@ from viewer.formats._text.numbers import is_infinite, parse_numbers, to_number
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.formats._translation_limit import FARTHEST, is_beyond
 from viewer.formats.bvh.hierarchy import BvhJoint, called
+from viewer.phrases import brief, counted, optional, quoted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import align_signs
 
@@ -78,13 +79,13 @@ def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
     or too long, or no frame is finite; the error has the line.
     """
     if start < 0:
-        source.warn("F007.bvh-no-motion", source.end)
+        source.warn("F007.bvh-no-motion: no MOTION section: shown in the rest pose", source.end)
         return _rest(n_channels, None)
     declared, time, start = read_head(source, start)
     if declared is None:
-        source.warn("F007.bvh-no-count", start)
+        source.warn("F007.bvh-no-count: missing Frames: all rows are used", start)
     if n_channels == 0:
-        source.warn("F007.bvh-no-channels", start)
+        source.warn("F007.bvh-no-channels: no joint has channels: shown in the rest pose", start)
         return _rest(0, time)
     rows, lost = _rows(source, start, n_channels, declared)
     return _Motion(rows, time, lost=lost) if len(rows) else _rest(n_channels, time)
@@ -107,14 +108,20 @@ def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int
 def _count(source: Source, match: re.Match[bytes]) -> int:
     value = to_number(match[1])
     if value is None or value < 0 or value != int(value):
-        raise source.fault("F002.count", match.start(1), item="Frames", found=match[1] or None)
+        raise source.fault(
+            wording.COUNT, match.start(1), item="Frames", found=quoted(match[1] or None)
+        )
     return int(value)
 
 
 def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
     value = to_number(match[1])
     if value is None or value < 0.0:
-        raise source.fault("F002.bvh-seconds", match.start(1), found=match[1] or None)
+        raise source.fault(
+            "F002.bvh-seconds: Frame Time: expected seconds, found {found}",
+            match.start(1),
+            found=quoted(match[1] or None),
+        )
     return match[1]
 
 
@@ -144,7 +151,7 @@ def _rows(
         _check_lines(source, start, width, declared)
         _warn_of_difference(source, width, declared, whole, rest)
     if whole == 0:
-        source.warn("F007.bvh-empty", start)
+        source.warn("F007.bvh-empty: no frames: shown in the rest pose", start)
     return values[: whole * width].reshape(whole, width), None
 
 
@@ -179,7 +186,7 @@ def _held_frames(
         source,
         words,
         bad[~is_number],
-        lambda word: Phrase("bvh-frame", frame=frame_of[word]),
+        lambda word: Phrase("frame {frame}", frame=frame_of[word]),
         "frames",
         frames[~is_number],
     )
@@ -200,8 +207,8 @@ def _gaps(source: Source, words: Words, bad: _Places, frames: _Places, count: in
     if len(bad) == 0:
         return None
     word, offset = words.word(int(bad[0])), int(words.offsets[bad[0]])
-    item = Phrase("bvh-frame", frame=int(frames[0]))
-    first = source.fault(number_key(word), offset, item=item, found=word)
+    item = Phrase("frame {frame}", frame=int(frames[0]))
+    first = source.fault(number_key(word), offset, item=item, found=quoted(word))
     source.frame_faults.append(first.diagnostic)
     lost = np.zeros(count, dtype=np.bool_)
     lost[frames] = True
@@ -228,13 +235,13 @@ def _refuse_sizes(source: Source, offsets: _Places, sizes: _Places, width: int) 
     if len(wrong):
         first = int(wrong[0])
         source.refuse(
-            "F002.bvh-row",
+            wording.BVH_ROW,
             int(offsets[first]),
             len(wrong),
             "frames",
             wrong,
             frame=first,
-            expected=width,
+            expected=counted(width, "number"),
             found=int(sizes[first]),
         )
 
@@ -245,10 +252,14 @@ def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int
     match = source.next_word(offset)
     word = b"" if match is None else match.group()
     if declared is not None and bad >= declared * width:
-        source.warn("F006.bvh-after", offset, found=word)
+        source.warn(
+            "F006.bvh-after: ignored data after the last frame, starting with {found}",
+            offset,
+            found=quoted(word),
+        )
         return
-    frame = Phrase("bvh-frame", frame=bad // width)
-    raise source.fault(number_key(word), offset, item=frame, found=word)
+    frame = Phrase("frame {frame}", frame=bad // width)
+    raise source.fault(number_key(word), offset, item=frame, found=quoted(word))
 
 
 def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
@@ -272,17 +283,30 @@ def _check_lines(source: Source, start: int, width: int, declared: int | None) -
 
 
 def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> FormatError:
-    return source.fault("F002.bvh-row", line[0], frame=row, expected=width, found=line[1])
+    return source.fault(
+        wording.BVH_ROW, line[0], frame=row, expected=counted(width, "number"), found=line[1]
+    )
 
 
 def _warn_of_difference(
     source: Source, width: int, declared: int | None, whole: int, rest: int
 ) -> None:
-    expected = None if declared is None else Phrase("bvh-frames", n=declared)
-    part = Phrase("bvh-part", n=rest, width=width) if rest else None
+    expected = None if declared is None else Phrase("{n}", n=counted(declared, "frame"))
+    part = Phrase("{n} of {width} numbers for the next", n=rest, width=width) if rest else None
     if whole == 0 and (declared or rest):
-        raise source.fault("F002.bvh-no-frame", source.end, expected=expected, rest=part)
-    source.warn("F007.bvh-frames", source.end, expected=expected, found=whole, rest=part)
+        raise source.fault(
+            "F002.bvh-no-frame: {expected}found none{rest}",
+            source.end,
+            expected=optional("expected {} as declared by Frames, ", expected),
+            rest=optional(" and {}", part),
+        )
+    source.warn(
+        "F007.bvh-frames: {expected}found {found}{rest}; only complete frames are used",
+        source.end,
+        expected=optional("expected {} as declared by Frames, ", expected),
+        found=whole,
+        rest=optional(" and {}", part),
+    )
 
 
 def table_of(source: Source, joints: list[BvhJoint]) -> Table:
@@ -296,7 +320,7 @@ def table_of(source: Source, joints: list[BvhJoint]) -> Table:
         if joint.offset is None:
             at = place[joint.parent] if joint.is_end else len(kept)
             source.warn(
-                "F007.bvh-no-offset",
+                "F007.bvh-no-offset: {joint} has no OFFSET: 0 0 0 assumed",
                 joint.start,
                 part="joints",
                 places=[at],
@@ -307,7 +331,7 @@ def table_of(source: Source, joints: list[BvhJoint]) -> Table:
             ends.append((place[joint.parent], joint.offset or [0.0, 0.0, 0.0]))
             if codes:
                 source.warn(
-                    "F006.bvh-end-channels",
+                    "F006.bvh-end-channels: ignored CHANNELS in {joint}",
                     joint.start,
                     part="joints",
                     places=[place[joint.parent]],
@@ -366,7 +390,10 @@ def translations_of(source: Source, table: Table, values: Floats) -> Floats | No
     base = offsets_replaced(table)
     inner = inner_moves(table)
     if base[inner].any() and not moves_inner(table, values):
-        source.warn("F007.bvh-positions")
+        source.warn(
+            "F007.bvh-positions: position channels below the root are 0: added to OFFSET "
+            "instead of replacing it"
+        )
         base[inner] = 0.0
     shifts = shifts_of(table, values, base)
     names = [("XYZ"[axis], table.names[joint]) for joint, axis, _ in table.moves]
@@ -419,13 +446,18 @@ def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) 
         at = int(np.abs(shifts[frame]).argmax())
         axis, joint = names[at]
         source.refuse(
-            "F003.beyond",
+            wording.BEYOND,
             source.offset_of("frames", frame),
             int(is_far.sum()),
             "frames",
             np.flatnonzero(is_far),
-            item=Phrase("bvh-position", frame=frame, axis=axis, joint=joint),
-            most=FARTHEST,
+            item=Phrase(
+                "frame {frame}: {axis}position of joint {joint}",
+                frame=frame,
+                axis=axis,
+                joint=brief(joint),
+            ),
+            most=rounded(FARTHEST, 2),
             found=float(shifts[frame, at]),
         )
     return held_rows(shifts, is_far)

@@ -31,6 +31,7 @@ from viewer.formats.easymocap.files import find_frames
 from viewer.formats.easymocap.images import find_images
 from viewer.formats.easymocap.reading import Options, Reading
 from viewer.media.file_names import folder_name
+from viewer.phrases import counted
 from viewer.rig.captures.capture import Capture
 
 _LEVELS = 3  # number of folders that may contain the cameras, from the folder of the frames upwards
@@ -100,7 +101,13 @@ def _name(source: Source) -> str:
 
 def _refusal(source: Source, count: int, fault: Diagnostic | None) -> FormatError:
     if fault is None:
-        return source.fault("F002.capture-people", n=count)
+        return source.fault(
+            "F002.capture-people: expected people, found none in {n}", n=counted(count, "frame")
+        )
     if not source.is_folder:
         return FormatError(fault)
-    return source.fault("F002.capture-people-fault", n=count, problem=fault)
+    return source.fault(
+        "F002.capture-people-fault: expected people, found none in {n}; first error: {problem}",
+        n=counted(count, "frame"),
+        problem=fault,
+    )

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import within_text
@@ -30,6 +30,7 @@ from viewer.formats.easymocap.json_frames import (
     take_row,
     width_of,
 )
+from viewer.phrases import one_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, members_by_numbers
 from viewer.rig.motion.body_motion import BodyMotion
@@ -96,10 +97,21 @@ def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) 
     usual = usual or {}
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
-        raise RecordError("poses", Phrase("record-vposer", found=count))
+        raise RecordError(
+            "poses",
+            Phrase(
+                "expected rotations, found {found} numbers, a VPoser latent vector, which needs "
+                "the VPoser network to decode: export full poses from EasyMocap",
+                found=count,
+            ),
+        )
     layout = _LAYOUTS.get(count)
     if layout is None:
-        problem = Phrase("record-lengths", expected=sorted(_LAYOUTS), found=count)
+        problem = Phrase(
+            "expected {expected} numbers, found {found}",
+            expected=one_of(sorted(_LAYOUTS)),
+            found=count,
+        )
         raise RecordError("poses", problem)
     widths = [("Rh", 3), ("Th", 3), ("poses", count)]
     keys = [key for key in COEFFICIENTS if has_numbers(record, key)]
@@ -109,7 +121,11 @@ def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) 
     widths = [(key, width_of(record, key, width)) for key, width in widths]
     widths += [(key, max(width_of(record, key), usual.get(key, 0))) for key in keys]
     if count != usual.get("poses", count):
-        problem = Phrase("record-lengths", expected=[usual["poses"]], found=count)
+        problem = Phrase(
+            "expected {expected} numbers, found {found}",
+            expected=one_of([usual["poses"]]),
+            found=count,
+        )
         raise RecordError("poses", problem)
     return BodyLayout(
         layout.model,
@@ -329,7 +345,7 @@ class BodyRows(Rows):
         is_given[lacking] = False
         if self.known is None:
             if lacking:
-                self.remarks.append(("F007.record-no-last", self.paths[lacking[0]], key))
+                self.remarks.append((wording.RECORD_NO_LAST, self.paths[lacking[0]], key))
             return rows
         before = self.known.get(key)
         filled = hold(rows, is_given, before)
@@ -338,7 +354,12 @@ class BodyRows(Rows):
             self.known[key] = last
         if lacking:
             is_first = before is None and lacking[0] == 0
-            message = "F007.record-no-last" if is_first else "F007.record-last"
+            message = (
+                wording.RECORD_NO_LAST
+                if is_first
+                else "F007.record-last: no {item} in this record: the person's last known values "
+                "are used"
+            )
             self.remarks.append((message, self.paths[lacking[0]], key))
         return filled
 

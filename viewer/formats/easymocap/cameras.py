@@ -29,12 +29,12 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source, remark_on
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
-from viewer.phrases import printable
+from viewer.phrases import axes, printable, quoted
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraView
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -87,11 +87,19 @@ def find_cameras(
             try:
                 return _cameras(*(Source.open(folder / name, max_size) for name in there))
             except FormatError as problem:
-                return (), [remark_on("F007.cameras", problem.diagnostic)]
+                return (), [
+                    remark_on("F007.cameras: {problem}; cameras omitted", problem.diagnostic)
+                ]
         if there:
             lacking = _EXTRINSIC if there == [_INTRINSIC] else _INTRINSIC
             values = {"name": lacking}
-            return (), [Diagnostic("F007.cameras-beside", folder / there[0], values=values)]
+            return (), [
+                Diagnostic(
+                    "F007.cameras-beside: no {name} in the same folder; cameras omitted",
+                    folder / there[0],
+                    values=values,
+                )
+            ]
     return (), []
 
 
@@ -104,7 +112,7 @@ def _cameras(
         try:
             views.append(_camera(name, inner, outer))
         except FormatError as problem:
-            notes.append(remark_on("F007.camera", problem.diagnostic))
+            notes.append(remark_on(wording.CAMERA, problem.diagnostic))
     return tuple(views), notes
 
 
@@ -121,10 +129,15 @@ def _camera(name: str, inner: Storage, outer: Storage) -> CameraView:
     matrix = _matrix(inner, f"K_{name}", (3, 3))
     focal = matrix[[0, 1], [0, 1]]
     if not (focal > 0).all() or not np.allclose(matrix[2], [0, 0, 1]):
-        raise inner.fault("F002.camera-focal", item=f"K_{name}")
+        raise inner.fault(
+            "F002.camera-focal: {item}: focal lengths must be positive and the last row must "
+            "be 0 0 1",
+            item=f"K_{name}",
+        )
     if not (focal.min() >= _SHORTEST and focal.max() <= _LARGEST):
         raise inner.fault(
-            "F002.camera-focal-range",
+            "F002.camera-focal-range: {item}: expected focal lengths of {low:g} to {high:g} "
+            "pixels, found {first:g} and {second:g}",
             item=f"K_{name}",
             low=_SHORTEST,
             high=_LARGEST,
@@ -154,7 +167,12 @@ def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGE
     """Refuse numbers that are too large for rendering in single precision."""
     worst = float(values.ravel()[np.abs(values).argmax()]) if values.size else 0.0
     if abs(worst) > largest:
-        raise file.fault("F003.camera-limit", item=key, limit=largest, found=worst)
+        raise file.fault(
+            "F003.camera-limit: {item}: expected numbers within ±{limit:g}, found {found:g}",
+            item=key,
+            limit=largest,
+            found=worst,
+        )
 
 
 def _rotation(file: Storage, name: str) -> Floats:
@@ -164,18 +182,28 @@ def _rotation(file: Storage, name: str) -> Floats:
     rotation = _matrix(file, f"Rot_{name}", (3, 3))
     off = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if off > _NEAR or np.linalg.det(rotation) < 0.0:
-        raise file.fault("F002.camera-rotation", item=f"Rot_{name}")
+        raise file.fault("F002.camera-rotation: {item}: not a rotation matrix", item=f"Rot_{name}")
     return rotation
 
 
 def _matrix(file: Storage, key: str, shape: tuple[int, ...]) -> Floats:
     value = file.values.get(key)
     if value is None:
-        raise file.fault("F002.camera-no-key", item=key, shape=shape)
+        raise file.fault("F002.camera-no-key: {item}: key not found", item=key, shape=shape)
     if not isinstance(value, np.ndarray):
-        raise file.fault("F002.camera-other", item=key, shape=shape)
+        raise file.fault(
+            "F002.camera-other: {item}: expected {shape} numbers, found a value that is not a "
+            "numeric matrix",
+            item=key,
+            shape=axes(shape),
+        )
     if value.size != np.prod(shape) or (len(shape) == 2 and value.shape != shape):
-        raise file.fault("F002.camera-shape", item=key, shape=shape, found=value.shape)
+        raise file.fault(
+            "F002.camera-shape: {item}: expected {shape} numbers, found {found}",
+            item=key,
+            shape=axes(shape),
+            found=axes(value.shape),
+        )
     return value.reshape(shape)
 
 
@@ -213,7 +241,12 @@ def read_storage(source: Source) -> Storage:
             matrix, listed = None, None
             name, rest = _text(key[1]), key[2].strip()
             if name in values:
-                raise _fault(source, "F002.camera-twice", number, found=name)
+                raise _fault(
+                    source,
+                    'F002.camera-twice: expected unique keys, found "{found}" again',
+                    number,
+                    found=name,
+                )
             file.lines[name] = number
             if rest.startswith(b"!!opencv-matrix"):
                 matrix = _Matrix(name, number)
@@ -228,7 +261,12 @@ def read_storage(source: Source) -> Storage:
         elif listed is not None and (item := _ITEM.fullmatch(line)):
             listed.append(_text(item[1]))
         else:
-            raise _fault(source, "F002.camera-value", number, found=line.strip())
+            raise _fault(
+                source,
+                "F002.camera-value: expected `name: value`, found {found}",
+                number,
+                found=quoted(line.strip()),
+            )
     _close(source, matrix, values)
     return file
 
@@ -249,12 +287,22 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
     """Parse one line of a matrix."""
     part = None if matrix.is_open else _PART.fullmatch(line)
     if part is None and not matrix.is_open:
-        raise _fault(source, "F002.camera-part", number, found=line.strip())
+        raise _fault(
+            source,
+            "F002.camera-part: expected rows, cols, dt or data, found {found}",
+            number,
+            found=quoted(line.strip()),
+        )
     text = line.strip() if part is None else part[2].strip()
     if part is not None and part[1] in (b"rows", b"cols"):
         size = to_number(text)
         if size is None or size != int(size) or not 0 <= size <= _MOST:
-            raise _fault(source, "F002.camera-size", number, found=text)
+            raise _fault(
+                source,
+                "F002.camera-size: expected a size, found {found}",
+                number,
+                found=quoted(text),
+            )
         if part[1] == b"rows":
             matrix.rows = int(size)
         else:
@@ -264,7 +312,12 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
         return
     if part is not None:
         if not text.startswith(b"["):
-            raise _fault(source, "F002.camera-data", number, found=text)
+            raise _fault(
+                source,
+                "F002.camera-data: expected a list of numbers in brackets, found {found}",
+                number,
+                found=quoted(text),
+            )
         text, matrix.is_open = text[1:], True
     numbers, bracket, _ = text.partition(b"]")
     matrix.is_open = not bracket
@@ -279,15 +332,27 @@ def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> 
         return
     if min(matrix.rows, matrix.columns) < 0:
         lacking = "rows" if matrix.rows < 0 else "cols"
-        raise _fault(source, "F002.camera-lacks", matrix.line, item=matrix.key, name=lacking)
+        raise _fault(
+            source,
+            "F002.camera-lacks: {item}: expected rows, cols and data, found no {name}",
+            matrix.line,
+            item=matrix.key,
+            name=lacking,
+        )
     numbers = [to_number(word) for word in matrix.data]
     if None in numbers:
         at = numbers.index(None)
         word = matrix.data[at]
         item = printable(matrix.key, 60)
-        raise _fault(source, number_key(word), matrix.lines[at], item=item, found=word)
+        raise _fault(source, number_key(word), matrix.lines[at], item=item, found=quoted(word))
     if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
-        sizes: dict[str, Any] = {"item": matrix.key, "shape": (matrix.rows, matrix.columns)}
-        raise _fault(source, "F002.camera-count", matrix.line, found=len(numbers), **sizes)
+        sizes: dict[str, Any] = {"item": matrix.key, "shape": axes((matrix.rows, matrix.columns))}
+        raise _fault(
+            source,
+            "F002.camera-count: {item}: expected {shape} numbers, found {found}",
+            matrix.line,
+            found=len(numbers),
+            **sizes,
+        )
     array = np.array(numbers, dtype=np.float64).reshape(matrix.rows, matrix.columns)
     values[matrix.key] = array

@@ -10,9 +10,11 @@ from dataclasses import field
 from pathlib import Path
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.formats._published_models import published_names
 from viewer.formats._source import Source
-from viewer.phrases import printable
+from viewer.phrases import counted, listed, printable
 
 BODIES = ("smpl_full", "smplfull", "smpl")
 """Folders of body parameters, the most complete first."""
@@ -72,8 +74,18 @@ def find_frames(source: Source) -> FrameFiles:
     if not any(found):
         models = published_names(source.path)
         if models:
-            raise source.fault("F002.model-folder", names=models)
-        raise source.fault("F002.capture-frames")
+            raise source.fault(
+                wording.MODEL_FOLDER,
+                names=listed(models, 12),
+                remedy=Remedy(
+                    "choose it with File > Models > Choose model folder",
+                    "name it with --model-path",
+                ),
+            )
+        raise source.fault(
+            "F002.capture-frames: expected frame files (smpl_full, smplfull, smpl, "
+            "keypoints3d: 000000.json …), found none"
+        )
     first = ((folder.path, names[0]) for folder, names in zip(folders, found, strict=True) if names)
     source.also_read += [(path / name).parent for path, name in first]
     return _on_timeline(source, folders, found)
@@ -94,9 +106,11 @@ def _look(source: Source, folder: Path) -> tuple[list[str], list[str]]:
                     others.append(entry.name)
     except OSError as problem:
         name, reason = printable(folder.name, 100), str(problem.strerror or problem)
-        raise source.fault("F001.capture-folder", item=name, reason=reason) from None
+        raise source.fault(
+            "F001.capture-folder: {item}: cannot be read: {reason}", item=name, reason=reason
+        ) from None
     if others:
-        source.warn("F007.capture-no-files", names=others)
+        source.warn("F007.capture-no-files: ignored (not files): {names}", names=listed(others))
     return sorted(files), sorted(folders)
 
 
@@ -107,9 +121,16 @@ def _folders(source: Source, names: list[str], inside: list[str]) -> list[FrameF
     if not bodies and not points:
         return [FrameFolder(source.path)]
     if len(bodies) > 1:
-        source.warn("F007.capture-beside", name=bodies[0], others=" and ".join(bodies[1:]))
+        source.warn(
+            "F007.capture-beside: read {name}/, ignored {others}/ in the same folder",
+            name=bodies[0],
+            others=" and ".join(bodies[1:]),
+        )
     if names:
-        source.warn("F007.capture-files", names=names)
+        source.warn(
+            "F007.capture-files: ignored files next to the frame folders: {names}",
+            names=listed(names),
+        )
     both = bool(bodies and points)
     return [
         FrameFolder(source.path / name, name != POINTS or not both, name == POINTS or not both)
@@ -125,7 +146,12 @@ def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> lis
     first, files = holding[0]
     if len(holding) > 1:
         others = [name for name, _ in holding[1:]]
-        source.warn("F007.capture-camera", folder=folder.path.name, name=first, others=others)
+        source.warn(
+            "F007.capture-camera: read {folder}/{name}, ignored other cameras: {others}",
+            folder=folder.path.name,
+            name=first,
+            others=listed(others),
+        )
     folder.path = folder.path / first
     return files
 
@@ -139,7 +165,10 @@ def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[st
         numbers = {name: number for part in numbered for name, number in part.items()}
         foreign = [name for names in found for name in names if name not in numbers]
         if foreign:
-            source.warn("F007.capture-foreign", names=list(dict.fromkeys(foreign)))
+            source.warn(
+                "F007.capture-foreign: ignored files that are not named like the frames: {names}",
+                names=listed(list(dict.fromkeys(foreign))),
+            )
         found = [[name for name in names if name in numbers] for names in found]
         order = sorted(set(numbers.values()))
         first, last = order[0], order[-1]
@@ -147,7 +176,12 @@ def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[st
             place = {name: number - first for name, number in numbers.items()}
             files.first_frame = first
         else:
-            source.warn("F007.capture-numbers", n=len(order), first=first, last=last)
+            source.warn(
+                "F007.capture-numbers: {n} numbered from {first} to {last}: treated as consecutive",
+                n=counted(len(order), "frame"),
+                first=first,
+                last=last,
+            )
             rank = {number: index for index, number in enumerate(order)}
             place = {name: rank[number] for name, number in numbers.items()}
     else:
@@ -188,4 +222,7 @@ def _put(source: Source, folder: FrameFolder, frames: Iterable[tuple[int, str]])
         if folder.names.setdefault(frame, name) != name:
             doubled.append(name)
     if doubled:
-        source.warn("C005.capture-twice", names=doubled)
+        source.warn(
+            "C005.capture-twice: omitted frames that occur in more than one file: {names}",
+            names=listed(doubled),
+        )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import FormatError
 from viewer.media.image import decode_picture, picture_dimensions
 from viewer.phrases import listed, printable
@@ -55,7 +55,7 @@ class ImageFolders:
             self._faults[path] = str(problem)
         except OSError as problem:
             values = {"reason": str(problem.strerror or problem)}
-            self._faults[path] = str(Diagnostic("F001.picture", path, values=values))
+            self._faults[path] = str(Diagnostic(wording.PICTURE, path, values=values))
         return None
 
     def size_of(self, camera: str) -> tuple[int, int] | None:
@@ -104,8 +104,13 @@ def find_images(
         if there:
             return ImageFolders(there, frame_rate, frames)
     if given is not None:
-        values = {"names": [view.name for view in views]}
-        key = "F001.camera-images" if views else "F001.camera-images-cameras"
+        values = {"names": listed([view.name for view in views])}
+        key = (
+            "F001.camera-images: expected a folder of images for a camera ({names}), found none"
+            if views
+            else "F001.camera-images-cameras: images need calibrated cameras: intri.yml and "
+            "extri.yml next to the recording, found none"
+        )
         raise FormatError(Diagnostic(key, given, values=values))
     return None
 

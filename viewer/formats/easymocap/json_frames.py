@@ -10,7 +10,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
@@ -26,7 +27,7 @@ from viewer.formats._text.json_places import (
 )
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST, within_text
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 
 Record = dict[str, Any]
 _TRANSLATION = "Th"
@@ -74,23 +75,28 @@ def load_people(path: str, max_size: int) -> list[Any]:
         content = _decode(text)
     except json.JSONDecodeError as problem:
         reason = printable(problem.msg, 100)
-        raise _fault("F002.json", path, problem.lineno, reason=reason) from None
+        raise _fault(wording.JSON, path, problem.lineno, reason=reason) from None
     except RecursionError:
-        raise _fault("F002.json-nesting", path, line_at(text, deepest_place(text))) from None
+        raise _fault(wording.JSON_NESTING, path, line_at(text, deepest_place(text))) from None
     except _RepeatedKeyError as problem:
         found = repeated_key(text)
         line = _line(text, found[1] if found else None)
-        raise _fault("F002.json-twice", path, line, found=str(problem)) from None
+        raise _fault(wording.JSON_TWICE, path, line, found=str(problem)) from None
     except ValueError:  # decoding can raise no other error
         line = _line(text, long_number_place(text))
-        raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
+        raise _fault(wording.CAPTURE_DIGITS, path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:
         content = content[_WRAPPER]
     elif isinstance(content, dict) and not _OF_PERSON.isdisjoint(content):
         content = [content]  # a single person without a list
     if not isinstance(content, list):
         line = _line(text, nearest_place(text, (_WRAPPER,))) or 1
-        raise _fault("F002.capture-list", path, line, found=describe(content))
+        raise _fault(
+            "F002.capture-list: expected a list of people, found {found}",
+            path,
+            line,
+            found=describe(content),
+        )
     return content
 
 
@@ -126,7 +132,9 @@ def _text(path: str, max_size: int) -> str:
         return data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as problem:
         line = 1 + data.count(b"\n", 0, problem.start)
-        raise _fault("F002.capture-text", path, line) from None
+        raise _fault(
+            "F002.capture-text: expected UTF-8 text, found invalid bytes", path, line
+        ) from None
 
 
 def _read(path: str, max_size: int) -> bytes:
@@ -135,7 +143,14 @@ def _read(path: str, max_size: int) -> bytes:
     try:
         size = os.fstat(handle).st_size
         if size > max_size:
-            raise _fault("F001.too-large", path, None, most=max_size, size=size)
+            raise _fault(
+                wording.TOO_LARGE,
+                path,
+                None,
+                most=max_size,
+                size=size,
+                remedy=Remedy("", " (see --max-size)"),
+            )
         data = os.read(handle, size + 1)
         while 0 < len(data) < size and (more := os.read(handle, size - len(data) + 1)):
             data += more
@@ -154,7 +169,9 @@ def person_of(record: Any, place: int) -> int | str:
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
     if not isinstance(record, dict):
-        raise RecordError("", Phrase("record-person", found=describe(record)))
+        raise RecordError(
+            "", Phrase("expected a person with named values, found {found}", found=describe(record))
+        )
     given = (value for key in ("id", "personID") if (value := record.get(key)) is not None)
     person = next(given, place)
     if isinstance(person, str):
@@ -165,9 +182,16 @@ def person_of(record: Any, place: int) -> int | str:
     if isinstance(person, float) and person.is_integer():
         person = int(person)
     if isinstance(person, bool) or not isinstance(person, int):
-        raise RecordError("id", Phrase("record-id", found=describe(person)))
+        raise RecordError(
+            "id", Phrase("expected an integer or a name, found {found}", found=describe(person))
+        )
     if abs(person) >= 1 << 31:
-        raise RecordError("id", Phrase("record-id-limit", limit=1 << 31, found=describe(person)))
+        raise RecordError(
+            "id",
+            Phrase(
+                "expected an id below {limit}, found {found}", limit=1 << 31, found=describe(person)
+            ),
+        )
     return person
 
 
@@ -185,8 +209,8 @@ def row_of(record: Record, key: str) -> list[Any]:
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
         values = values[0]
     if not isinstance(values, list):
-        found = describe(record[key]) if key in record else Phrase("found-no-key")
-        raise RecordError(key, Phrase("record-numbers", found=found))
+        found = describe(record[key]) if key in record else Phrase("no value")
+        raise RecordError(key, Phrase("expected numbers, found {found}", found=found))
     return values
 
 
@@ -227,9 +251,23 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
         pass  # the error is reported below
     values = row_of(record, key)
     if len(values) != count:
-        raise RecordError(key, Phrase("record-count", expected=count, found=len(values)))
+        raise RecordError(
+            key,
+            Phrase(
+                "expected {expected}, found {found}",
+                expected=counted(count, "number"),
+                found=len(values),
+            ),
+        )
     found = describe(_odd_one(values))
-    raise RecordError(key, Phrase("record-odd", expected=count, found=found))
+    raise RecordError(
+        key,
+        Phrase(
+            "expected {expected}, found {found} among them",
+            expected=counted(count, "number"),
+            found=found,
+        ),
+    )
 
 
 def _odd_one(values: list[Any]) -> Any:

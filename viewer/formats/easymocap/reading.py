@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._source import remark_on
@@ -40,7 +40,7 @@ from viewer.formats.easymocap.json_frames import (
     person_of,
     record_line,
 )
-from viewer.phrases import printable
+from viewer.phrases import counted, listed, one_of, optional, printable
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.capture import CapturePart
@@ -146,11 +146,18 @@ class Reading:
                 continue
             if person < 0:  # the identity is unknown: the number is unique only within the frame
                 person = min(seen) - 1 if -1 in seen else -1
-                self.note("F007.record-untracked", path)
+                self.note(wording.RECORD_UNTRACKED, path)
             if person in seen:
                 line = self._line(path, place, "")
                 values = {"item": f"person {person}"}
-                self._fault(Diagnostic("F002.record-twice", Path(path), line, values=values))
+                self._fault(
+                    Diagnostic(
+                        "F002.record-twice: {item} occurs twice: the first one is used",
+                        Path(path),
+                        line,
+                        values=values,
+                    )
+                )
                 continue
             if record.get("id") is None or "personID" in record:
                 self._note_ids(path, record)
@@ -161,15 +168,18 @@ class Reading:
         """Add a note on the identity that is used if a record has none, or two different ones."""
         first, second = record.get("id"), record.get("personID")
         if first is None and second is None:
-            self.note("F007.record-no-id", path)
+            self.note("F007.record-no-id: people without an id are numbered in list order", path)
         elif None not in (first, second) and str(first) != str(second):
-            self.note("F007.record-ids", path)
+            self.note("F007.record-ids: id and personID of people differ: id is used", path)
 
     def _number_of(self, person: int | str) -> int:
         """Return the number of a person; those with names get unused numbers."""
         if isinstance(person, int):
             if person in self._names.values():
-                raise RecordError("id", Phrase("record-id-named", found=person))
+                raise RecordError(
+                    "id",
+                    Phrase("expected a name as in earlier records, found {found}", found=person),
+                )
             self._numbers.add(person)
             return person
         if person not in self._names:
@@ -199,9 +209,17 @@ class Reading:
         except RecordError as problem:
             self._fault_of(path, place, problem, person_label(person), problem.key)
         if has_body and _POINTS in record and not has_points:
-            self.note("F007.record-points", path)
+            self.note(
+                "F007.record-points: keypoints3d in this record and in the folder keypoints3d: "
+                "those in the folder are used",
+                path,
+            )
         elif has_points and "poses" in record and not has_body:
-            self.note("F007.record-poses", path)
+            self.note(
+                "F007.record-poses: poses in this record and in a separate folder: those in the "
+                "folder are used",
+                path,
+            )
 
     def _add_body(
         self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
@@ -217,7 +235,7 @@ class Reading:
         rows.add(record, frame, path, place)
         part.bodies[person] = rows
         if "vertices" in record:
-            self.note("F007.record-vertices", path)
+            self.note("F007.record-vertices: vertices are ignored: they are not needed", path)
 
     def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
         """Return the layout of all bodies, extended by the first record with coefficients."""
@@ -226,7 +244,11 @@ class Reading:
             layout = body_layout(record, self._usual)
         elif first := [key for key in self._awaited if has_numbers(record, key)]:
             layout = with_coefficients(layout, record, self._usual)
-            self.note("F007.record-first", path, keys=tuple(first))
+            self.note(
+                "F007.record-first: no earlier record has {keys}: 0 is used until a record does",
+                path,
+                keys=one_of(tuple(first)),
+            )
         else:
             return layout
         self.body_layout, keys = layout, [key for key, _ in layout.widths]
@@ -285,13 +307,24 @@ class Reading:
         values: dict[str, Any] = {"name": self.options.name}
         if unseen:
             people = [*map(person_label, unseen)]
-            found.append(Diagnostic("F007.record-unseen", values={**values, "people": people}))
+            found.append(
+                Diagnostic(
+                    "F007.record-unseen: {name}: no keypoint of {people} is ever visible: every "
+                    "confidence is 0",
+                    values={**values, "people": listed(people)},
+                )
+            )
         if self._names:
             names = [f"{number}: {printable(name, 40)}" for name, number in self._names.items()]
-            found.append(Diagnostic("F007.person-names", values={"names": names}))
+            found.append(Diagnostic(wording.PERSON_NAMES, values={"names": listed(names)}))
         more = self._n_faults - _MOST_WARNINGS
         if more > 0:
-            found.append(Diagnostic("F007.records", values={**values, "n": more}))
+            found.append(
+                Diagnostic(
+                    "F007.records: {name}: {n} in frame files",
+                    values={**values, "n": counted(more, "more error")},
+                )
+            )
         return found
 
     def _faults(self, person: int, rows: Rows, faults: list[RowFault]) -> None:
@@ -302,8 +335,10 @@ class Reading:
     def _fault_of(self, path: str, place: int, problem: RecordError, *names: str) -> None:
         """Record an error in a person's record, or in one of its keys."""
         line = self._line(path, place, problem.key)
-        values = {"item": ": ".join(filter(None, names)), "problem": problem.problem}
-        self._fault(Diagnostic(f"{problem.code}.record", Path(path), line, values=values))
+        item = optional("{}: ", ": ".join(filter(None, names)))
+        values = {"item": item, "problem": problem.problem}
+        message = f"{problem.code}.record: {{item}}{{problem}}"
+        self._fault(Diagnostic(message, Path(path), line, values=values))
 
     def _line(self, path: str, place: int, key: str) -> int | None:
         # Finding the line reads the file again, which is skipped for errors that are not shown.
@@ -315,7 +350,7 @@ class Reading:
         self.first_fault = self.first_fault or fault
         self._n_faults += 1
         if self._n_faults <= _MOST_WARNINGS:
-            self._found.append(remark_on("F007.record", fault))
+            self._found.append(remark_on("F007.record: {problem}", fault))
 
     def note(self, key: str, path: str, **values: Any) -> None:
         """Record a note about the files, without repeating it."""
@@ -328,8 +363,12 @@ class Reading:
 def _lacks(record: dict[str, Any], folder: FrameFolder) -> Phrase:
     wanted = ("poses",) * folder.has_bodies + (_POINTS,) * folder.has_points
     if not record:
-        return Phrase("record-no-keys", expected=wanted)
-    return Phrase("record-lacks", expected=wanted, keys=list(record))
+        return Phrase("expected {expected}, found no keys", expected=one_of(wanted))
+    return Phrase(
+        "expected {expected}, found keys {keys}",
+        expected=one_of(wanted),
+        keys=listed(list(record), 8),
+    )
 
 
 @dataclass(slots=True, kw_only=True)
@@ -357,7 +396,7 @@ class _PointRows(Rows):
     def check_any(self) -> None:
         """Refuse rows without a valid keypoint, which must not determine the layout of others."""
         if _is_odd(self._rows()).all():
-            raise RecordError(_POINTS, Phrase("record-no-rows"))
+            raise RecordError(_POINTS, Phrase("expected rows of 3 or 4 finite numbers, found none"))
 
     def _take(self, rows: Any, key: str, count: int) -> None:
         try:
@@ -373,10 +412,26 @@ class _PointRows(Rows):
         except (TypeError, ValueError, OverflowError):
             pass  # the error is reported below
         if not isinstance(rows, list):
-            raise RecordError(key, Phrase("record-points", expected=count, found=describe(rows)))
+            raise RecordError(
+                key,
+                Phrase(
+                    "expected {expected}, found {found}",
+                    expected=counted(count, "keypoint"),
+                    found=describe(rows),
+                ),
+            )
         if len(rows) != count:
-            raise RecordError(key, Phrase("record-points", expected=count, found=len(rows)))
-        raise RecordError(key, Phrase("record-other-rows"))
+            raise RecordError(
+                key,
+                Phrase(
+                    "expected {expected}, found {found}",
+                    expected=counted(count, "keypoint"),
+                    found=len(rows),
+                ),
+            )
+        raise RecordError(
+            key, Phrase("expected rows of 3 or 4 numbers, found rows of different lengths")
+        )
 
     def points(self) -> tuple[Floats, list[RowFault]]:
         """Return the points (N, K, 4), and the errors in invalid rows."""
@@ -384,7 +439,18 @@ class _PointRows(Rows):
         is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
         points[is_odd | is_unseen] = 0.0
         faults = [
-            (int(row), "", RecordError(_POINTS, Phrase("record-unseen", n=int(is_odd[row].sum()))))
+            (
+                int(row),
+                "",
+                RecordError(
+                    _POINTS,
+                    Phrase(
+                        "{n} with non-finite numbers or negative confidence, treated as not "
+                        "visible",
+                        n=counted(int(is_odd[row].sum()), "keypoint"),
+                    ),
+                ),
+            )
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
         points.flags.writeable = False  # a read-only array is not copied again
@@ -435,7 +501,16 @@ def _one_hand(side: int) -> PointLayout:
 def _count(record: dict[str, Any], key: str) -> int:
     rows = record[key]
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-        raise RecordError(key, Phrase("record-rows", found=describe(rows)))
+        raise RecordError(
+            key, Phrase("expected rows of 3 or 4 numbers, found {found}", found=describe(rows))
+        )
     if len(rows) > _MOST_POINTS:
-        raise RecordError(key, Phrase("record-most-points", most=_MOST_POINTS, found=len(rows)))
+        raise RecordError(
+            key,
+            Phrase(
+                "expected at most {most} keypoints, found {found}",
+                most=_MOST_POINTS,
+                found=len(rows),
+            ),
+        )
     return len(rows)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 import viewer
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._references import referenced_path
@@ -42,7 +42,7 @@ from viewer.formats.fbx.meshes import Placed, mesh_on_node, on_nodes, skin_of
 from viewer.formats.fbx.message import Arrays, unpacked
 from viewer.media.image import decode_picture
 from viewer.media.unfinished import new_prefix
-from viewer.phrases import counted
+from viewer.phrases import agree, counted, listed, optional, quoted, rounded
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.material import Material, Texture
 from viewer.rig.units import METRES, UNIT_NAMES
@@ -61,13 +61,13 @@ _LEAST_ALPHA = 255  # minimum alpha of opaque pixels
 _WHAT = {
     "vertices": "position",
     "normals": "normal",
-    "colors": "color",
-    "matrices": "bind-matrix",
+    "colors": "colour",
+    "matrices": "bind matrix",
     "weights": "weight",
     "blend": "weight",
     "offsets": "offset",
 }
-"""Phrase of a number in an array of a mesh, by the array's name."""
+"""What a number in an array of a mesh is, by the array's name."""
 
 # Limits of the child process.
 _SECONDS = 60.0  # time limit for the smallest files, seconds
@@ -133,7 +133,10 @@ def node_file(source: Source) -> NodeFile:
 def _run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]:
     """Run the worker on a file, and return its message."""
     if find_spec("ufbx") is None:
-        raise source.fault("F001.fbx-extra")
+        raise source.fault(
+            "F001.fbx-extra: reading .fbx files needs ufbx, which is not installed: pip "
+            "install ufbx"
+        )
     if source.is_piped:
         # The library reads files, in any order.
         prefix = new_prefix(tempfile.gettempdir(), "viewer-fbx")
@@ -158,12 +161,19 @@ def _run(source: Source, path: Path, arguments: Sequence[str]) -> tuple[Arrays, 
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise source.fault("F001.fbx-slow", seconds=seconds) from None
+        raise source.fault(
+            "F001.fbx-slow: reading took more than {seconds:.0f} s and was stopped", seconds=seconds
+        ) from None
     message = unpacked(done.stdout) if done.returncode == 0 else None
     if message is None:
-        raise source.fault("F001.fbx-crash", how=_ending(done.returncode, done.stderr))
+        raise source.fault(
+            "F001.fbx-crash: the FBX library failed on this file: {how}",
+            how=_ending(done.returncode, done.stderr),
+        )
     if "error" in message[1]:
-        raise source.fault("F002.fbx", reason=message[1]["error"])
+        raise source.fault(
+            "F002.fbx: not a readable FBX file: {reason}", reason=message[1]["error"]
+        )
     return message
 
 
@@ -178,9 +188,11 @@ def _environment(memory: int) -> dict[str, str]:
 def _ending(code: int, errors: bytes) -> Phrase:
     """Return a phrase that describes how a process ended."""
     if code < 0:
-        return Phrase("ended-by-signal", number=-code)
+        return Phrase("it crashed with signal {number}", number=-code)
     lines = errors.decode(errors="replace").strip().splitlines()
-    return Phrase("ended-with-error", code=code, error=lines[-1] if lines else "")
+    return Phrase(
+        "exit code {code}{error}", code=code, error=optional(": {}", lines[-1] if lines else "")
+    )
 
 
 def _check_end(source: Source, version: int) -> None:
@@ -190,12 +202,24 @@ def _check_end(source: Source, version: int) -> None:
     bare = _UNSTRUCTURED.sub(b"", source.data)
     depth = bare.count(b"{") - bare.count(b"}")
     if depth > 0:
-        raise source.fault("F002.fbx-cut", source.end, n=depth)
+        raise source.fault(
+            "F002.fbx-cut: expected the end of {n}, found the end of the file: it is cut short",
+            source.end,
+            n=counted(depth, "open section"),
+        )
     if version >= _CONNECTED and b"Connections:" not in bare:
-        raise source.fault("F002.fbx-connections", source.end)
+        raise source.fault(
+            "F002.fbx-connections: expected a section Connections, found the end of the file: "
+            "it is cut short",
+            source.end,
+        )
     if _CONNECTED <= version < _STACKED and b"Takes:" not in bare:
         # The SDK always writes this section, other programs may not, so the file can be whole.
-        source.warn("F007.fbx-takes", source.end)
+        source.warn(
+            "F007.fbx-takes: no section Takes before the end of the file: if it is cut short, "
+            "its animations are missing",
+            source.end,
+        )
 
 
 def _check_arrays(source: Source, arrays: Arrays, place: Callable[[str, int], Phrase]) -> None:
@@ -206,17 +230,15 @@ def _check_arrays(source: Source, arrays: Arrays, place: Callable[[str, int], Ph
         bad = ~(np.abs(array) <= REACH)
         if bad.any():
             row, found = int(np.argwhere(bad)[0][0]), float(array[bad][0])
-            kind = "limit" if math.isfinite(found) else "finite"
+            kind = wording.TOO_FAR if math.isfinite(found) else wording.NOT_FINITE
             at = place(name, row)
-            raise source.fault(f"F003.{kind}", item=at, found=found, limit=REACH, at="")
+            raise source.fault(f"F003.{kind}", item=at, found=found, limit=rounded(REACH, 2), at="")
 
 
 def _check_values(source: Source, told: Any, path: str) -> None:
     """Refuse such numbers in the JSON of a message."""
     if isinstance(told, float):
-        _check_arrays(
-            source, {path: np.array([told])}, lambda name, _: Phrase("fbx-value", of=name)
-        )
+        _check_arrays(source, {path: np.array([told])}, lambda name, _: Phrase("{of}", of=name))
     elif isinstance(told, dict):
         name = told.get("name")
         for key, value in told.items():
@@ -236,17 +258,20 @@ def _check_indices(source: Source, arrays: Arrays, told: dict[str, Any]) -> None
         if wrong.any():
             place = _place(told, name, int(wrong.argmax()))
             found = float(array[wrong.argmax()])
-            raise source.fault("F002.vertex-range", item=place, last=last, found=found)
+            raise source.fault(wording.VERTEX_RANGE, item=place, last=last, found=found)
 
 
 def _place(told: dict[str, Any], name: str, row: int) -> Phrase:
     """Return where an array of the contents stands in the file."""
     if name in ("local", "geometry"):
-        return Phrase("fbx-node", node=told["names"][row], row=row)
+        return Phrase("node {node} ({row}): transform", node=quoted(told["names"][row]), row=row)
     owner, *_, what = name.split(".")
     mesh = told["meshes"][int(owner.removeprefix("mesh"))]
     return Phrase(
-        "fbx-mesh", mesh=mesh["name"], what=Phrase(f"fbx-{_WHAT.get(what, 'uv')}"), row=row
+        "mesh {mesh}: {what} {row}",
+        mesh=quoted(mesh["name"]),
+        what=Phrase(_WHAT.get(what, "texture coordinate")),
+        row=row,
     )
 
 
@@ -257,30 +282,45 @@ def _place_of_keys(told: dict[str, Any], track: dict[str, Any]) -> Phrase:
     else:
         rows = [shape for mesh in told["meshes"] for shape in mesh["shapes"]]
         name = next((r["name"] for r in rows if r["element"] == track["element"]), "")
-    return Phrase("fbx-keys", node=name, path=track["path"])
+    return Phrase("keys of {node}: {path}", node=quoted(name), path=track["path"])
 
 
 def _say_unused(source: Source, told: dict[str, Any]) -> None:
     """Report unused elements of the file, and converted axes or units."""
     if told["unused"]:
         items = [counted(n, word) for word, n in told["unused"].items()]
-        source.warn("F007.fbx-unused", items=items)
+        source.warn("F007.fbx-unused: not used: {items}", items=listed(items, 12))
     for text in told["warnings"]:
-        source.warn("F007.fbx-warning", text=text)
+        source.warn("F007.fbx-warning: FBX library: {text}", text=text)
     if told["converted"]:
         names = {"target_axes": "axes", "target_unit_meters": "unit"}
         what = [names[key] for key in told["converted"] if key in names]
-        to = [Phrase("fbx-axes") if name == "axes" else UNIT_NAMES["m"] for name in what]
-        source.warn("F007.fbx-converted", what=what, to=to)
+        to = [Phrase("y up, right-handed") if name == "axes" else UNIT_NAMES["m"] for name in what]
+        source.warn(
+            "F007.fbx-converted: unsupported {what} converted to {to}",
+            what=listed(what),
+            to=listed(to),
+        )
 
 
 def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, Any]) -> None:
     """Report the properties of a mesh that have no equivalent."""
     if mesh["color_sets"] > 1:
-        source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
+        source.warn(
+            "F007.fbx-color-sets: mesh {mesh}: only the first of {n} colour sets is used",
+            mesh=quoted(mesh["name"]),
+            n=mesh["color_sets"],
+        )
     for shape in mesh["shapes"]:
         if shape["place"] == len(shape["targets"]) - 1 > 0:
-            source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["place"])
+            source.warn(
+                "F007.fbx-in-betweens: blend shape {shape}: {n} {are} of {their} own; animations "
+                "set all weights",
+                shape=quoted(shape["name"]),
+                n=counted(shape["place"], "in-between target"),
+                are=agree(shape["place"], "is a blend shape", "are blend shapes"),
+                their=agree(shape["place"], "its", "their"),
+            )
 
 
 def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera, ...], Ints]:
@@ -359,7 +399,14 @@ def _channels(
     tracks = {each["keys"]: each for each in keys["keys"]}
     _check_arrays(source, arrays, lambda name, row: _place_of_keys(told, tracks[name]))
     if keys["cut"]:
-        source.warn("F007.fbx-continued", n=keys["cut"])
+        source.warn(
+            "F007.fbx-continued: {n} that {verb} before or after {their} keys {are} held after "
+            "20000 frames",
+            n=counted(keys["cut"], "curve"),
+            verb=agree(keys["cut"], "continues", "continue"),
+            their=agree(keys["cut"], "its", "their"),
+            are=agree(keys["cut"], "is", "are"),
+        )
     channels: list[NodeChannel] = []
     weights: dict[int, dict[int, Floats]] = {}  # weights by mesh, then by blend channel
     for each in keys["keys"]:
@@ -471,7 +518,12 @@ def _material(source: Source, told: dict[str, Any], texture: Any) -> Material:
     opacity = min(max(number("opacity", 1.0), 0.0), 1.0)
     cut = texture(told["opacity"]["texture"])
     if cut is not None and (base is None or cut.name != base.name):
-        source.warn("F007.fbx-opacity", material=told["name"], texture=cut.name)
+        source.warn(
+            "F007.fbx-opacity: material {material}: the opacity texture {texture} is not used, "
+            "only the alpha of the colour texture",
+            material=quoted(told["name"]),
+            texture=quoted(cut.name),
+        )
         cut = None
     has_alpha = cut is not None and base is not None and _has_alpha(base.image)
     # In FBX, a texture replaces the value of its property; in a material, it multiplies the value.
@@ -528,5 +580,5 @@ def _picture(source: Source, content: bytes, name: str) -> Bytes | None:
     try:
         return decode_picture(source.path, content)
     except FormatError as problem:
-        source.warn("F005.texture", problem=problem.diagnostic)
+        source.warn(wording.TEXTURE, problem=problem.diagnostic)
         return None

@@ -13,6 +13,7 @@ from viewer.formats._mesh.polygons import triangulate
 from viewer.formats._scene_graph.content import MorphTargets, NodeMesh, NodeSkin, Primitive
 from viewer.formats._source import Source
 from viewer.formats.fbx.message import Arrays
+from viewer.phrases import agree, counted, quoted
 from viewer.rig.arrays import Floats, Ints
 
 
@@ -261,14 +262,28 @@ def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -
     get = _getter(arrays, f"{prefix}.skin")
     kept = _with_bone(get)
     if not kept.all():
-        source.warn("F007.fbx-no-bone", mesh=told["name"], n=int((~kept).sum()))
+        source.warn(
+            "F007.fbx-no-bone: mesh {mesh}: {n} without a joint ignored",
+            mesh=quoted(told["name"]),
+            n=counted(int((~kept).sum()), "skin cluster"),
+        )
     if told["n_skins"] > 1:
-        source.warn("F007.fbx-skins", mesh=told["name"], n=told["n_skins"])
+        source.warn(
+            "F007.fbx-skins: mesh {mesh}: only the first of {n} skin deformers is used",
+            mesh=quoted(told["name"]),
+            n=told["n_skins"],
+        )
     if not kept.any():
         return None
     alone = len(_without_weights(arrays, prefix))
     if alone:
-        source.warn("W004.mesh-node", mesh=told["name"], n=alone)
+        source.warn(
+            "W004.mesh-node: mesh {mesh}: {n} without weights {follow} the node of the mesh "
+            "instead of a joint",
+            mesh=quoted(told["name"]),
+            n=counted(alone, "vertex"),
+            follow=agree(alone, "follows", "follow"),
+        )
     return NodeSkin(
         told["skin"]["name"], get("bones")[kept], get("matrices")[kept], told["skin"]["method"]
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.formats.gltf.buffers import Buffers, View
 from viewer.formats.gltf.elements import Element, Table
+from viewer.phrases import counted, one_of
 from viewer.rig.arrays import Floats, Ints
 
 _COMPONENTS: dict[int, np.dtype[Any]] = {
@@ -145,7 +146,10 @@ class Accessors:
         layout = self._layout(index, kinds, user)
         if layout.is_normalized or layout.dtype.kind == "f":
             return values
-        layout.element.warn("G002.normalized")
+        layout.element.warn(
+            "G002.normalized: expected normalised integers, found none marked as normalised: "
+            "normalised"
+        )
         return np.maximum(values / np.iinfo(layout.dtype).max, -1.0)
 
     def integers(
@@ -164,7 +168,12 @@ class Accessors:
         if layout.dtype.kind == "f" or layout.is_normalized:
             found = "normalised integers" if layout.is_normalized else "floating-point numbers"
             source = layout.element.source
-            raise source.fault("F002.gltf-whole", user, found=found, accessor=index)
+            raise source.fault(
+                "F002.gltf-whole: expected whole numbers, found {found} in accessor {accessor}",
+                user,
+                found=found,
+                accessor=index,
+            )
         return self._picked(layout, rows, decoded).astype(np.int64)
 
     def components(self, index: int) -> Floats | None:
@@ -203,7 +212,9 @@ class Accessors:
             values = decoded.astype(layout.dtype)
         else:
             raise layout.element.fault(
-                "F002.gltf-decoded-width", expected=layout.width, found=decoded.shape[1]
+                "F002.gltf-decoded-width: expected {expected}, found {found} in compressed data",
+                expected=counted(layout.width, "component"),
+                found=decoded.shape[1],
             )
         if rows is not None:
             values = values[rows]
@@ -217,7 +228,11 @@ class Accessors:
         code = element.choice("componentType", tuple(_COMPONENTS))
         if kind not in kinds:
             raise element.source.fault(
-                "F002.gltf-kind", user, wanted=list(kinds), found=kind, accessor=index
+                "F002.gltf-kind: expected {wanted}, found {found} in accessor {accessor}",
+                user,
+                wanted=one_of(list(kinds)),
+                found=kind,
+                accessor=index,
             )
         normalized = element.flag("normalized")
         return _Layout(element, kind, _COMPONENTS[code], element.whole("count"), normalized)
@@ -238,7 +253,12 @@ class Accessors:
         """Return values in which the elements listed by a sparse accessor are replaced."""
         count = sparse.whole("count")
         if count > layout.count:
-            raise sparse.fault("F002.gltf-sparse", "count", most=layout.count, found=count)
+            raise sparse.fault(
+                "F002.gltf-sparse: expected at most {most} replaced elements, found {found}",
+                "count",
+                most=layout.count,
+                found=count,
+            )
         indices = self._sparse_indices(layout, sparse, count)
         items = sparse.part("values")
         if items is None:
@@ -260,13 +280,14 @@ class Accessors:
         if count and int(indices.max()) >= layout.count:
             first = int((indices >= layout.count).argmax())
             raise items.fault(
-                "F002.gltf-sparse-index",
+                "F002.gltf-sparse-index: entry {entry}: expected an index below {count}, found "
+                "{found}",
                 count=layout.count,
                 entry=first,
                 found=int(indices[first]),
             )
         if (indices[1:] <= indices[:-1]).any():
-            items.warn("G002.sparse-order")
+            items.warn("G002.sparse-order: sparse indices are not in increasing order")
         return indices
 
     def _sparse_view(self, items: Element) -> View:
@@ -279,15 +300,27 @@ def _elements(view: View, layout: _Layout, element: Element, offset: int) -> NDA
     size = layout.size
     stride = view.stride or size
     if stride < size:
-        raise element.fault("F002.gltf-stride", expected=size, found=stride)
+        raise element.fault(
+            "F002.gltf-stride: expected a stride of at least {expected} bytes, found {found}",
+            expected=size,
+            found=stride,
+        )
     needed = offset + stride * (layout.count - 1) + layout.extent if layout.count else 0
     if needed > len(view.data):
         raise element.fault(
-            "F002.gltf-accessor", count=layout.count, expected=needed, found=len(view.data)
+            "F002.gltf-accessor: {count}: expected {expected} in the buffer view, found {found}",
+            count=counted(layout.count, "element"),
+            expected=counted(needed, "byte"),
+            found=len(view.data),
         )
     unit = layout.dtype.itemsize
     if (view.offset + offset) % unit or stride % unit:
-        element.warn("G002.alignment", size=unit, at=view.offset + offset, stride=stride)
+        element.warn(
+            "G002.alignment: components of {size} bytes are misaligned: at {at}, stride {stride}",
+            size=unit,
+            at=view.offset + offset,
+            stride=stride,
+        )
     shape = (layout.count, *layout.columns)
     strides = (stride, layout.column_size, unit)
     if not layout.count:

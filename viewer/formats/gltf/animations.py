@@ -16,10 +16,12 @@ from typing import Any, cast
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeAnimation, NodeChannel, NodeMesh, NodeTree
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element, Table
+from viewer.phrases import counted, listed, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, Interpolation, TransformPath
 
@@ -145,7 +147,12 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
             _leave_out(document, problem, index)
     if unused.n:
         names = list(unused.names)
-        document.source.warn("F007.gltf-channels", unused.pointer, n=unused.n, names=names)
+        document.source.warn(
+            "F007.gltf-channels: {n} no visible effect: {names}",
+            unused.pointer,
+            n=counted(unused.n, "animation channel", "has", "have"),
+            names=listed(names),
+        )
     return tuple(found)
 
 
@@ -154,7 +161,9 @@ def _leave_out(document: Document, problem: FormatError, index: int) -> None:
         document.source.diagnostics.add(problem.diagnostic)
         return
     pointer = problem.diagnostic.pointer or f"/animations/{index}"
-    document.source.warn("G005.animation", pointer, problem=problem.diagnostic.message)
+    document.source.warn(
+        "G005.animation: {problem}: animation omitted", pointer, problem=problem.diagnostic.message
+    )
 
 
 def _checked(animation: NodeAnimation) -> NodeAnimation:
@@ -185,7 +194,15 @@ def _channels(
     first = min((float(channel.times[0]) for channel in channels), default=start)
     last = max((float(channel.times[-1]) for channel in channels), default=end)
     if max(abs(first - start), abs(last - end)) > _SAME_TIME:
-        animation.warn("G005.range", "samplers", start=start, end=end, first=first, last=last)
+        animation.warn(
+            "G005.range: expected keys from {start} to {end} s as declared by the accessors, "
+            "found {first} to {last} s",
+            "samplers",
+            start=rounded(start, 6),
+            end=rounded(end, 6),
+            first=rounded(first, 6),
+            last=rounded(last, 6),
+        )
     return channels
 
 
@@ -311,11 +328,20 @@ def _read_channels(
         moved = targets.of(channel)
         for node in moved.nodes:
             if (node, moved.path) in found:
-                channel.warn("G005.channel-twice", "target", node=node, path=moved.path)
+                channel.warn(
+                    "G005.channel-twice: ignored second channel for {path} of node {node}",
+                    "target",
+                    node=node,
+                    path=moved.path,
+                )
             else:
                 found[node, moved.path] = _channel(reading, channel, moved, node)
     if reading.n_equal:
-        animation.warn("G005.equal-times", "samplers", n=reading.n_equal)
+        animation.warn(
+            "G005.equal-times: {n} the same time as the next key: ignored",
+            "samplers",
+            n=counted(reading.n_equal, "key", "has", "have"),
+        )
     return tuple(found.values())
 
 
@@ -352,15 +378,23 @@ def _read_times(document: Document, sampler: Element) -> Floats:
     accessor = sampler.required_index("input", len(document.accessors), "accessors")
     times = document.accessors.floats(accessor, ("SCALAR",), sampler.at("input"))[:, 0]
     if not len(times):
-        raise sampler.fault("F002.gltf-no-keys", "input")
+        raise sampler.fault(
+            "F002.gltf-no-keys: expected at least one key time, found none", "input"
+        )
     if not np.isfinite(times).all():
         key = int((~np.isfinite(times)).argmax())
-        raise sampler.fault("F003.gltf-keys", "input", index=key, found=float(times[key]))
+        raise sampler.fault(wording.GLTF_KEYS, "input", index=key, found=float(times[key]))
     is_earlier = times[1:] < times[:-1]
     if is_earlier.any():
         key = int(is_earlier.argmax()) + 1
         found, before = float(times[key]), float(times[key - 1])
-        raise sampler.fault("F002.gltf-times", "input", index=key, found=found, before=before)
+        raise sampler.fault(
+            "F002.gltf-times: key {index}: expected ascending times, found {found} after {before}",
+            "input",
+            index=key,
+            found=rounded(found, 6),
+            before=rounded(before, 6),
+        )
     return times
 
 
@@ -380,14 +414,20 @@ def _read_keys(
     expected = len(times) * per_key * width
     if rows.size != expected:
         # The count is in elements of the accessor: vectors, or single weights.
-        counts = {"expected": expected // rows.shape[1], "found": len(rows), "keys": len(times)}
-        raise sampler.fault("F002.gltf-outputs", "output", **counts)
+        counts = {
+            "expected": counted(expected // rows.shape[1], "element"),
+            "found": len(rows),
+            "keys": counted(len(times), "key"),
+        }
+        raise sampler.fault(
+            "F002.gltf-outputs: expected {expected} for {keys}, found {found}", "output", **counts
+        )
     keys = rows.reshape(len(times), per_key, width)
     bad = ~np.isfinite(keys)
     if bad.any():
         key, place, column = (int(axis[0]) for axis in np.nonzero(bad))
         found = float(keys[key, place, column])
-        raise sampler.fault("F003.gltf-keys", "output", index=key, found=found)
+        raise sampler.fault(wording.GLTF_KEYS, "output", index=key, found=found)
     if path == "rotation":
         is_whole = document.accessors[accessor].values.get("componentType") != 5126
         keys = _rotations(sampler, keys, is_whole)
@@ -411,5 +451,9 @@ def _rotations(sampler: Element, keys: Floats, is_whole: bool) -> Floats:
     middle = keys.shape[1] // 2
     lengths = np.linalg.norm(keys[:, middle], axis=1)
     if (lengths < _TINY).any():
-        raise sampler.fault("F002.gltf-rotation", "output", index=int((lengths < _TINY).argmax()))
+        raise sampler.fault(
+            "F002.gltf-rotation: key {index}: expected a rotation, found only zeros",
+            "output",
+            index=int((lengths < _TINY).argmax()),
+        )
     return keys if middle and not is_whole else keys / lengths[:, None, None]

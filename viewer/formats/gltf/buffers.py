@@ -16,6 +16,7 @@ from viewer.formats._file_bytes import read_bytes
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.meshopt import decoded_view, meshopt_of
+from viewer.phrases import counted, quoted
 from viewer.rig.arrays import Bytes
 
 
@@ -52,7 +53,7 @@ def _located(buffer: Element, length: int) -> bytes:
         if problem.path == buffer.source.path:
             raise
         found = problem.diagnostic
-        raise buffer.fault("F001.gltf-file", "uri", problem=found) from None
+        raise buffer.fault("F001.gltf-file: {problem}", "uri", problem=found) from None
 
 
 class Buffers:
@@ -117,7 +118,7 @@ class Buffers:
         if place >= 0:
             return EncodedImage(name, self.view(place).data.tobytes(), True)
         if not image.has("uri"):
-            raise image.fault("F002.gltf-image")
+            raise image.fault("F002.gltf-image: expected a uri or a bufferView, found neither")
         uri = image.text("uri")
         if _is_data_uri(uri):
             return EncodedImage(name, _uri_bytes(image), True)
@@ -132,7 +133,12 @@ class Buffers:
         data = self.data(number)
         if offset + length > len(data):
             raise view.fault(
-                "F002.gltf-view", first=offset, end=offset + length, buffer=number, size=len(data)
+                "F002.gltf-view: expected bytes {first} to {end} of buffer {buffer}, found the end "
+                "of its data after {size} bytes",
+                first=offset,
+                end=offset + length,
+                buffer=number,
+                size=len(data),
             )
         stride = view.whole("byteStride", 0)
         return View(data[offset : offset + length], stride, offset)
@@ -147,9 +153,13 @@ class Buffers:
         elif index == 0 and self._binary is not None:
             data = self._binary
         else:
-            raise buffer.fault("F002.gltf-no-data")
+            raise buffer.fault("F002.gltf-no-data: expected a uri or a binary chunk, found neither")
         if len(data) < length:
-            buffer.warn("G001.buffer", expected=length, found=len(data))
+            buffer.warn(
+                "G001.buffer: expected {expected} as declared by byteLength, found {found}",
+                expected=counted(length, "byte"),
+                found=len(data),
+            )
         return np.frombuffer(data, dtype=np.uint8)
 
 
@@ -179,13 +189,19 @@ def _uri_path(element: Element) -> Path:
     """Return the file to which the ``uri`` of a buffer or image refers; it need not exist."""
     uri = element.text("uri")
     if _SCHEME.match(uri):
-        raise element.fault("F002.gltf-scheme", "uri", found=uri[:_SHOWN])
+        raise element.fault(
+            "F002.gltf-scheme: expected a data URI or a relative file name, found {found}",
+            "uri",
+            found=quoted(uri[:_SHOWN]),
+        )
     folder = element.source.path.parent
     name = unquote(uri)
     path = referenced_path(folder, name)
     if path is None:
         reason = refused_text(name)
-        raise element.fault("F002.gltf-outside", "uri", found=name[:_SHOWN], reason=reason)
+        raise element.fault(
+            "F002.gltf-outside: {found} {reason}", "uri", found=quoted(name[:_SHOWN]), reason=reason
+        )
     # Many exporters do not encode names, so a name may contain a literal %.
     literal = referenced_path(folder, uri) if "%" in uri else None
     return literal if literal is not None and _is_file(literal) else path
@@ -203,7 +219,11 @@ def _data_uri_bytes(element: Element, most: int | None = None) -> bytes:
     uri = element.text("uri")
     comma = uri.find(",")
     if comma < 0:
-        raise element.fault("F002.gltf-data-uri", "uri", found=uri[:_SHOWN])
+        raise element.fault(
+            "F002.gltf-data-uri: expected a comma before the data, found {found}",
+            "uri",
+            found=quoted(uri[:_SHOWN]),
+        )
     if not uri[:comma].rstrip().lower().endswith(";base64"):
         data = unquote_to_bytes(uri[comma + 1 :])
         return data if most is None else data[:most]
@@ -220,4 +240,7 @@ def _decoded(element: Element, text: str) -> bytes:
     try:
         return binascii.a2b_base64(plain + "=" * (-len(plain) % 4), strict_mode=True)
     except ValueError:
-        raise element.fault("F002.gltf-base64", "uri") from None
+        raise element.fault(
+            "F002.gltf-base64: expected base64 data, found other characters or an incomplete end",
+            "uri",
+        ) from None

@@ -12,11 +12,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree, descendants, roots_of
 from viewer.formats._vrm.parts import listed, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
+from viewer.phrases import agree, counted
+from viewer.phrases import listed as listed_text
+from viewer.phrases import rounded as rounded_text
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.inspection.faults import UNIT_ROTATION
 
@@ -100,13 +104,27 @@ def _compare_bounds(accessor: Element, components: Floats | None) -> None:
         declared = accessor.numbers(name)
         if declared is None or len(declared) != len(found):
             n_declared = 0 if declared is None else len(declared)
-            accessor.warn("G002.bounds-length", name, expected=len(found), found=n_declared)
+            accessor.warn(
+                "G002.bounds-length: expected {expected}, one per component, found {found}",
+                name,
+                expected=counted(len(found), "number"),
+                found=n_declared,
+            )
             continue
         apart = np.abs(declared - found)
         if (apart > _ROUNDING * max(1e-30, float(np.abs(components).max()))).any():
             worst = int(apart.argmax())
-            values = {"expected": float(found[worst]), "found": float(declared[worst])}
-            accessor.warn("G002.bounds", name, component=worst, **values)
+            values = {
+                "expected": rounded_text(float(found[worst]), 9),
+                "found": rounded_text(float(declared[worst]), 9),
+            }
+            accessor.warn(
+                "G002.bounds: component {component}: expected {expected} as in the data, found "
+                "{found}",
+                name,
+                component=worst,
+                **values,
+            )
 
 
 def _check_vertices(document: Document) -> None:
@@ -127,7 +145,10 @@ def _check_attributes(document: Document, attributes: Element) -> None:
     accessors = document.accessors
     position = attributes.index("POSITION", len(accessors), "accessors")
     if position >= 0 and not _has_bounds(accessors[position]):
-        attributes.warn("G002.no-bounds", "POSITION")
+        attributes.warn(
+            "G002.no-bounds: positions: expected an accessor with min and max, found one without",
+            "POSITION",
+        )
     for name in attributes.values:
         number = name.removeprefix("JOINTS_")
         if number == name or not attributes.has(f"WEIGHTS_{number}"):
@@ -141,7 +162,14 @@ def _check_attributes(document: Document, attributes: Element) -> None:
         unused = (weights == 0.0) & (joints != 0.0)
         if unused.any():
             vertex = int(unused.any(axis=1).argmax())
-            attributes.warn("G002.unused-joints", name, n=int(unused.sum()), vertex=vertex)
+            attributes.warn(
+                "G002.unused-joints: {n} of weight 0 {refer} to a joint other than 0 (first: "
+                "vertex {vertex})",
+                name,
+                n=counted(int(unused.sum()), "influence"),
+                vertex=vertex,
+                refer=agree(int(unused.sum()), "refers", "refer"),
+            )
 
 
 def _has_bounds(accessor: Element) -> bool:
@@ -152,12 +180,23 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: Ints, roots: Ints) 
     """Check that the joints have a common root, and that ``skeleton`` is one if it is declared."""
     found = np.unique(roots[read.joints]).tolist()
     if len(found) > 1:
-        skin.warn("G004.no-common-root", "joints", nodes=found)
+        skin.warn(
+            "G004.no-common-root: expected joints with a common root, found joints below nodes "
+            "{nodes}",
+            "joints",
+            nodes=listed_text(found, 12),
+        )
     declared = skin.values.get("skeleton")
     if type(declared) is int and 0 <= declared < len(parents):
         outside = int((~descendants(parents, declared)[read.joints]).sum())
         if outside:
-            skin.warn("G004.not-a-root", "skeleton", node=declared, n=outside)
+            skin.warn(
+                "G004.not-a-root: expected a common ancestor of all joints, found node {node}, "
+                "with {n} outside its subtree",
+                "skeleton",
+                node=declared,
+                n=counted(outside, "joint"),
+            )
 
 
 def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
@@ -169,18 +208,29 @@ def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...
         mesh, element = int(tree.meshes[node]), document.table("nodes")[node]
         if tree.skins[node] < 0:
             if n_bound[mesh]:
-                element.warn("G003.no-skin")
+                element.warn(
+                    "G003.no-skin: mesh with joints and weights, but no skin: not deformed"
+                )
             continue
         if is_drawn[mesh] and not n_bound[mesh]:
-            element.warn("G003.no-influences", "skin")
+            element.warn(
+                "G003.no-influences: skin of a mesh without joints and weights: not used", "skin"
+            )
             continue
         local = (*tree.translations[node], *tree.rotations[node], *tree.scales[node])
         if node in tree.matrices or not np.allclose(local, identity, atol=1e-6):
             n_rigid = len(meshes[mesh].primitives) - n_bound[mesh]
             if n_rigid:
-                element.warn("G003.partly-used", n=n_rigid)
+                element.warn(
+                    "G003.partly-used: transform of a node with a skinned mesh: used only by its "
+                    "{n} "
+                    "without joints and weights",
+                    n=counted(n_rigid, "primitive"),
+                )
             else:
-                element.warn("G003.unused-transform")
+                element.warn(
+                    "G003.unused-transform: transform of a node with a skinned mesh: not used"
+                )
 
 
 def _check_animation(document: Document, animation: Element) -> None:
@@ -195,7 +245,12 @@ def _check_animation(document: Document, animation: Element) -> None:
         node = target.index("node", len(nodes), "nodes")
         path = target.text("path")
         if node >= 0 and path != "weights" and nodes[node].has("matrix"):
-            target.warn("G005.matrix", "node", node=node)
+            target.warn(
+                "G005.matrix: expected a node without a matrix, found node {node} with one: its "
+                "matrix is decomposed",
+                "node",
+                node=node,
+            )
         if path == "rotation":
             rotating.add(channels[place].index("sampler", len(samplers), "samplers"))
     seen: set[int] = set()
@@ -211,10 +266,18 @@ def _check_animation(document: Document, animation: Element) -> None:
 
 def _check_times(document: Document, sampler: Element, accessor: int) -> None:
     if not _has_bounds(document.accessors[accessor]):
-        sampler.warn("G005.no-bounds", "input")
+        sampler.warn(
+            "G005.no-bounds: times: expected an accessor with min and max, found one without",
+            "input",
+        )
     times = document.accessors.components(accessor)
     if times is not None and len(times) and times.min() < 0.0:
-        sampler.warn("G005.negative", "input", n=int((times < 0.0).sum()), found=float(times.min()))
+        sampler.warn(
+            "G005.negative: {n} at negative times (earliest: {found} s)",
+            "input",
+            n=counted(int((times < 0.0).sum()), "key"),
+            found=rounded_text(float(times.min()), 6),
+        )
 
 
 def _check_rotations(document: Document, sampler: Element) -> None:
@@ -230,8 +293,13 @@ def _check_rotations(document: Document, sampler: Element) -> None:
     odd = np.abs(lengths - 1.0) > (UNIT_ROTATION if one == 1.0 else 0.02)
     if odd.any():
         key = int(odd.argmax())
-        found = {"index": key, "found": float(lengths[key])}
-        sampler.warn("G005.unit", "output", n=int(odd.sum()), **found)
+        found = {"index": key, "found": rounded_text(float(lengths[key]), 6)}
+        sampler.warn(
+            "G005.unit: {n} not of unit length (first: {found}, key {index}): normalised",
+            "output",
+            n=counted(int(odd.sum()), "rotation"),
+            **found,
+        )
 
 
 def _reporter(document: Document) -> _Report:
@@ -265,16 +333,16 @@ def _check_accessor(accessor: dict[str, Any], index: int, report: _Report) -> No
     path, kind = ("accessors", index), accessor.get("componentType")
     if accessor.get("normalized") is True and kind in _UNNORMALIZED:
         wanted = "integers of 8 or 16 bits"
-        report("G002.storage", wanted, f"component type {kind}", (*path, "normalized"))
+        report(wording.STORAGE, wanted, f"component type {kind}", (*path, "normalized"))
     if "byteOffset" in accessor and "bufferView" not in accessor:
-        report("G002.storage", "a bufferView", "none", (*path, "byteOffset"))
+        report(wording.STORAGE, "a bufferView", "none", (*path, "byteOffset"))
     for name in ("min", "max"):
         bounds = accessor.get(name)
         if isinstance(bounds, list) and not all(map(_is_number, bounds)):
-            report("G002.storage", "numbers", "other values", (*path, name))
+            report(wording.STORAGE, "numbers", "other values", (*path, name))
         elif isinstance(bounds, list) and any(abs(each) > _LARGEST for each in bounds):
             found = max(bounds, key=abs)
-            report("G002.storage", "numbers in single precision", found, (*path, name))
+            report(wording.STORAGE, "numbers in single precision", found, (*path, name))
 
 
 def _is_number(value: Any) -> bool:
@@ -284,9 +352,9 @@ def _is_number(value: Any) -> bool:
 def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: _Report) -> None:
     path, target, stride = ("bufferViews", index), view.get("target"), view.get("byteStride")
     if target is not None and target not in _TARGETS.values():
-        report("G002.storage", "34962 or 34963", target, (*path, "target"))
+        report(wording.STORAGE, "34962 or 34963", target, (*path, "target"))
     if stride is not None and stride not in _STRIDES:
-        report("G002.storage", "a multiple of 4 from 4 to 252", stride, (*path, "byteStride"))
+        report(wording.STORAGE, "a multiple of 4 from 4 to 252", stride, (*path, "byteStride"))
     length, start, buffer = view.get("byteLength"), view.get("byteOffset", 0), view.get("buffer")
     buffers = root.get("buffers")
     if not isinstance(buffers, list) or not isinstance(buffer, int):
@@ -296,10 +364,10 @@ def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: 
     size = part(buffers[buffer], "byteLength")
     if isinstance(length, int) and isinstance(start, int) and isinstance(size, int):
         if length < 1:
-            report("G002.storage", "at least 1 byte", length, (*path, "byteLength"))
+            report(wording.STORAGE, "at least 1 byte", length, (*path, "byteLength"))
         elif start + length > size:
             wanted = f"an end within the {size} bytes of buffer {buffer}"
-            report("G002.storage", wanted, f"byte {start + length}", (*path, "byteLength"))
+            report(wording.STORAGE, wanted, f"byte {start + length}", (*path, "byteLength"))
 
 
 def _check_uses(root: dict[str, Any], report: _Report) -> None:
@@ -316,13 +384,13 @@ def _check_uses(root: dict[str, Any], report: _Report) -> None:
         common = first.setdefault(index, kind)
         target = _TARGETS.get(kind)
         if common != kind:
-            report("G002.storage", f"a buffer view of {kind}", f"one of {common}", path)
+            report(wording.STORAGE, f"a buffer view of {kind}", f"one of {common}", path)
         elif view.get("target") in _TARGETS.values() and view["target"] != target:
             found = f"target {view['target']}"
-            report("G002.storage", f"target {target}" if target else "no target", found, path)
+            report(wording.STORAGE, f"target {target}" if target else "no target", found, path)
         elif "byteStride" in view and target != _VERTICES:
             found = f"a stride of {view['byteStride']}"
-            report("G002.storage", f"{kind} without a stride", found, path)
+            report(wording.STORAGE, f"{kind} without a stride", found, path)
 
 
 def _uses(root: dict[str, Any]) -> Iterator[tuple[int, str, tuple[str | int, ...]]]:
@@ -373,12 +441,12 @@ def _check_names(given: dict[str, Any], path: tuple[str | int, ...], report: _Re
     for name in given:
         if not _KNOWN.fullmatch(name):
             wanted = "an attribute of the specification, or a name that begins with _"
-            report("G002.storage", wanted, name, (*path, name))
+            report(wording.STORAGE, wanted, name, (*path, name))
     for kind in ("TEXCOORD", "COLOR", "JOINTS", "WEIGHTS"):
         sets = sorted(int(n.split("_")[1]) for n in given if re.fullmatch(rf"{kind}_\d{{1,4}}", n))
         if sets != list(range(len(sets))):
             missing = next(n for n, found in enumerate([*sets, -1]) if n != found)
-            report("G002.storage", f"{kind}_{missing}", f"{kind}_{sets[-1]}", path)
+            report(wording.STORAGE, f"{kind}_{missing}", f"{kind}_{sets[-1]}", path)
 
 
 def _check_types(
@@ -391,7 +459,7 @@ def _check_types(
         if allowed and isinstance(kind, int) and (kind, normalized) not in allowed:
             how = "normalised" if normalized else "not normalised"
             wanted = " or ".join(f"{one}{' normalised' * flag}" for one, flag in allowed)
-            report("G002.storage", f"component type {wanted}", f"{kind}, {how}", (*path, name))
+            report(wording.STORAGE, f"component type {wanted}", f"{kind}, {how}", (*path, name))
 
 
 def _check_indices(
@@ -403,7 +471,7 @@ def _check_indices(
     index = primitive.get("indices")
     kind = accessors.get(index, {}).get("componentType") if isinstance(index, int) else None
     if isinstance(kind, int) and kind not in _INDICES and kind != _FLOAT:
-        report("G002.storage", "unsigned integers", f"component type {kind}", (*path, "indices"))
+        report(wording.STORAGE, "unsigned integers", f"component type {kind}", (*path, "indices"))
 
 
 def _check_targets(
@@ -414,17 +482,17 @@ def _check_targets(
     report: _Report,
 ) -> None:
     if primitive.get("targets") == []:
-        report("G002.storage", "at least one morph target", "none", (*path, "targets"))
+        report(wording.STORAGE, "at least one morph target", "none", (*path, "targets"))
     for t, target in _items_of(primitive, "targets"):
         for name, index in target.items():
             at = (*path, "targets", t, name)
             if not _MORPHED.fullmatch(name):
-                report("G002.storage", "an attribute that can be morphed", name, at)
+                report(wording.STORAGE, "an attribute that can be morphed", name, at)
             elif name not in given:
-                report("G002.storage", f"{name} in the attributes of the primitive", "none", at)
+                report(wording.STORAGE, f"{name} in the attributes of the primitive", "none", at)
             accessor = accessors.get(index, {}) if isinstance(index, int) else {}
             if name == "POSITION" and accessor and not {"min", "max"} <= accessor.keys():
-                report("G002.storage", "an accessor with min and max", "one without", at)
+                report(wording.STORAGE, "an accessor with min and max", "one without", at)
 
 
 def _check_tangents(
@@ -437,7 +505,7 @@ def _check_tangents(
         rows = document.accessors.components(index)
     except FormatError as problem:
         found = problem.diagnostic.message
-        report("G002.storage", "readable tangents", found, (*path, "TANGENT"))
+        report(wording.STORAGE, "readable tangents", found, (*path, "TANGENT"))
         return
     if rows is None or rows.shape[1] != 4 or not np.isfinite(rows).all():
         return
@@ -446,12 +514,12 @@ def _check_tangents(
     if odd.any():
         at = int(odd.argmax())
         found = f"{int(odd.sum())} of another length (first: {lengths[at]:.6g} at vertex {at})"
-        report("G002.storage", "tangents of unit length", found, (*path, "TANGENT"))
+        report(wording.STORAGE, "tangents of unit length", found, (*path, "TANGENT"))
     signs = np.abs(np.abs(rows[:, 3]) - 1.0) > _NORMAL_ROUNDING
     if signs.any():
         at = int(signs.argmax())
         found = f"{rows[at, 3]:.6g} at vertex {at}"
-        report("G002.storage", "1 or -1 as the sign of a tangent", found, (*path, "TANGENT"))
+        report(wording.STORAGE, "1 or -1 as the sign of a tangent", found, (*path, "TANGENT"))
 
 
 def _check_texture_sets(
@@ -479,7 +547,7 @@ def _check_texture_sets(
         sets |= {number} if isinstance(number, int) else set()
     missing = sorted(number for number in sets if f"TEXCOORD_{number}" not in given)
     if missing:
-        report("G002.storage", f"TEXCOORD_{missing[0]}, which the material uses", "none", path)
+        report(wording.STORAGE, f"TEXCOORD_{missing[0]}, which the material uses", "none", path)
 
 
 def _check_structure(
@@ -488,7 +556,7 @@ def _check_structure(
     """Check members that depend on each other."""
     for name in _LISTS:
         if root.get(name) == []:
-            report("G001.structure", "at least one item", "none", (name,))
+            report(wording.STRUCTURE, "at least one item", "none", (name,))
     for index, node in _items_of(root, "nodes"):
         _check_node(node, index, report)
     _check_skinned(root, tree, skins, report)
@@ -497,7 +565,7 @@ def _check_structure(
         for place, root_node in enumerate(listed(scene, "nodes")):
             if isinstance(root_node, int) and root_node in seen:
                 at = ("scenes", index, "nodes", place)
-                report("G003.structure", "each node once", f"node {root_node} again", at)
+                report(wording.G003_STRUCTURE, "each node once", f"node {root_node} again", at)
             elif isinstance(root_node, int):
                 seen.add(root_node)
     nodes = dict(_items_of(root, "nodes"))
@@ -509,14 +577,14 @@ def _check_structure(
 def _check_node(node: dict[str, Any], index: int, report: _Report) -> None:
     path = ("nodes", index)
     if node.get("children") == []:
-        report("G003.structure", "at least one child", "none", (*path, "children"))
+        report(wording.G003_STRUCTURE, "at least one child", "none", (*path, "children"))
     for name in ("skin", "weights"):
         if name in node and "mesh" not in node:
-            report("G003.structure", "a node with a mesh", "one without", (*path, name))
+            report(wording.G003_STRUCTURE, "a node with a mesh", "one without", (*path, name))
     matrix = node.get("matrix")
     if isinstance(matrix, list) and len(matrix) == 16 and _is_sheared(matrix):
         wanted = "a matrix of a translation, rotation and scale"
-        report("G003.structure", wanted, "a sheared one", (*path, "matrix"))
+        report(wording.G003_STRUCTURE, wanted, "a sheared one", (*path, "matrix"))
 
 
 def _is_sheared(matrix: list[Any]) -> bool:
@@ -541,13 +609,23 @@ def _check_skinned(
     for node in np.flatnonzero(tree.skins >= 0).tolist():
         if parents[node] >= 0:
             found = f"a child of node {parents[node]}, whose transform has no effect"
-            report("G007.skinned-child", "a root", found, ("nodes", node))
+            report(
+                "G007.skinned-child: node with a skinned mesh: expected {wanted}, found {found}",
+                "a root",
+                found,
+                ("nodes", node),
+            )
         joints = skins[int(tree.skins[node])].joints.tolist()
         top, roots = int(tops[node]), set(tops[joints].tolist())
         shown = [scene for scene in scenes if top in scene]
         if shown and not any(scene >= roots for scene in shown):
             wanted = "joints in the scene of the mesh"
-            report("G004.structure", wanted, "joints outside it", ("nodes", node))
+            report(
+                "G004.structure: expected {wanted}, found {found}",
+                wanted,
+                "joints outside it",
+                ("nodes", node),
+            )
 
 
 def _check_channels(
@@ -556,14 +634,24 @@ def _check_channels(
     path = ("animations", index)
     for name in ("channels", "samplers"):
         if animation.get(name) == []:
-            report("G005.structure", "at least one item", "none", (*path, name))
+            report(
+                "G005.structure: expected {wanted}, found {found}",
+                "at least one item",
+                "none",
+                (*path, name),
+            )
     for place, channel in _items_of(animation, "channels"):
         moved, node = part(channel, "target", "path"), part(channel, "target", "node")
         owner = nodes.get(node, {}) if isinstance(node, int) else {}
         if "skin" in owner and moved in ("translation", "rotation", "scale"):
             found = f"a node with a skinned mesh, whose {moved} has no effect"
             at = (*path, "channels", place, "target", "path")
-            report("G007.skinned-moved", "a node without a skinned mesh", found, at)
+            report(
+                "G007.skinned-moved: expected {wanted}, found {found}",
+                "a node without a skinned mesh",
+                found,
+                at,
+            )
 
 
 def _check_extensions(root: dict[str, Any], report: _Report) -> None:
@@ -572,7 +660,7 @@ def _check_extensions(root: dict[str, Any], report: _Report) -> None:
     for place, name in enumerate(listed(root, "extensionsRequired")):
         if isinstance(name, str) and name not in used:
             at = ("extensionsRequired", place)
-            report("G001.structure", "a name that extensionsUsed contains", name, at)
+            report(wording.STRUCTURE, "a name that extensionsUsed contains", name, at)
     told: set[str] = set()
     stack: list[tuple[Any, tuple[str | int, ...]]] = [(root, ())]
     while stack:
@@ -587,6 +675,6 @@ def _check_extensions(root: dict[str, Any], report: _Report) -> None:
                     if extension not in used and extension not in told:
                         told.add(extension)
                         at = (*path, name, extension)
-                        report("G001.structure", "a name in extensionsUsed", extension, at)
+                        report(wording.STRUCTURE, "a name in extensionsUsed", extension, at)
             elif name != "extras" and isinstance(each, dict | list):
                 stack.append((each, (*path, name)))

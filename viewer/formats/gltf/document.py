@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._source import Source
@@ -29,7 +30,7 @@ from viewer.formats._text.json_places import MOST_DIGITS
 from viewer.formats.gltf.accessors import Accessors
 from viewer.formats.gltf.buffers import Buffers
 from viewer.formats.gltf.elements import Element, Table
-from viewer.phrases import printable
+from viewer.phrases import agree, counted, printable, quoted
 
 _MAGIC = b"glTF"  # first bytes of a GLB
 _HEADER = struct.Struct("<4sII")
@@ -76,7 +77,13 @@ class Document:
         size = self._decoded + n_bytes
         most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
         if size > most:
-            raise self.source.fault("F002.gltf-decoded", pointer, most=most, size=size)
+            raise self.source.fault(
+                "F002.gltf-decoded: expected at most {most} bytes of decoded data for a file of "
+                "this size, found {size}",
+                pointer,
+                most=most,
+                size=size,
+            )
         self._decoded = size
 
     def kept(self, read: Callable[[], _Content], neutral: _Content) -> _Content:
@@ -108,17 +115,17 @@ def _check_version(root: Element) -> None:
     """Refuse documents that have another major version or require a later minor version."""
     asset = root.part("asset")
     if asset is None:
-        root.warn("G001.no-asset")
+        root.warn("G001.no-asset: expected an asset with a version, found none: read as glTF 2.0")
         return
     stated = asset.values.get("version")
     # Some files of glTF 0.8 and 1.0 state the version as a number.
     if isinstance(stated, int | float) and not isinstance(stated, bool) and stated < 2:
-        raise asset.fault("F002.gltf-version", "version", found=stated)
+        raise asset.fault(wording.GLTF_VERSION, "version", found=stated)
     version = asset.text("version", "2.0")
     if version.partition(".")[0] != "2":
-        raise asset.fault("F002.gltf-version", "version", found=version)
+        raise asset.fault(wording.GLTF_VERSION, "version", found=version)
     if asset.text("minVersion", "2.0") != "2.0":
-        raise asset.fault("F002.gltf-version", "minVersion", found=asset.text("minVersion"))
+        raise asset.fault(wording.GLTF_VERSION, "minVersion", found=asset.text("minVersion"))
 
 
 def _contents(source: Source) -> tuple[dict[str, Any], memoryview | None]:
@@ -129,20 +136,25 @@ def _contents(source: Source) -> tuple[dict[str, Any], memoryview | None]:
     chunks: dict[bytes, memoryview] = {}
     for kind, content in _chunks(source):
         if kind in (_JSON, _BINARY) and kind in chunks:
-            source.warn("G001.chunk-again", kind=_title(kind))
+            source.warn("G001.chunk-again: ignored another {kind} chunk", kind=_title(kind))
         chunks.setdefault(kind, content)
     if _JSON not in chunks:
-        raise source.fault("F002.glb-json")
+        raise source.fault("F002.glb-json: expected a JSON chunk, found none")
     kinds = [*chunks]
     for place, kind in (("first", _JSON), ("second", _BINARY)):
         found = kinds[0 if place == "first" else min(1, len(kinds) - 1)]
         if kind in chunks and found != kind:
             titles = _title(kind), _title(found)
-            source.warn("G001.chunk-order", first=titles[0], place=place, found=titles[1])
+            source.warn(
+                "G001.chunk-order: expected the {first} chunk as the {place} one, found {found}",
+                first=titles[0],
+                place=place,
+                found=titles[1],
+            )
             break
     text = bytes(chunks[_JSON])
     if text.endswith(b"\0"):
-        source.warn("G001.padding")
+        source.warn("G001.padding: JSON chunk padded with zeros instead of spaces")
     return parsed_json(source, text, has_lines=False), chunks.get(_BINARY)
 
 
@@ -157,26 +169,45 @@ def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:
         if place + length > end:
             found = len(data) - place
             if kind == _JSON and length > found:
-                raise source.fault("F002.glb-chunk", kind="JSON", expected=length, found=found)
-            source.warn("G001.chunk-length", kind=_title(kind), expected=length, found=end - place)
+                raise source.fault(
+                    "F002.glb-chunk: {kind} chunk: expected {expected}, found {found}",
+                    kind="JSON",
+                    expected=counted(length, "byte"),
+                    found=found,
+                )
+            source.warn(
+                "G001.chunk-length: {kind} chunk: expected {expected}, found {found}",
+                kind=_title(kind),
+                expected=counted(length, "byte"),
+                found=end - place,
+            )
         # A file whose length is too small may still contain the whole chunk.
         stop = min(place + length, len(data))
         yield kind, data[place:stop]
         place = _next(data, place + length)
     if place < end and bytes(data[place:end]).strip(b"\0 "):
-        source.warn("G001.trailing", n=end - place)
+        source.warn(
+            "G001.trailing: ignored {n} after the last chunk", n=counted(end - place, "byte")
+        )
 
 
 def _end(source: Source) -> int:
     """Return the end of the last chunk, according to the header or the size of the file."""
     size = len(source.data)
     if size < _HEADER.size:
-        raise source.fault("F002.glb-header", found=size)
+        raise source.fault(
+            "F002.glb-header: expected a header of 12 bytes, found {found}",
+            found=counted(size, "byte"),
+        )
     _, version, length = _HEADER.unpack_from(source.data)
     if version != 2:
-        raise source.fault("F002.gltf-version", found=version)
+        raise source.fault(wording.GLTF_VERSION, found=version)
     if length != size:
-        source.warn("G001.length", expected=length, found=size)
+        source.warn(
+            "G001.length: expected {expected} as declared by the header, found {found}",
+            expected=counted(length, "byte"),
+            found=size,
+        )
     # A file that is too long has other data after its chunks; a truncated one ends early.
     return length if _HEADER.size + _CHUNK.size <= length < size else size
 
@@ -199,7 +230,12 @@ def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     Raises ``FormatError`` if the text is not a valid JSON object.
     """
     if len(data) > _MOST_BYTES:
-        raise source.fault("F001.gltf-text", most=_MOST_BYTES, size=len(data))
+        raise source.fault(
+            "F001.gltf-text: expected at most {most:,.0f} bytes of JSON, found {size:,.0f}: "
+            "store the data in a .glb or .bin file",
+            most=_MOST_BYTES,
+            size=len(data),
+        )
     text = _decoded_text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []
     repeated: list[str] = []
@@ -236,34 +272,59 @@ def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     except json.JSONDecodeError as problem:
         place = len(text[: problem.pos].encode(errors="replace")) if has_lines else None
         reason = printable(problem.msg, 100)
-        raise source.fault("F002.gltf-json", place, reason=reason, at=problem.pos) from None
+        raise source.fault(
+            "F002.gltf-json: expected JSON, found a syntax error: {reason} (character {at})",
+            place,
+            reason=reason,
+            at=problem.pos,
+        ) from None
     except RecursionError:
-        raise source.fault("F002.json-nesting") from None
+        raise source.fault(wording.JSON_NESTING) from None
     except ValueError:  # the error is raised only for numbers with too many digits
-        raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
+        raise source.fault(
+            "F002.gltf-digits: expected numbers of at most {most} digits, found a longer number",
+            most=MOST_DIGITS,
+        ) from None
     if type(root) is not dict:
-        raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))
+        raise source.fault(wording.GLTF_TYPE, wanted="an object", found=describe(root))
     if constants:
-        source.warn("G001.constants", n=len(constants), found=constants[0])
+        source.warn(
+            "G001.constants: {n} invalid in JSON (first: {found})",
+            n=counted(len(constants), "number"),
+            found=constants[0],
+        )
     if overflows:
-        source.warn("G001.overflow", n=len(overflows), found=overflows[0])
+        source.warn(
+            "G001.overflow: {n} too large for double precision (first: {found})",
+            n=counted(len(overflows), "number"),
+            found=overflows[0],
+        )
     if repeated:
-        source.warn("G001.repeated", n=len(repeated), found=repeated[0], names=repeated)
+        source.warn(
+            "G001.repeated: {n} (first: {found}): only the last value is used",
+            n=counted(len(repeated), "repeated key"),
+            found=quoted(repeated[0]),
+            names=repeated,
+        )
     if "null" in text and (n_nulls := _remove_nulls(root)):
-        source.warn("G001.nulls", n=n_nulls)
+        source.warn(
+            "G001.nulls: {n} that {are} null: ignored",
+            n=counted(n_nulls, "member"),
+            are=agree(n_nulls, "is", "are"),
+        )
     return root
 
 
 def _decoded_text(source: Source, data: bytes) -> str:
     if not data:
-        raise source.fault("F002.gltf-no-json")
+        raise source.fault("F002.gltf-no-json: expected a JSON object, found no text")
     if data.startswith(_UTF_16):
-        raise source.fault("F002.gltf-utf-16")
+        raise source.fault("F002.gltf-utf-16: expected JSON in UTF-8, found UTF-16 text")
     try:
         return data.decode()
     except UnicodeDecodeError as problem:
         # Only names can be in another encoding, and they are only displayed; keys are ASCII.
-        source.warn("G001.text", at=problem.start)
+        source.warn("G001.text: invalid UTF-8 at byte {at} of the JSON: replaced", at=problem.start)
         return data.decode(errors="replace")
 
 

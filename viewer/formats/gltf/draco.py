@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 
@@ -44,7 +45,9 @@ def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitiv
     except ModuleNotFoundError:
         if _NAME not in document.root.values.get("extensionsRequired", []):
             return None
-        raise extension.fault("F002.gltf-draco") from None
+        raise extension.fault(
+            "F002.gltf-draco: compressed with Draco, which requires DracoPy: pip install DracoPy"
+        ) from None
     view = extension.required_index("bufferView", document.buffers.n_views, "bufferViews")
     mesh = _decoded(library, extension, document.buffers.view(view).data.tobytes())
     arrays = {int(item["unique_id"]): np.asarray(item["data"]) for item in mesh.attributes}
@@ -58,9 +61,9 @@ def _decoded(library: ModuleType, extension: Element, data: bytes) -> Any:
     try:
         mesh = library.decode(data)
     except (library.FileTypeException, MemoryError, RuntimeError, ValueError):
-        raise extension.fault("F002.gltf-compressed") from None
+        raise extension.fault(wording.GLTF_COMPRESSED) from None
     if not isinstance(mesh, library.DracoMesh):
-        raise extension.fault("F002.gltf-compressed")
+        raise extension.fault(wording.GLTF_COMPRESSED)
     return mesh
 
 
@@ -73,7 +76,11 @@ def _named(extension: Element, arrays: dict[int, NDArray[Any]]) -> dict[str, NDA
     for name in names.values:
         number = names.whole(name)
         if number not in arrays:
-            raise names.fault("F002.gltf-draco-id", name, found=number)
+            raise names.fault(
+                "F002.gltf-draco-id: expected an attribute of the compressed data, found {found}",
+                name,
+                found=number,
+            )
         array = arrays[number]
         result[name] = array if array.ndim == 2 else array.reshape(len(array), -1)
     return result

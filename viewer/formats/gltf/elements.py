@@ -8,11 +8,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
-from viewer.phrases import one_of
+from viewer.phrases import one_of, quoted
 from viewer.rig.arrays import Floats, Ints
 
 _Choice = TypeVar("_Choice", int, str)
@@ -65,8 +66,12 @@ class Element:
     def wrong(self, name: str, wanted: str) -> FormatError:
         """Return the exception for a member of an unexpected type."""
         if name not in self.values:
-            return self.fault("F002.gltf-missing", wanted=wanted, member=name)
-        return self.fault("F002.gltf-type", name, wanted=wanted, found=describe(self.values[name]))
+            return self.fault(
+                "F002.gltf-missing: expected {wanted} as {member}, found none",
+                wanted=wanted,
+                member=quoted(name),
+            )
+        return self.fault(wording.GLTF_TYPE, name, wanted=wanted, found=describe(self.values[name]))
 
     def whole(self, name: str, default: int | None = None) -> int:
         """Return a member that is a whole number of at least 0.
@@ -92,7 +97,7 @@ class Element:
             return -1
         index = self.whole(name)
         if index >= count:
-            raise self.fault("F002.gltf-index", name, what=what, count=count, found=index)
+            raise self.fault(wording.GLTF_INDEX, name, what=what, count=count, found=index)
         return index
 
     def required_index(self, name: str, count: int, what: str) -> int:
@@ -133,7 +138,7 @@ class Element:
                 pointer = self.at(name, place)
                 found = describe(item)
                 raise self.source.fault(
-                    "F002.gltf-type", pointer, wanted="a finite number", found=found
+                    wording.GLTF_TYPE, pointer, wanted="a finite number", found=found
                 )
         return np.array(items, dtype=np.float64)
 
@@ -211,9 +216,11 @@ class Element:
         """Return the exception for an item that is not a valid index."""
         pointer = self.at(name, place)
         if type(item) is int and 0 <= item < _BEYOND:
-            return self.source.fault("F002.gltf-index", pointer, what=what, count=count, found=item)
+            return self.source.fault(
+                wording.GLTF_INDEX, pointer, what=what, count=count, found=item
+            )
         wanted = "a whole number of at least 0"
-        return self.source.fault("F002.gltf-type", pointer, wanted=wanted, found=describe(item))
+        return self.source.fault(wording.GLTF_TYPE, pointer, wanted=wanted, found=describe(item))
 
     def extension(self, name: str) -> Element | None:
         """Return an extension of this object; None if there is none.
@@ -241,7 +248,7 @@ class Table:
         pointer = f"{self.pointer}/{index}"
         if type(values) is not dict:
             found = describe(values)
-            raise self.source.fault("F002.gltf-type", pointer, wanted="an object", found=found)
+            raise self.source.fault(wording.GLTF_TYPE, pointer, wanted="an object", found=found)
         return Element(self.source, values, pointer)
 
 

@@ -13,6 +13,8 @@ from viewer.diagnostics import Phrase
 from viewer.formats._scene_graph.content import NodeTree, descendants
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
+from viewer.phrases import agree, counted
+from viewer.phrases import listed as listed_text
 
 # Extensions of geometry and animation, and of characters; materials and textures list their own.
 _GEOMETRY = (
@@ -64,17 +66,36 @@ def check_extensions(document: Document) -> None:
     unknown = [name for name in required if not _changes_only_look(name)]
     pointer = document.root.at("extensionsRequired")
     if unknown:
-        document.source.refuse("F002.gltf-extensions", pointer, names=unknown)
+        document.source.refuse(
+            "F002.gltf-extensions: expected supported extensions, found {names}, without which "
+            "the file may have another shape or motion",
+            pointer,
+            names=listed_text(unknown, 12),
+        )
     looks = [name for name in required if name not in unknown]
     if looks:
-        document.source.warn("F007.gltf-look", pointer, names=looks, n=len(looks))
+        document.source.warn(
+            "F007.gltf-look: {names} not shown: surfaces and motions do not depend on {them}",
+            pointer,
+            names=listed_text(looks, 12),
+            n=len(looks),
+            them=agree(len(looks), "it", "them"),
+        )
     optional = [name for name in _names(document, "extensionsUsed") if name not in _KNOWN]
     optional = [name for name in optional if name not in required and not _ABOUT.match(name)]
     if optional:
-        document.root.warn("F007.gltf-extensions", "extensionsUsed", names=optional)
+        document.root.warn(
+            "F007.gltf-extensions: ignored unsupported {names}",
+            "extensionsUsed",
+            names=listed_text(optional, 12),
+        )
     lights = document.root.extension("KHR_lights_punctual")
     if lights is not None and len(lights.table("lights")):
-        document.root.warn("F007.gltf-lights", "extensions", n=len(lights.table("lights")))
+        document.root.warn(
+            "F007.gltf-lights: {n} not used",
+            "extensions",
+            n=counted(len(lights.table("lights")), "light"),
+        )
 
 
 def _changes_only_look(name: str) -> bool:
@@ -106,7 +127,12 @@ def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
     drawn = np.flatnonzero(hidden & (tree.meshes >= 0)).tolist()
     if drawn:
         names = [tree.names[node] or f"node {node}" for node in drawn]
-        document.source.warn("F007.gltf-hidden", "/nodes", n=len(drawn), names=names)
+        document.source.warn(
+            "F007.gltf-hidden: {n} hidden by KHR_node_visibility: {names}",
+            "/nodes",
+            n=counted(len(drawn), "node", "is", "are"),
+            names=listed_text(names, 12),
+        )
     return drawn
 
 
@@ -174,13 +200,18 @@ def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
     for mesh in _objects(root.get("meshes")):
         for primitive in _objects(mesh.get("primitives")):
             counts[_DRAWN.get(primitive.get("mode", 4), "triangles")] += 1
-    found = {f"gltf-{kind}": counts[kind] for kind in ("points", "lines", "triangles")}
-    for kind in ("cameras", "nodes", "skins", "animations", "materials", "images"):
-        found[f"gltf-{kind}"] = len(_objects(root.get(kind)))
+    parts = [
+        ("{n} of points", "primitive", counts["points"]),
+        ("{n} of lines", "primitive", counts["lines"]),
+        ("{n} of triangles that no node shows", "primitive", counts["triangles"]),
+    ]
+    for kind in ("camera", "node", "skin", "animation", "material", "image"):
+        parts.append(("{n}", kind, len(_objects(root.get(f"{kind}s")))))
     extensions = root.get("extensions")
     told = extensions.get("KHR_lights_punctual") if isinstance(extensions, dict) else None
-    found["gltf-lights"] = len(_objects(told.get("lights"))) if isinstance(told, dict) else 0
-    return tuple(Phrase(key, n=n) for key, n in found.items() if n)
+    if isinstance(told, dict):
+        parts.append(("{n}", "light", len(_objects(told.get("lights")))))
+    return tuple(Phrase(text, n=counted(n, noun)) for text, noun, n in parts if n)
 
 
 def _objects(listed: Any) -> list[dict[str, Any]]:

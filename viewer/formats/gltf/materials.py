@@ -33,6 +33,7 @@ from viewer.formats.gltf.textures import (
     read_slot,
 )
 from viewer.formats.gltf.toon import MTOON, Toon, read_toon
+from viewer.phrases import counted
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import ALPHA_MODES, Material
 from viewer.rig.srgb import decode_srgb, encode_srgb
@@ -206,10 +207,20 @@ def _report(document: Document, elements: list[Element], stated: list[_Stated]) 
     source = document.source
     missing = Counter(name for element in elements for name in _not_drawn(element))
     for name, count in missing.items():
-        source.warn("F007.gltf-not-drawn", "/materials", extension=name, n=count)
+        source.warn(
+            "F007.gltf-not-drawn: {extension} not drawn ({n})",
+            "/materials",
+            extension=name,
+            n=counted(count, "material"),
+        )
     approximated = sum(one.glossiness is not None for one in stated)
     if approximated:
-        source.warn("F007.gltf-glossiness", "/materials", n=approximated)
+        source.warn(
+            "F007.gltf-glossiness: KHR_materials_pbrSpecularGlossiness is approximated by "
+            "metallic and roughness ({n})",
+            "/materials",
+            n=counted(approximated, "material"),
+        )
 
 
 def _not_drawn(element: Element) -> list[str]:

@@ -22,6 +22,7 @@ from viewer.formats._scene_graph.content import MorphTargets, NodeMesh, NodeTree
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.draco import decoded_primitive
 from viewer.formats.gltf.elements import Element, Table
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats, Ints
 
 _LIST, _STRIP, _FAN = 4, 5, 6
@@ -59,7 +60,11 @@ def read_meshes(document: Document) -> tuple[NodeMesh, ...]:
     for index in range(len(table)):
         meshes.append(document.kept(partial(_mesh, reading, table[index]), empty))
     if reading.n_undrawn:
-        document.source.warn("F007.gltf-undrawn", reading.undrawn, n=reading.n_undrawn)
+        document.source.warn(
+            "F007.gltf-undrawn: {n} of points or lines not drawn",
+            reading.undrawn,
+            n=counted(reading.n_undrawn, "primitive"),
+        )
     return tuple(meshes)
 
 
@@ -78,7 +83,7 @@ def _users(table: Table) -> Counter[int]:
 def _mesh(reading: _Reading, mesh: Element) -> NodeMesh:
     primitives = mesh.table("primitives")
     if not len(primitives):
-        mesh.warn("G002.no-primitives")
+        mesh.warn("G002.no-primitives: mesh without primitives")
     count = _n_targets(mesh, primitives)
     read = (_primitive(reading, primitives[place]) for place in range(len(primitives)))
     return NodeMesh(
@@ -102,7 +107,7 @@ def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
         return None
     if not element.has("POSITION"):
         # This is valid: an unsupported extension may provide the vertices.
-        element.warn("G002.no-positions")
+        element.warn("G002.no-positions: no POSITION: not drawn")
         return None
     document = reading.document
     position = element.index("POSITION", len(document.accessors), "accessors")
@@ -178,7 +183,12 @@ class _Attributes:
         decoded, expected = self.decoded.get(name), self.n_vertices
         found = accessors.count(index) if decoded is None else len(decoded)
         if found != expected:
-            raise self.element.fault("F002.gltf-vertices", name, expected=expected, found=found)
+            raise self.element.fault(
+                "F002.gltf-vertices: expected {expected} as in POSITION, found {found}",
+                name,
+                expected=counted(expected, "element"),
+                found=found,
+            )
         return index
 
     def floats(self, name: str, *kinds: str) -> Floats | None:
@@ -228,7 +238,12 @@ class _Attributes:
         if not bad.any():
             return values
         first = int(bad.argmax())
-        self.element.warn("G002.finite", name, n=int(bad.sum()), vertex=self.vertex(first))
+        self.element.warn(
+            "G002.finite: {n} with non-finite values (first: vertex {vertex}): set to 0",
+            name,
+            n=counted(int(bad.sum()), "vertex"),
+            vertex=self.vertex(first),
+        )
         return np.where(bad[:, None], 0.0, values)
 
 
@@ -248,7 +263,12 @@ def _read_triangles(
     if mode == _FAN:
         return _fan(corners)
     if len(corners) % 3:
-        primitive.warn("G002.corners", "indices", n=len(corners), left=len(corners) % 3)
+        primitive.warn(
+            "G002.corners: {n} vertex indices, not a multiple of 3: the last {left} ignored",
+            "indices",
+            n=len(corners),
+            left=len(corners) % 3,
+        )
     return corners[: len(corners) // 3 * 3].reshape(-1, 3)
 
 
@@ -271,7 +291,8 @@ def _existing(
         bad = corners >= n_vertices
         entry = int(bad.argmax())
         document.source.refuse(
-            "F002.gltf-corner",
+            "F002.gltf-corner: index {entry}: expected a vertex index below {vertices}, found "
+            "{found}",
             primitive.at("indices"),
             entry=entry,
             vertices=n_vertices,
@@ -318,7 +339,13 @@ def _read_positions(attributes: _Attributes) -> Floats:
     if bad.any():
         vertex, pointer = attributes.vertex(int(bad.argmax())), attributes.element.at("POSITION")
         source, n = attributes.element.source, int(bad.sum())
-        source.refuse("F003.gltf-positions", pointer, n=n, vertex=vertex)
+        source.refuse(
+            "F003.gltf-positions: expected finite positions, found {n} non-finite ones (first: "
+            "vertex {vertex})",
+            pointer,
+            n=n,
+            vertex=vertex,
+        )
         positions = np.where(bad[:, None], 0.0, positions)
     return positions
 
@@ -397,7 +424,11 @@ def _read_influences(attributes: _Attributes) -> tuple[Ints, Floats] | tuple[Non
     numbers = attributes.sets("JOINTS")
     without = sorted(set(numbers) ^ set(attributes.sets("WEIGHTS")))
     if without:
-        attributes.element.warn("G004.influence-sets", sets=without)
+        attributes.element.warn(
+            "G004.influence-sets: joints without weights, or weights without joints, in set "
+            "{sets}: ignored",
+            sets=listed(without),
+        )
     joints, weights = [], []
     for number in numbers:
         if number in without:
@@ -423,7 +454,14 @@ def _finite_weights(attributes: _Attributes, number: int, weights: Floats) -> Fl
         source, pointer = attributes.element.source, attributes.element.at(f"WEIGHTS_{number}")
         vertex, found = attributes.vertex(row), float(weights[row, column])
         n = int(bad.sum())
-        source.refuse("W003.gltf-weights", pointer, n=n, vertex=vertex, found=found)
+        source.refuse(
+            "W003.gltf-weights: expected finite weights, found {n} non-finite ones (first: "
+            "{found} at vertex {vertex})",
+            pointer,
+            n=n,
+            vertex=vertex,
+            found=found,
+        )
         weights = np.where(bad, 0.0, weights)
     return weights
 
@@ -434,7 +472,10 @@ def _n_targets(mesh: Element, primitives: Table) -> int:
     for place, found in enumerate(counts):
         if found != counts[0]:
             raise primitives[place].fault(
-                "F002.gltf-targets", "targets", expected=counts[0], found=found
+                "F002.gltf-targets: expected {expected} as in the first primitive, found {found}",
+                "targets",
+                expected=counted(counts[0], "morph target"),
+                found=found,
             )
     return counts[0] if counts else 0
 
@@ -520,5 +561,10 @@ def node_weights(
 def _fitted(element: Element, weights: Floats, count: int) -> Floats:
     """Return weights for all morph targets; missing ones are 0."""
     if len(weights) != count:
-        element.warn("G002.weights", "weights", expected=count, found=len(weights))
+        element.warn(
+            "G002.weights: expected {expected}, one per morph target, found {found}",
+            "weights",
+            expected=counted(count, "weight"),
+            found=len(weights),
+        )
     return np.concatenate([weights[:count], np.zeros(max(0, count - len(weights)))])

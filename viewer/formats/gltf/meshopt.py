@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.formats.gltf.elements import Element
 from viewer.rig.arrays import Bytes, Floats
 
@@ -90,7 +91,7 @@ def decoded_view(compressed: Element, data: Bytes, spend: Callable[[int, str], N
     else:
         decoded = decoded_indices(data, count, stride)
     if decoded is None:
-        raise compressed.fault("F002.gltf-compressed")
+        raise compressed.fault(wording.GLTF_COMPRESSED)
     result = filtered(decoded, kind, stride)
     result.flags.writeable = False
     return result

@@ -25,6 +25,7 @@ from viewer.formats._scene_graph.content import (
 )
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element, Table, member_indices, member_rows
+from viewer.phrases import counted, listed, quoted, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import (
     matrix_to_quaternion,
@@ -106,11 +107,22 @@ def _parents(table: Table) -> Ints:
             continue
         for index, child in enumerate(table[place].indices("children", count, "nodes")):
             if parents[child] == place:
-                table[place].warn("G003.child-twice", "children", found=child)
+                table[place].warn(
+                    "G003.child-twice: node {found} is listed more than once",
+                    "children",
+                    found=child,
+                )
             elif parents[child] >= 0:
                 pointer = table[place].at("children", index)
                 other = parents[child]
-                table.source.refuse("F002.gltf-parents", pointer, found=child, other=other)
+                table.source.refuse(
+                    "F002.gltf-parents: expected one parent per node, found node {found} below "
+                    "nodes "
+                    "{other} and this one",
+                    pointer,
+                    found=child,
+                    other=other,
+                )
             else:
                 parents[child] = place
     result = np.array(parents, dtype=np.int32)
@@ -131,7 +143,11 @@ def _check_cycles(table: Table, parents: Ints) -> None:
             cycle.append(above)
         seen.update(cycle)
         pointer = table[int(parents[first])].at("children")
-        table.source.refuse("F002.gltf-cycle", pointer, nodes=[*reversed(cycle)])
+        table.source.refuse(
+            "F002.gltf-cycle: expected a tree, found a cycle of nodes: {nodes}",
+            pointer,
+            nodes=listed([*reversed(cycle)]),
+        )
         parents[first] = -1
 
 
@@ -169,7 +185,12 @@ def _unit(table: Table, places: Ints, rotations: Floats) -> Floats:
         first = int(odd.argmax())
         pointer = table[int(places[first])].at("rotation")
         n = int(odd.sum())
-        table.source.warn("G003.rotation", pointer, n=n, found=float(lengths[first]))
+        table.source.warn(
+            "G003.rotation: {n} not of unit length (first: {found}): normalised",
+            pointer,
+            n=counted(n, "rotation"),
+            found=rounded(float(lengths[first]), 6),
+        )
     is_zero = lengths < _TINY
     rotations = np.where(is_zero[:, None], (0.0, 0.0, 0.0, 1.0), rotations)
     return rotations / np.where(is_zero, 1.0, lengths)[:, None]
@@ -198,7 +219,11 @@ def _check_mixture(table: Table, places: Ints) -> None:
     for place in places.tolist():
         others = {"translation", "rotation", "scale"} & table.items[place].keys()
         if others:
-            table[place].warn("G003.matrix-and", "matrix", names=sorted(others))
+            table[place].warn(
+                "G003.matrix-and: matrix used, {names} ignored",
+                "matrix",
+                names=listed(sorted(others)),
+            )
 
 
 def _check_affine(table: Table, places: Ints, matrices: Floats) -> None:
@@ -206,7 +231,9 @@ def _check_affine(table: Table, places: Ints, matrices: Floats) -> None:
     if odd.any():
         first = int(odd.argmax())
         row = " ".join(f"{value:g}" for value in matrices[first, 3])
-        raise table[int(places[first])].fault("F002.gltf-affine", "matrix", found=row)
+        raise table[int(places[first])].fault(
+            "F002.gltf-affine: expected 0 0 0 1 as the last row, found {found}", "matrix", found=row
+        )
 
 
 def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
@@ -240,9 +267,14 @@ def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
     roots = _roots(scene, tree)
     if len(scenes) > 1 and roots:
         name = scene.text("name") or str(max(default, 0))
-        document.root.warn("F007.gltf-scenes", "scenes", n=len(scenes), found=name)
+        document.root.warn(
+            "F007.gltf-scenes: {n} scenes: only {found} is shown",
+            "scenes",
+            n=len(scenes),
+            found=quoted(name),
+        )
     if not roots and every:
-        scene.warn("F007.gltf-empty-scene")
+        scene.warn("F007.gltf-empty-scene: no nodes in the scene: all nodes are shown")
     return roots or every
 
 
@@ -260,7 +292,12 @@ def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
     nodes = scene.indices("nodes", tree.n_nodes, "nodes")
     children = [node for node in nodes if tree.parents[node] >= 0]
     if children:
-        scene.warn("G003.scene-child", "nodes", n=len(children), found=children[0])
+        scene.warn(
+            "G003.scene-child: {n} not a root (first: node {found}): shown from the root",
+            "nodes",
+            n=counted(len(children), "node", "is", "are"),
+            found=children[0],
+        )
     # Transforms of the ancestors apply, so the tree is shown from its root.
     return tuple(dict.fromkeys(roots_of(tree.parents)[nodes].tolist()))
 
@@ -275,7 +312,11 @@ def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
         except FormatError as problem:
             # A figure can be shown without the file's camera.
             pointer = problem.diagnostic.pointer
-            table.source.warn("G003.camera", pointer, problem=problem.diagnostic.message)
+            table.source.warn(
+                "G003.camera: {problem}: default lens used",
+                pointer,
+                problem=problem.diagnostic.message,
+            )
             cameras.append(NodeCamera("", _ANGLE))
     return tuple(cameras)
 
@@ -322,13 +363,21 @@ def _skin(document: Document, table: Table, index: int) -> NodeSkin:
     if not joints:
         if not skin.has("joints"):
             raise skin.wrong("joints", "a list of nodes")
-        skin.warn("G004.no-joints", "joints")
+        skin.warn("G004.no-joints: skin without joints: not used", "joints")
         return _EMPTY
     if len(set(joints)) != len(joints):
-        skin.warn("G004.joint-twice", "joints", n=len(joints) - len(set(joints)))
+        skin.warn(
+            "G004.joint-twice: {n} listed more than once",
+            "joints",
+            n=counted(len(joints) - len(set(joints)), "joint", "is", "are"),
+        )
     root = skin.values.get("skeleton", 0)
     if type(root) is not int or not 0 <= root < n_nodes:
-        skin.warn("G004.skeleton", "skeleton", found=str(root)[:20])
+        skin.warn(
+            "G004.skeleton: expected the index of a node, found {found}: ignored",
+            "skeleton",
+            found=str(root)[:20],
+        )
     matrices = _inverse_bind(document, skin, len(joints))
     return NodeSkin(skin.text("name"), np.array(joints, dtype=np.int32), matrices)
 
@@ -341,18 +390,38 @@ def _inverse_bind(document: Document, skin: Element, n_joints: int) -> Floats:
         return np.tile(np.eye(4), (n_joints, 1, 1))
     found = document.accessors.count(accessor)
     if found < n_joints:
-        raise skin.fault("F002.gltf-bind-count", name, expected=n_joints, found=found)
+        raise skin.fault(
+            "F002.gltf-bind-count: expected {expected}, one per joint, found {found}",
+            name,
+            expected=counted(n_joints, "matrix"),
+            found=found,
+        )
     if found > n_joints:
-        skin.warn("G004.bind-count", name, expected=n_joints, found=found)
+        skin.warn(
+            "G004.bind-count: expected {expected}, one per joint, found {found}: the rest ignored",
+            name,
+            expected=counted(n_joints, "matrix"),
+            found=found,
+        )
     matrices = document.accessors.matrices(accessor, skin.at(name))[:n_joints]
     is_finite = np.isfinite(matrices).all(axis=(1, 2))
     if not is_finite.all():
-        raise skin.fault("F003.gltf-bind", name, joint=int((~is_finite).argmax()))
+        raise skin.fault(
+            "F003.gltf-bind: joint {joint}: expected a finite inverse bind matrix, found a "
+            "non-finite one",
+            name,
+            joint=int((~is_finite).argmax()),
+        )
     odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _BINDING_LAST_ROW).any(axis=1)
     if odd.any():
         joint = int(odd.argmax())
         row = " ".join(f"{value:g}" for value in matrices[joint, 3])
-        raise skin.fault("F002.gltf-bind-row", name, joint=joint, found=row)
+        raise skin.fault(
+            "F002.gltf-bind-row: joint {joint}: expected 0 0 0 1 as the last row, found {found}",
+            name,
+            joint=joint,
+            found=row,
+        )
     matrices[:, 3] = 0.0, 0.0, 0.0, 1.0
     return matrices
 
@@ -390,7 +459,8 @@ def _with_joints(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -
         bad = joints >= n_joints
         vertex, column = (int(axis[0]) for axis in np.nonzero(bad))
         document.source.refuse(
-            "W010.gltf-joint",
+            "W010.gltf-joint: vertex {vertex}: expected a joint index below {joints} (skin "
+            "{skin}), found {found}",
             f"{primitive.pointer}/attributes/JOINTS_{column // 4}",
             vertex=vertex,
             found=int(joints[vertex, column]),

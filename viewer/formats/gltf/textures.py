@@ -17,12 +17,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats.gltf.buffers import EncodedImage
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.media.image import decoding_pictures
+from viewer.phrases import one_of, quoted
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.material import MINIFICATIONS, Texture
 
@@ -84,9 +86,9 @@ def _image(document: Document, texture: Element) -> int:
     if found < 0:
         named = [name for name in _UNREADABLE if _extension(texture, name) is not None]
         if named:
-            texture.warn("F005.gltf-format", found=named[0])
+            texture.warn(wording.GLTF_FORMAT, found=named[0])
         else:
-            texture.warn("F005.gltf-texture")
+            texture.warn("F005.gltf-texture: no image; drawn untextured")
     return found
 
 
@@ -113,7 +115,13 @@ def _constant(sampler: Element, name: str, meanings: dict[int, str], default: st
         return meanings[value]
     if value >= 0:
         used = default or "the default"
-        sampler.warn("F006.gltf-choice", name, choices=[*meanings], found=str(value), used=used)
+        sampler.warn(
+            wording.GLTF_CHOICE,
+            name,
+            choices=one_of([*meanings]),
+            found=quoted(str(value)),
+            used=quoted(used),
+        )
     return default
 
 
@@ -205,7 +213,7 @@ def _decoded(
     name = image.name or f"image{index}"
     if isinstance(pixels, FormatError):
         problem = pixels.diagnostic.message if image.is_embedded else str(pixels)
-        document.source.warn("F005.gltf-image", f"/images/{index}", problem=problem)
+        document.source.warn(wording.GLTF_IMAGE, f"/images/{index}", problem=problem)
         return DecodedImage(name)
     keeps = image.is_embedded and image.data.startswith(_KEPT)
     return DecodedImage(name, pixels, image.data if keeps else None)
@@ -219,13 +227,13 @@ def _encoded(document: Document, index: int) -> EncodedImage | None:
         # An error without a JSON pointer concerns the file of the image, which the message names.
         has_pointer = bool(problem.diagnostic.pointer)
         said = problem.diagnostic.message if has_pointer else _named(document, problem)
-        document.source.warn("F005.gltf-image", f"/images/{index}", problem=said)
+        document.source.warn(wording.GLTF_IMAGE, f"/images/{index}", problem=said)
         return None
     unsupported = next(
         (name for magic, name in _UNSUPPORTED.items() if image.data.startswith(magic)), None
     )
     if unsupported is not None:
-        document.source.warn("F005.gltf-format", f"/images/{index}", found=unsupported)
+        document.source.warn(wording.GLTF_FORMAT, f"/images/{index}", found=unsupported)
         return None
     return image
 
@@ -245,7 +253,7 @@ def lenient(source: Source, read: Callable[[], _Content], default: _Content) -> 
         return read()
     except FormatError as problem:
         found = problem.diagnostic
-        source.warn("F006.gltf-material", found.pointer, problem=found.message)
+        source.warn("F006.gltf-material: {problem}; ignored", found.pointer, problem=found.message)
         return default
 
 
@@ -272,7 +280,9 @@ def chosen(element: Element, name: str, choices: tuple[str, ...], default: str) 
     word = lenient(element.source, lambda: element.text(name, default), default)
     if word in choices:
         return word
-    element.warn("F006.gltf-choice", name, choices=choices, found=word, used=default)
+    element.warn(
+        wording.GLTF_CHOICE, name, choices=one_of(choices), found=quoted(word), used=quoted(default)
+    )
     return default
 
 
@@ -285,5 +295,11 @@ def _clamped(
         odd = next(place for place, value in enumerate(values) if value != within[place])
         limits = f"at least {low:g}" if high == np.inf else f"{low:g} to {high:g}"
         found, used = f"{values[odd]:g}", f"{within[odd]:g}"
-        element.warn("F006.gltf-range", name, limits=limits, found=found, used=used)
+        element.warn(
+            "F006.gltf-range: expected {limits}, found {found}; {used} used",
+            name,
+            limits=limits,
+            found=found,
+            used=used,
+        )
     return within

@@ -27,6 +27,7 @@ from viewer.formats._vrm.parts import part, rows_of, value_of
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.textures import Slot, read_slot
+from viewer.phrases import Shown, counted, listed
 from viewer.rig.file_record import StoredImage, StoredTextures
 from viewer.rig.material import Outline, Rim
 
@@ -73,8 +74,8 @@ def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
     """Return the shading of materials that VRM declares toon-shaded or unlit, by index."""
     found: dict[int, Toon] = {}
     omitted: dict[str, None] = {}
-    listed = part(document.root.values, "extensions", "VRM", "materialProperties")
-    for index, each in enumerate(listed[: len(elements)] if isinstance(listed, list) else ()):
+    upgraded = part(document.root.values, "extensions", "VRM", "materialProperties")
+    for index, each in enumerate(upgraded[: len(elements)] if isinstance(upgraded, list) else ()):
         shader, pointer = part(each, "shader"), elements[index].pointer
         if shader != _SHADER and not (isinstance(shader, str) and shader.startswith(_UNLIT)):
             continue
@@ -93,7 +94,12 @@ def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
             omitted |= dict.fromkeys(_omitted(modern))
     count = sum(bool(toon.values) for toon in found.values())
     if count:
-        document.source.warn("F007.gltf-toon", "/materials", n=count, names=[*omitted])
+        document.source.warn(
+            "F007.gltf-toon: {n} lit by the white key light only{names}",
+            "/materials",
+            n=counted(count, "toon material", "is", "are"),
+            names=Shown(f"; not drawn: {listed([*omitted])}" if omitted else "", [*omitted]),
+        )
     return found
 
 

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.formats._mesh.polygons import (
     Picks,
     filled_normals,
@@ -56,6 +57,8 @@ from viewer.formats.obj.lines import (
     without_comments,
 )
 from viewer.formats.obj.mtl import read_libraries
+from viewer.phrases import counted, optional, quoted
+from viewer.phrases import listed as listed_text
 from viewer.rig.arrays import Bools, Floats, Ints, freeze
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
@@ -138,7 +141,11 @@ def read(source: Source) -> Figure:
     source.release()
     if len(parts.positions) == 0:
         looks = source.looks_like()
-        raise source.fault("F002.obj-mesh", None if looks else source.end, looks=looks)
+        raise source.fault(
+            "F002.obj-mesh: expected a mesh, found no `v` line{looks}",
+            None if looks else source.end,
+            looks=optional(" ({})", looks),
+        )
     rough = neutral_positions(parts.positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
     triangles = picked(parts.corners[:, 0], picks).astype(np.int32)
@@ -164,9 +171,9 @@ def read(source: Source) -> Figure:
         colors=None if any(one.image is not None for one in materials) else parts.colors,
     )
     if mesh.n_triangles == 0:
-        source.warn("F007.no-faces", n=mesh.n_vertices)
+        source.warn("F007.no-faces: no faces: {n} points, not drawn", n=mesh.n_vertices)
     if uvs is None and any(material.texture for material in materials):
-        source.warn("F005.obj-texture")
+        source.warn("F005.obj-texture: texture without vt lines: drawn untextured")
     head = source.peek(_HEAD).decode("ascii", "replace")
     comments = "\n".join(re.findall(r"^#.*$", head, re.MULTILINE))
     return Figure(
@@ -187,10 +194,18 @@ def _read_parts(source: Source) -> _ObjParts:
     for lines in pieces(source):
         _read_piece(source, lines, gathered)
     for what, (count, offset) in gathered.unused.items():
-        source.warn(f"F007.obj-{what}", offset, n=count)
+        if what == "w":
+            source.warn("F007.obj-w: w of {n} ignored", offset, n=counted(count, "vertex"))
+        else:
+            source.warn(
+                "F007.obj-edges: {n} with fewer than 3 corners not drawn",
+                offset,
+                n=counted(count, "face"),
+            )
     for keyword, name in _SHAPES.items():
         if gathered.odd[keyword]:
-            source.warn(f"F007.obj-{name}s", n=gathered.odd[keyword])
+            n = counted(gathered.odd[keyword], name)
+            source.warn(f"F007.obj-{name}s: {{n}} not drawn", n=n)
     vertices = gathered.vertices.rows()
     source.remember("positions", lambda vertex: int(vertices[vertex]))
     tables = {keyword: table.rows() for keyword, table in gathered.tables.items()}
@@ -260,7 +275,13 @@ def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
     wrong = np.flatnonzero((counts == 5) | (counts > 7))
     if len(wrong):
         offset = int(rows.origins[wrong[0]]) - 1
-        source.refuse("F002.obj-vertex", offset, len(wrong), found=int(counts[wrong[0]]))
+        source.refuse(
+            "F002.obj-vertex: v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found "
+            "{found}",
+            offset,
+            len(wrong),
+            found=int(counts[wrong[0]]),
+        )
     firsts = np.cumsum(counts) - counts
     for count in (6, 7):
         colored = np.flatnonzero(counts == count)
@@ -304,7 +325,7 @@ def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
             gathered.libraries.append((rest, offset))
         elif words[0] not in _QUIET:
             if words[0] not in _SHAPES and not gathered.odd[words[0]]:
-                source.warn("F006.unknown", offset, found=words[0])
+                source.warn(wording.UNKNOWN, offset, found=quoted(words[0]))
             gathered.odd[words[0]] += 1
 
 
@@ -330,7 +351,7 @@ def _normals(source: Source, parts: _ObjParts) -> Floats | None:
         return None
     used: Bools = parts.corners[:, 2] >= 0
     if not used.any():
-        source.warn("F007.obj-normals", n=len(listed))
+        source.warn("F007.obj-normals: omitted {n} normals not used by any face", n=len(listed))
         return None
     if np.isnan(listed.sum()):
         # Invalid normals are computed from the triangles instead.
@@ -349,12 +370,13 @@ def _normals(source: Source, parts: _ObjParts) -> Floats | None:
     if several.any():
         first = int(several.argmax())
         source.warn(
-            "F007.obj-hard-edges",
+            "F007.obj-hard-edges: {n} several normals (first: vertex {vertex}): averaged, so "
+            "hard edges are drawn smooth",
             None,
             1,
             "positions",
             [first],
-            n=int(several.sum()),
+            n=counted(int(several.sum()), "vertex", "has", "have"),
             vertex=first,
         )
         result[several] = _means(n_vertices, vertices, indices, listed)[several]
@@ -382,10 +404,15 @@ def _uvs(source: Source, parts: _ObjParts, picks: Picks) -> tuple[Floats | None,
     corners = picked(parts.corners[:, 1], picks)
     absent = corners < 0
     if absent.all():
-        source.warn("F007.obj-texcoords", n=len(uvs))
+        source.warn(
+            "F007.obj-texcoords: omitted {n} texture coordinates not used by any face", n=len(uvs)
+        )
         return None, None
     if absent.any():
-        source.warn("F007.obj-corners", n=int(absent.sum()))
+        source.warn(
+            "F007.obj-corners: {n} without vt: 0 0 used",
+            n=counted(int(absent.sum()), "triangle corner"),
+        )
         corners = np.where(absent, len(uvs), corners)
         uvs = np.vstack([uvs, [0.0, 0.0]])
     return uvs, corners.astype(np.int32)
@@ -426,7 +453,11 @@ def _parts_of(source: Source, parts: _ObjParts) -> tuple[tuple[str, ...], Ints]:
     objects, groups = ({name: None for _, name in parts.runs[word]} for word in (b"o", b"g"))
     within = [name for name in groups if name and name not in objects]
     if len(objects) > 1 and len(within) > 1 and parts.runs[b"usemtl"]:
-        source.warn("F007.obj-groups", n=len(within), names=within)
+        source.warn(
+            "F007.obj-groups: {n} within objects ignored, as a face has one part: {names}",
+            n=counted(len(within), "group"),
+            names=listed_text(within, 8),
+        )
     for word in (b"o", b"g"):
         names, of_face = _named(parts.runs[word], len(parts.counts))
         used = np.unique(of_face[of_face >= 0])

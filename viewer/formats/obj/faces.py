@@ -12,9 +12,11 @@ from viewer.formats._mesh.polygons import first_known, triangles_of
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, parse_words, to_number, word_begins
 from viewer.formats.obj.lines import Lines, Places, Rows, rows_of
+from viewer.phrases import quoted
 from viewer.rig.arrays import Bools, Floats
 
 _CORNER_KINDS = ("v", "vt", "vn")
+_CORNER_NAMES = {"v": "vertex", "vt": "texture coordinate", "vn": "normal"}
 """Keywords of the elements that the three numbers of a corner index."""
 FEWEST = 3
 """Corners of a face."""
@@ -188,7 +190,13 @@ def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     if len(small):
         offset = int(rows.origins[small[0]]) - 1
         found = int(counts[small[0]])
-        source.refuse("F002.obj-face", offset, len(small), least=FEWEST, found=found)
+        source.refuse(
+            "F002.obj-face: f: expected at least {least} corners, found {found}",
+            offset,
+            len(small),
+            least=FEWEST,
+            found=found,
+        )
     written, lost = _corners(rows, begins)
     kept = counts >= FEWEST
     places = (np.cumsum(kept) - 1)[owners]
@@ -203,7 +211,14 @@ def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
         far = np.flatnonzero((-numbers > known) & ~lost & kept[owners])
         if len(far):
             values = {"least": -int(known[far[0]]), "found": int(numbers[far[0]])}
-            key = f"F002.obj-{keyword}-back" if known[far[0]] else f"F002.obj-{keyword}-early"
+            kind = _CORNER_NAMES[keyword]
+            key = (
+                f"F002.obj-{keyword}-back: f: expected a {kind} index from -1 to {{least}}, found "
+                "{found}"
+                if known[far[0]]
+                else f"F002.obj-{keyword}-early: f: expected a {kind} defined before this line, "
+                "found {found}"
+            )
             offset = rows.offset(int(begins[far[0]]))
             faults.append(CornerFault(key, offset, values, places[far]))
             lost[far] = True
@@ -236,8 +251,13 @@ def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
     found = source.next_word(offset)
     word = b"" if found is None else found.group()
     if any(to_number(number) == 0.0 for number in word.split(b"/")):
-        return CornerFault("F002.obj-zero", offset, {}, faces)
-    return CornerFault("F002.obj-corner", offset, {"found": word}, faces)
+        return CornerFault("F002.obj-zero: f: indices start at 1, found 0", offset, {}, faces)
+    return CornerFault(
+        "F002.obj-corner: f: expected a corner v, v/vt, v//vn or v/vt/vn, found {found}",
+        offset,
+        {"found": quoted(word)},
+        faces,
+    )
 
 
 def checked_corners(
@@ -259,10 +279,15 @@ def checked_corners(
         )
     owners = np.repeat(np.arange(len(counts)), counts)
     for column, keyword in enumerate(_CORNER_KINDS):
+        kind = _CORNER_NAMES[keyword]
         wrong = np.flatnonzero(corners[:, column] >= ends[keyword])
         if len(wrong):
             source.refuse(
-                f"F002.obj-{keyword}-range" if ends[keyword] else f"F002.obj-{keyword}-none",
+                f"F002.obj-{keyword}-range: f: expected a {kind} index from 1 to {{limit}}, found "
+                "{found}"
+                if ends[keyword]
+                else f"F002.obj-{keyword}-none: f: {kind} {{found}} is not defined: the file has "
+                f"no {'vertices' if keyword == 'v' else f'{kind}s'}",
                 int(faces.offsets[owners[wrong[0]]]),
                 len(wrong),
                 "triangles" if column == 0 else "",

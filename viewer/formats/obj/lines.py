@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Part, Phrase
+from viewer.diagnostics import Part, Phrase, wording
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
 from viewer.formats._text.words import Words, refuse_words
+from viewer.phrases import counted
 from viewer.rig.arrays import Bools, Floats
 
 KEYWORDS = ("v", "vt", "vn", "f")
@@ -28,6 +29,7 @@ _CONTINUES = re.compile(rb"\\(?:\r*\n|\r+)\Z")
 _COMMENT = re.compile(rb"#[^\r\n]*")
 _OPEN_END = re.compile(rb"(?<=\d)/+(?=\s)")  # as in 1/2/ or 1//, which some programs write
 _OPEN_ENDS = b"/ ", b"/\n", b"/\r", b"/\t"
+_ITEMS = {"v": "v of vertex {index}", "vt": "vt {index}", "vn": "vn {index}"}
 Places = NDArray[np.int64]
 Letters = NDArray[np.uint8]
 
@@ -177,7 +179,7 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
             source,
             words,
             bad[chosen],
-            lambda word: Phrase(f"obj-{keyword}", index=int(owners[word]) + first),
+            lambda word: Phrase(_ITEMS[keyword], index=int(owners[word]) + first),
             whose,
             owned,
         )
@@ -185,13 +187,13 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     if len(short):
         row = int(short[0])
         source.refuse(
-            "F002.width",
+            wording.WIDTH,
             int(rows.origins[row]) - 1,
             len(short),
             part,
             short + first,
-            item=Phrase(f"obj-{keyword}", index=row + first),
-            expected=width,
+            item=Phrase(_ITEMS[keyword], index=row + first),
+            expected=counted(width, "number"),
             found=int(counts[row]),
         )
     table = np.full((len(counts), width), np.nan)

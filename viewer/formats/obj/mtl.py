@@ -32,6 +32,7 @@ from viewer.formats._mesh.texture import load_image
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, to_number
+from viewer.phrases import counted, listed, quoted
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture
 
@@ -127,7 +128,11 @@ def read_libraries(
             _read(library, known, load)
     missing = [name for name in names if name not in known]
     if missing and libraries:
-        source.warn("F005.mtl-materials", n=len(missing), material=missing[0])
+        source.warn(
+            "F005.mtl-materials: {n} not in any library (first: {material}): drawn untextured",
+            n=counted(len(missing), "material", "is", "are"),
+            material=missing[0],
+        )
     return tuple(
         _material(name, known[name], load) if name in known else Material(name) for name in names
     )
@@ -144,13 +149,22 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     for written in names:
         name = _name_here(folder, written) or written
         if referenced_path(folder, name) is None:
-            source.warn("F005.library-refused", offset, name=name, reason=refused_text(name))
+            source.warn(
+                "F005.library-refused: material library {name} {reason}",
+                offset,
+                name=name,
+                reason=refused_text(name),
+            )
             continue
         library = source.beside(name.replace("\\", "/"))
         try:
             _ = library.data
         except FormatError as problem:
-            source.warn("F005.library", offset, problem=problem.diagnostic)
+            source.warn(
+                "F005.library: material library {problem}; drawn untextured",
+                offset,
+                problem=problem.diagnostic,
+            )
             continue
         found.append(library)
     return found
@@ -224,7 +238,11 @@ def _read(library: Source, known: dict[str, _Statements], load: _Load) -> None:
             ignored.setdefault(words[0].decode("ascii"), position)
         position += len(line) + 1
     if ignored:
-        library.warn("F007.mtl-statements", min(ignored.values()), statements=list(ignored))
+        library.warn(
+            "F007.mtl-statements: {statements} not drawn",
+            min(ignored.values()),
+            statements=listed(list(ignored), 8),
+        )
 
 
 def _found_here(library: Source, text: bytes, position: int, moved: set[str]) -> _MapOptions:
@@ -235,7 +253,12 @@ def _found_here(library: Source, text: bytes, position: int, moved: set[str]) ->
         return options
     if file != options.file.strip("\"'").replace("\\", "/") and file not in moved:
         moved.add(file)
-        library.warn("F005.mtl-moved", position, name=options.file, used=file)
+        library.warn(
+            "F005.mtl-moved: texture {name} not found: {used} next to the library is used",
+            position,
+            name=options.file,
+            used=file,
+        )
     return replace(options, file=file)
 
 
@@ -328,9 +351,20 @@ def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
         written = word.decode("ascii")
         if is_color:
             limits = "from 0" if lower == b"ke" else "from 0 to 1"
-            now.library.warn("F006.mtl-color", position, word=written, limits=limits, found=rest)
+            now.library.warn(
+                "F006.mtl-color: {word}: expected 1 or 3 numbers {limits}, found {found}; ignored",
+                position,
+                word=written,
+                limits=limits,
+                found=quoted(rest),
+            )
         else:
-            now.library.warn("F006.mtl-number", position, word=written, found=rest)
+            now.library.warn(
+                "F006.mtl-number: {word}: expected a number from 0 to 1, found {found}; ignored",
+                position,
+                word=written,
+                found=quoted(rest),
+            )
         return
     values = [min(value, most) for value in values]
     name = _COLORS[lower] if is_color else _NUMBERS[lower]

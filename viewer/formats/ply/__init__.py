@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.formats._mesh.polygons import (
     filled_normals,
     first_known,
@@ -37,7 +37,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.ply.header import CORNERS, Header, read_header
 from viewer.formats.ply.rows import Table, read_tables
-from viewer.phrases import printable
+from viewer.phrases import brief, counted, listed, printable
 from viewer.rig.arrays import Floats, Ints, freeze
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
@@ -86,7 +86,9 @@ def read(source: Source) -> Figure:
     )
     _report(source, tables, uv_corners is not None, is_painted)
     if mesh.n_triangles == 0:
-        source.warn("F007.ply-no-faces", n=mesh.n_vertices)
+        source.warn(
+            "F007.ply-no-faces: no faces: {n}, not drawn", n=counted(mesh.n_vertices, "point")
+        )
     comments = "\n".join(text for text, _ in header.comments)
     facts = []
     if (counts > 3).any():
@@ -114,15 +116,26 @@ def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple
     """Return the element of the vertices, and their positions."""
     if "vertex" not in tables:
         if not tables:
-            raise source.fault("F002.ply-nothing", header.end - 1)
+            raise source.fault(
+                "F002.ply-nothing: expected a vertex element, found none", header.end - 1
+            )
         names = [printable(name, 40) for name in tables]
-        raise source.fault("F002.ply-no-vertex", header.end - 1, names=names)
+        raise source.fault(
+            "F002.ply-no-vertex: expected a vertex element, found {names}",
+            header.end - 1,
+            names=listed(names, 12),
+        )
     vertices = tables["vertex"]
     positions = _columns(source, vertices, ("x", "y", "z"))
     if positions is None:
-        raise source.fault("F002.ply-coordinates", vertices.element.offset)
+        raise source.fault(
+            "F002.ply-coordinates: vertex element has no x, y and z properties",
+            vertices.element.offset,
+        )
     if len(positions) == 0:
-        raise source.fault("F002.ply-vertices", vertices.element.offset)
+        raise source.fault(
+            "F002.ply-vertices: expected at least one vertex, found none", vertices.element.offset
+        )
     return vertices, positions
 
 
@@ -146,12 +159,12 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
             row = values[odd[0]]
             is_place = names == ("x", "y", "z")
             source.refuse(
-                "F003.ply-finite",
+                wording.PLY_FINITE,
                 None,
                 int((~(np.abs(values) <= LARGEST)).sum()),
                 "positions" if is_place else "",
                 odd if is_place else None,
-                item=Phrase("ply-row", element=table.element.name, row=int(odd[0])),
+                item=Phrase("{element} {row}", element=brief(table.element.name), row=int(odd[0])),
                 names=" ".join(names),
                 found=float(row[~(np.abs(row) <= LARGEST)][0]),
             )
@@ -167,11 +180,17 @@ def _faces(
     nothing = np.zeros(0, np.int64)
     if faces is None:
         if "tristrips" in tables:
-            raise source.fault("F002.ply-strips", tables["tristrips"].element.offset)
+            raise source.fault(
+                "F002.ply-strips: expected a face element, found tristrips",
+                tables["tristrips"].element.offset,
+            )
         return nothing, nothing, None
     name = next((name for name in CORNERS if name in faces.lists), None)
     if name is None:
-        raise source.fault("F002.ply-no-corners", faces.element.offset)
+        raise source.fault(
+            "F002.ply-no-corners: face: expected a vertex_indices list, found none",
+            faces.element.offset,
+        )
     counts, values = faces.lists[name]
     corners = _corners(source, faces, counts, values, n_vertices)
     small = counts < 3
@@ -179,7 +198,11 @@ def _faces(
     faces.lists.clear()
     del values
     if small.any():
-        source.warn("F007.ply-small-faces", n=int(small.sum()), face=int(small.argmax()))
+        source.warn(
+            "F007.ply-small-faces: omitted {n} with fewer than 3 corners (first: face {face})",
+            n=counted(int(small.sum()), "face"),
+            face=int(small.argmax()),
+        )
         keeps = np.repeat(~small, counts)
         counts, corners = counts[~small], corners[keeps]
         uvs = None if uvs is None else uvs[keeps]
@@ -207,7 +230,8 @@ def _corners(
     if len(wrong):
         face = int(owners[wrong[0]])
         source.refuse(
-            "F002.ply-corner",
+            "F002.ply-corner: face {face}: expected a vertex index from 0 to {last}, found "
+            "{found:g}",
             faces.offset(face),
             len(wrong),
             "triangles",
@@ -227,7 +251,12 @@ def _wedges(source: Source, faces: Table, counts: _Indices) -> Floats | None:
     found, values = faces.lists["texcoord"]
     wrong = np.flatnonzero(found != 2 * counts)
     if len(wrong):
-        source.warn("F007.ply-texcoord", n=len(wrong), face=int(wrong[0]))
+        source.warn(
+            "F007.ply-texcoord: texcoord of {n} does not have two numbers per corner (first: "
+            "face {face}): texture coordinates omitted",
+            n=counted(len(wrong), "face"),
+            face=int(wrong[0]),
+        )
         return None
     uvs = values.astype(np.float64).reshape(-1, 2)
     odd = np.flatnonzero(~(np.abs(uvs) <= LARGEST).all(axis=1))
@@ -235,9 +264,9 @@ def _wedges(source: Source, faces: Table, counts: _Indices) -> Floats | None:
         if faces.offset_of is None:
             face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
             source.refuse(
-                "F003.ply-finite",
+                wording.PLY_FINITE,
                 count=len(odd),
-                item=Phrase("ply-row", element="face", row=face),
+                item=Phrase("{element} {row}", element=brief("face"), row=face),
                 names="texcoord",
                 found=float(uvs[odd[0]].max()),
             )
@@ -288,7 +317,9 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     if not named or not has_uvs:
         return ()
     if len(named) > 1:
-        source.warn("F007.ply-textures", named[1][1], n=len(named))
+        source.warn(
+            "F007.ply-textures: {n} textures: only the first one is used", named[1][1], n=len(named)
+        )
     name, offset = named[0]
     return (Material(name, Texture(name, load_image(source, name, offset))),)
 
@@ -310,4 +341,7 @@ def _report(source: Source, tables: dict[str, Table], uses_wedges: bool, is_pain
         others = (prop.name for prop in table.element.properties)
         left += [f"{name} {other}" for other in others if other not in used[name]]
     if left:
-        source.warn("F007.ply-unused", names=[printable(name, 40) for name in left])
+        source.warn(
+            "F007.ply-unused: unused: {names}",
+            names=listed([printable(name, 40) for name in left], 12),
+        )

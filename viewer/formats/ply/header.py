@@ -8,6 +8,7 @@ from dataclasses import field
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._source import Source
+from viewer.phrases import brief, listed, quoted
 
 CORNERS = ("vertex_indices", "vertex_index")
 """Names of the property that lists a face's vertices."""
@@ -74,7 +75,10 @@ def read_header(source: Source) -> Header:
             raise _no_ply(source, match[1])
         if words == ["end_header"]:
             if not has_format:
-                raise source.fault("F002.ply-no-format", position)
+                raise source.fault(
+                    "F002.ply-no-format: expected a `format` line, found none before end_header",
+                    position,
+                )
             header.end = _behind(source.data, match)
             return header
         if words and words[0] == "format":
@@ -82,15 +86,21 @@ def read_header(source: Source) -> Header:
         elif number:
             _take(source, header, words, match[1], position)
         position, number = match.end(), number + 1
-    raise source.fault("F002.ply-no-end", position)
+    raise source.fault("F002.ply-no-end: missing end_header", position)
 
 
 def _no_ply(source: Source, line: bytes) -> FormatError:
     """Return the error for a file in another format."""
     looks = source.looks_like()
     if looks is not None:
-        return source.fault("F002.ply-looks", 0, looks=looks)
-    return source.fault("F002.ply-start", 0, found=line[:40])
+        return source.fault(
+            'F002.ply-looks: expected "ply" on the first line, found {looks}', 0, looks=looks
+        )
+    return source.fault(
+        'F002.ply-start: expected "ply" on the first line, found {found}',
+        0,
+        found=quoted(line[:40]),
+    )
 
 
 def _behind(data: bytes, match: re.Match[bytes]) -> int:
@@ -103,7 +113,12 @@ def _behind(data: bytes, match: re.Match[bytes]) -> int:
 def _order(source: Source, words: list[str], offset: int) -> str:
     if len(words) != 3 or words[1] not in _ORDERS or words[2] != "1.0":
         found = " ".join(words[1:])
-        raise source.fault("F002.ply-format", offset, orders=list(_ORDERS), found=found)
+        raise source.fault(
+            'F002.ply-format: format: expected one of {orders} and 1.0, found "{found}"',
+            offset,
+            orders=listed(list(_ORDERS)),
+            found=brief(found),
+        )
     return _ORDERS[words[1]]
 
 
@@ -117,16 +132,26 @@ def _take(source: Source, header: Header, words: list[str], line: bytes, offset:
         header.elements.append(_element(source, words, offset))
     elif keyword == "property":
         if not header.elements:
-            raise source.fault("F002.ply-no-element", offset)
+            raise source.fault(
+                "F002.ply-no-element: property: expected an element before it, found none", offset
+            )
         _add(source, header.elements[-1], words, offset)
     elif keyword:
-        raise source.fault("F002.ply-line", offset, found=keyword)
+        raise source.fault(
+            'F002.ply-line: expected element, property, comment or end_header, found "{found}"',
+            offset,
+            found=brief(keyword),
+        )
 
 
 def _element(source: Source, words: list[str], offset: int) -> Element:
     is_count = len(words) == 3 and words[2].isascii() and words[2].isdecimal()
     if not is_count or len(words[2]) > 18:
-        raise source.fault("F002.ply-element", offset, found=" ".join(words[1:]))
+        raise source.fault(
+            'F002.ply-element: element: expected a name and a count, found "{found}"',
+            offset,
+            found=brief(" ".join(words[1:])),
+        )
     return Element(words[1], int(words[2]), offset)
 
 
@@ -134,9 +159,23 @@ def _add(source: Source, element: Element, words: list[str], offset: int) -> Non
     kinds, name = (words[2:-1], words[-1]) if words[1:2] == ["list"] else (words[1:-1], words[-1])
     is_list = words[1:2] == ["list"]
     if len(kinds) != 1 + is_list or any(kind not in TYPES for kind in kinds):
-        raise source.fault("F002.ply-property", offset, found=" ".join(words[1:]))
+        raise source.fault(
+            "F002.ply-property: property: expected a type and a name, or list, two types and a "
+            'name, found "{found}"',
+            offset,
+            found=brief(" ".join(words[1:])),
+        )
     if any(prop.name == name for prop in element.properties):
-        raise source.fault("F002.ply-property-again", offset, found=name)
+        raise source.fault(
+            'F002.ply-property-again: property: expected a unique name, found "{found}" again',
+            offset,
+            found=brief(name),
+        )
     if is_list and TYPES[kinds[0]].startswith("f"):
-        raise source.fault("F002.ply-list-count", offset, found=kinds[0])
+        raise source.fault(
+            "F002.ply-list-count: property: expected an integer type for the list count, found "
+            '"{found}"',
+            offset,
+            found=brief(kinds[0]),
+        )
     element.properties.append(Property(name, TYPES[kinds[-1]], TYPES[kinds[0]] if is_list else ""))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Part, Phrase
+from viewer.diagnostics import Part, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._mesh.polygons import triangles_of
 from viewer.formats._source import Source
@@ -25,6 +25,7 @@ from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
 from viewer.formats._text.words import number_key
 from viewer.formats.ply.header import CORNERS, Element, Header, Property
+from viewer.phrases import brief, counted, quoted
 from viewer.progress import report_bytes
 
 _PART = 1 << 17  # rows that are parsed together, to limit the memory of their values
@@ -167,10 +168,10 @@ class _TextRows:
         last = self.line + element.count * bool(element.properties)
         if last > len(self.firsts):
             raise self.source.fault(
-                "F002.ply-lines",
+                "F002.ply-lines: {element}: expected {expected}, found {found}",
                 element.offset,
                 element=element.name,
-                expected=element.count,
+                expected=counted(element.count, "line"),
                 found=len(self.firsts) - self.line,
             )
         rows = slice(self.line, last)
@@ -226,7 +227,7 @@ class _TextRows:
     ) -> None:
         """Refuse words that are not numbers, each in a row of a table."""
         if len(words):
-            item = Phrase("ply-row", element=table.element.name, row=int(rows[0]))
+            item = Phrase("{element} {row}", element=brief(table.element.name), row=int(rows[0]))
             self._refuse_first(words, item, part, places)
 
     def _refuse_first(
@@ -239,17 +240,25 @@ class _TextRows:
         first = int(words[0])
         word = self._word(first)
         self.source.refuse(
-            number_key(word), self._offset(first), len(words), part, places, item=item, found=word
+            number_key(word),
+            self._offset(first),
+            len(words),
+            part,
+            places,
+            item=item,
+            found=quoted(word),
         )
 
     def _no_count(self, table: Table, row: int, word: int) -> FormatError:
         """Return the error for a list without a valid count."""
-        item = Phrase("ply-row", element=table.element.name, row=row)
+        item = Phrase("{element} {row}", element=brief(table.element.name), row=row)
         found = float(self.values[word])
         if np.isnan(found):
             text = self._word(word)
-            return self.source.fault(number_key(text), self._offset(word), item=item, found=text)
-        return self.source.fault("F002.ply-list", self._offset(word), item=item, found=found)
+            return self.source.fault(
+                number_key(text), self._offset(word), item=item, found=quoted(text)
+            )
+        return self.source.fault(wording.PLY_LIST, self._offset(word), item=item, found=found)
 
     def end(self, element: Element, cursor: _Places) -> None:
         """Refuse rows with more numbers than their properties need."""
@@ -261,11 +270,13 @@ class _TextRows:
         """Warn about lines after the last element, and release the text."""
         left = len(self.counts) - self.line
         if left:
-            self.source.warn("F006.ply-lines", n=left)
+            self.source.warn(
+                "F006.ply-lines: ignored {n} after the last element", n=counted(left, "line")
+            )
             first = self.firsts[self.line]
             words = first + np.flatnonzero(np.isnan(self.values[first:]))
             if len(words):
-                self._refuse_first(words, Phrase("ply-rest"))
+                self._refuse_first(words, Phrase("after the last element"))
         del self._lines
         self.source.release()
 
@@ -279,8 +290,18 @@ class _TextRows:
         first = int(self.firsts[line])
         expected, found, where = cursor - first, int(self.counts[line]), self._offset(first)
         if cursor > self.rows_left[row]:
-            raise self.source.fault("F002.ply-fewer", where, expected=expected, found=found)
-        raise self.source.fault("F002.ply-more", where, expected=expected, found=found)
+            raise self.source.fault(
+                "F002.ply-fewer: expected at least {expected} numbers on the line, found {found}",
+                where,
+                expected=expected,
+                found=found,
+            )
+        raise self.source.fault(
+            "F002.ply-more: expected {expected} on the line, found {found}",
+            where,
+            expected=counted(expected, "number"),
+            found=found,
+        )
 
     def _word(self, word: int) -> bytes:
         found = _WORD.match(self.data, self._offset(word))
@@ -391,8 +412,8 @@ class _BinaryRows:
         wrong = np.flatnonzero(whole < 0)
         if len(wrong):
             row = int(wrong[0])
-            item = Phrase("ply-row", element=table.element.name, row=row)
-            raise self.source.fault("F002.ply-list", item=item, found=int(whole[row]))
+            item = Phrase("{element} {row}", element=brief(table.element.name), row=row)
+            raise self.source.fault(wording.PLY_LIST, item=item, found=int(whole[row]))
         size = int(prop.kind[1])
         values, _ = self._numbers(_list_places(cursor, whole, size), prop.kind)
         return whole, values, cursor + whole * size
@@ -406,14 +427,17 @@ class _BinaryRows:
         """Warn about bytes after the last element."""
         left = len(self.data) - self.position
         if left:
-            self.source.warn("F006.ply-bytes", n=left)
+            self.source.warn(
+                "F006.ply-bytes: ignored {n} after the last element", n=counted(left, "byte")
+            )
 
     def _short(self, element: Element, left: int) -> FormatError:
         return self.source.fault(
-            "F002.ply-short",
+            "F002.ply-short: {element}: expected {expected}, found the end of the file after "
+            "{size} bytes",
             element.offset,
             element=element.name,
-            expected=element.count,
+            expected=counted(element.count, "row"),
             size=left,
         )
 

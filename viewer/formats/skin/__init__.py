@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._mesh.polygons import filled_normals
 from viewer.formats._mesh.texture import load_image
@@ -42,7 +42,7 @@ from viewer.formats.skin.sections import Sections, read_sections
 from viewer.formats.skin.tables import KEYWORDS
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
-from viewer.phrases import printable
+from viewer.phrases import all_of, optional, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
@@ -67,10 +67,15 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
     _require_positions(source, sections)
     even_counts(source, sections)
     if not sections.triangles:
-        raise source.fault("F002.skin-triangles", source.end)
+        raise source.fault(
+            "F002.skin-triangles: expected triangles, found no `triangles` section", source.end
+        )
     triangles = checked_triangles(source, sections, len(sections.tables["positions"]))
     if len(triangles) == 0:
-        raise source.fault("F002.skin-no-triangle", sections.offsets["triangles"])
+        raise source.fault(
+            "F002.skin-no-triangle: expected at least one triangle, found none",
+            sections.offsets["triangles"],
+        )
     source.remember("triangles", sections.triangle_offset)
     materials = np.repeat(
         [run.material for run in sections.triangles],
@@ -93,28 +98,35 @@ def _require_positions(source: Source, sections: Sections) -> None:
     table = sections.tables.get("positions")
     if table is None:
         looks = source.looks_like()
-        raise source.fault("F002.skin-positions", None if looks else source.end, looks=looks)
+        raise source.fault(
+            "F002.skin-positions: expected a skin, found no `positions` section{looks}",
+            None if looks else source.end,
+            looks=optional(" ({})", looks),
+        )
     if len(table) == 0:
-        raise source.fault("F002.skin-no-vertex", sections.offsets["positions"])
+        raise source.fault(
+            "F002.skin-no-vertex: expected at least one vertex, found positions 0",
+            sections.offsets["positions"],
+        )
 
 
 def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
     normals = sections.tables.get("normals")
     if normals is None and "normals" not in sections.offsets:
-        source.warn("F007.skin-normals")
+        source.warn("F007.skin-normals: no `normals` section: computed from the triangles")
     return filled_normals(source, normals, positions, triangles)
 
 
 def _skin(source: Source, sections: Sections) -> Skin | None:
     if sections.starts is None and sections.bindings is None:
-        source.warn("F007.skin-unbound")
+        source.warn("F007.skin-unbound: no `skinweights` or `bindings`: the mesh cannot be skinned")
         return None
     if sections.starts is None or sections.bindings is None:
         missing = "skinweights" if sections.starts is None else "bindings"
         present = "bindings" if sections.starts is None else "skinweights"
         skin = None if sections.starts is None else _unbound_skin(sections)
         source.refuse(
-            "B001.skin-section",
+            "B001.skin-section: expected a `{missing}` section to go with `{present}`, found none",
             sections.offsets[present],
             1,
             "bindings",
@@ -169,10 +181,10 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     notes = []
     if len(sources) != figure.mesh.n_vertices:
         counts = {"before": figure.mesh.n_vertices, "after": mesh.n_vertices}
-        notes.append(Diagnostic("X005.seams", Path(path), values=counts))
+        notes.append(Diagnostic(wording.SEAMS, Path(path), values=counts))
     if lost := lost_parts(mesh):
         notes.append(
-            Diagnostic("X003.parts", Path(path), values={"format": ".skin", "parts": lost})
+            Diagnostic(wording.PARTS, Path(path), values={"format": ".skin", "parts": all_of(lost)})
         )
     return notes
 
@@ -181,13 +193,13 @@ def lost_parts(mesh: Mesh) -> list[Phrase]:
     """Return the data of a mesh that the format cannot hold."""
     lost = []
     if not all(material.is_plain for material in mesh.materials):
-        lost.append(Phrase("part-materials"))
+        lost.append(Phrase("material properties except one texture each"))
     if mesh.other_uvs:
-        lost.append(Phrase("part-second-uvs"))
+        lost.append(Phrase("second texture coordinates"))
     if mesh.colors is not None:
-        lost.append(Phrase("part-vertex-colors"))
+        lost.append(Phrase("vertex colours"))
     if mesh.parts:
-        lost.append(Phrase("part-mesh-parts"))
+        lost.append(Phrase("names of its parts"))
     return lost
 
 

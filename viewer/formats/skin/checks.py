@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.formats._placeholders import neutral_corners
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.skin.sections import Sections, check_declared
 from viewer.formats.skin.tables import LOST
+from viewer.phrases import rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.inspection.faults import are_singular
@@ -30,7 +32,7 @@ def even_counts(source: Source, sections: Sections) -> None:
         name, wanted = next(iter(others.items()))
         if wanted != n_positions:
             source.refuse(
-                "F002.skin-entries",
+                wording.SKIN_ENTRIES,
                 sections.offsets["positions"],
                 1,
                 "positions",
@@ -50,7 +52,7 @@ def even_counts(source: Source, sections: Sections) -> None:
             continue
         is_weights = name == "skinweights"
         source.refuse(
-            "F002.skin-entries",
+            wording.SKIN_ENTRIES,
             sections.offsets[name],
             1,
             "weights" if is_weights else "",
@@ -86,7 +88,8 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
             if wrong.any():
                 row, corner = np.argwhere(wrong)[0].tolist()
                 source.refuse(
-                    "F002.skin-corner-range",
+                    "F002.skin-corner-range: triangle {triangle}: expected a vertex index below "
+                    "{limit}, found {found}",
                     run.offset_of(row),
                     int(wrong.sum()),
                     "triangles",
@@ -105,9 +108,15 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
     """Warn about textures that cannot be drawn."""
     has_texture = any(material.texture for material in mesh.materials)
     if mesh.uvs is not None and not has_texture:
-        source.warn("F007.skin-texcoords", sections.offsets["texcoords"])
+        source.warn(
+            "F007.skin-texcoords: texcoords without a texture: drawn untextured",
+            sections.offsets["texcoords"],
+        )
     if mesh.uvs is None and has_texture:
-        source.warn("F005.skin-texture", sections.offsets["material"])
+        source.warn(
+            "F005.skin-texture: texture without texcoords: drawn untextured",
+            sections.offsets["material"],
+        )
 
 
 def invert_bindings(source: Source, sections: Sections) -> Floats:
@@ -123,13 +132,14 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
     if flat.any():
         index = int(flat.argmax())
         source.refuse(
-            "B002.skin-matrix",
+            "B002.skin-matrix: bindings: expected invertible matrices, found matrix {matrix} "
+            "with determinant {determinant}",
             source.offset_of("bindings", index),
             int(flat.sum()),
             "bindings",
             np.flatnonzero(flat),
             matrix=index,
-            determinant=float(determinants[index]),
+            determinant=rounded(float(determinants[index])),
         )
         # A singular binding is replaced by its translation alone.
         inverse[flat] = translation_matrix(-bindings[flat, :3, 3])
@@ -147,7 +157,8 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
     vertices = np.searchsorted(sections.starts, wrong, side="right") - 1
     vertex = int(vertices[0])
     source.refuse(
-        "W010.skin-joint",
+        "W010.skin-joint: skinweights of vertex {vertex}: expected a joint index below "
+        "{limit}, found {found}",
         source.offset_of("weights", vertex),
         len(wrong),
         "weights",

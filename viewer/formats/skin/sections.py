@@ -8,7 +8,7 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, parse_few
@@ -24,6 +24,7 @@ from viewer.formats.skin.tables import (
     words_of,
 )
 from viewer.formats.skin.weights import read_weights
+from viewer.phrases import counted, quoted
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.material import Material, Texture
 
@@ -86,10 +87,14 @@ def read_sections(source: Source) -> Sections:
             extra_braces += 1
             position = word.end()
         else:
-            source.warn("F006.skin-section", word.start(), found=name)
+            source.warn(
+                "F006.skin-section: ignored unknown section {found}",
+                word.start(),
+                found=quoted(name),
+            )
             position = _skip(source, word)
     if extra_braces:
-        source.warn("F006.skin-braces", n=extra_braces)
+        source.warn('F006.skin-braces: ignored {n} "}}" outside any section', n=extra_braces)
     return sections
 
 
@@ -97,7 +102,11 @@ def _read_section(source: Source, sections: Sections, word: _Word) -> int:
     """Read one section and return the offset after it."""
     name = word.group().decode()
     if name in sections.offsets and name not in ("triangles", "material"):
-        source.warn("F007.skin-again", word.start(), section=name)
+        source.warn(
+            "F007.skin-again: repeated {section} section: the last one is used",
+            word.start(),
+            section=name,
+        )
         check_declared(source, sections, name)
     sections.offsets[name] = word.start()
     if name == "material":
@@ -122,7 +131,7 @@ def _read_section(source: Source, sections: Sections, word: _Word) -> int:
         sections.tables[name], offset_of = read_rows(source, block, count, _WIDTHS[name])
         source.remember(name, offset_of)
     if not block.closed:
-        source.warn("F006.last-brace", section=name)
+        source.warn(wording.LAST_BRACE, section=name)
     return block.end + block.closed
 
 
@@ -136,12 +145,12 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
     declared = sections.counts[name]
     if declared != found:
         offset = sections.offsets[name]
-        source.refuse("F002.skin-declared", offset, section=name, expected=declared, found=found)
+        source.refuse(wording.SKIN_DECLARED, offset, section=name, expected=declared, found=found)
 
 
 def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> _TriangleRun:
     first = sections.n_triangles
-    rows, offset_of = read_rows(source, block, count, 3, first, "triangle")
+    rows, offset_of = read_rows(source, block, count, 3, first, "triangle {index}")
     corners = whole_corners(source, rows, offset_of, first)
     return _TriangleRun(corners, len(sections.materials) - 1, offset_of)
 
@@ -165,13 +174,21 @@ def _read_material(
             texture = rest[1].strip().decode("utf-8", "surrogateescape") or None
             named, position = word.start(), rest.end()
         else:
-            source.warn("F006.skin-material", word.start(), found=word.group())
+            source.warn(
+                "F006.skin-material: ignored unknown material property {found}",
+                word.start(),
+                found=quoted(word.group()),
+            )
             position = _skip_item(source, word)
     if word is None:
         line = source.line(header.start())
-        raise source.fault("F002.unclosed", source.end, section="material", line=line, found=None)
+        raise source.fault(
+            wording.UNCLOSED, source.end, section="material", line=line, found=quoted(None)
+        )
     if texture is None:
-        source.warn("F005.skin-material", header.start())
+        source.warn(
+            "F005.skin-material: material without a texture: drawn untextured", header.start()
+        )
         return Material(name), word.end()
     if texture not in pictures:
         pictures[texture] = load_image(source, texture, named)
@@ -188,7 +205,7 @@ def _material_name(source: Source, header: _Word) -> tuple[str, _Word]:
     if word is None or word.group() != b"{":
         where = header.start() if word is None else word.start()
         raise source.fault(
-            "F002.skin-brace", where, section="material", found=word and word.group()
+            wording.SKIN_BRACE, where, section="material", found=quoted(word and word.group())
         )
     return b" ".join(words).decode("utf-8", "surrogateescape"), word
 
@@ -205,7 +222,7 @@ def _skip_item(source: Source, word: _Word) -> int:
         if text == b"}" and depth == 0:
             return position
     if depth:
-        raise source.fault("F002.open", word.start(), word=word.group())
+        raise source.fault(wording.OPEN, word.start(), word=quoted(word.group()))
     return position
 
 
@@ -231,14 +248,32 @@ def _read_bindings(source: Source, count: int, position: int) -> tuple[Floats, i
         if not is_whole:
             line = source.line(stated)
             raise source.fault(
-                "F002.skin-bindings-end", end, line=line, expected=count, found=found, then=then
+                "F002.skin-bindings-end: bindings (from line {line}): expected {expected}, found "
+                "{found} followed by {then}",
+                end,
+                line=line,
+                expected=counted(count, "matrix"),
+                found=counted(found, "matrix"),
+                then=quoted(then),
             )
         line = source.line(end)
-        source.refuse("B001.skin-count", stated, line=line, expected=count, found=found, then=then)
+        source.refuse(
+            "B001.skin-count: bindings (to line {line}): expected {expected}, found {found} "
+            "followed by {then}",
+            stated,
+            line=line,
+            expected=counted(count, "matrix"),
+            found=counted(found, "matrix"),
+            then=quoted(then),
+        )
     if word is None:
-        source.warn("F006.last-brace", section="bindings")
+        source.warn(wording.LAST_BRACE, section="bindings")
     elif word.group() != b"}":
-        raise source.fault("F002.skin-bindings-brace", word.start(), found=word.group())
+        raise source.fault(
+            'F002.skin-bindings-brace: bindings: expected "}}", found {found}',
+            word.start(),
+            found=quoted(word.group()),
+        )
     bindings = np.tile(np.eye(4), (len(matrices), 1, 1))
     if matrices:
         bindings[:, :3, :] = np.array(matrices).reshape(-1, 4, 3).transpose(0, 2, 1)
@@ -255,18 +290,18 @@ def _read_matrix(source: Source, index: int, word: _Word) -> tuple[Floats, int]:
         from viewer.formats._text.words import refuse_words
 
         places = np.full(len(words.bad), index)
-        item = Phrase("matrix", index=index)
+        item = Phrase("bindings matrix {index}", index=index)
         refuse_words(source, words, words.bad, lambda _: item, "bindings", places)
         return _IDENTITY, block.end + 1
     if len(values) != len(_IDENTITY):
         source.refuse(
-            "F002.width",
+            wording.WIDTH,
             word.start(),
             1,
             "bindings",
             [index],
-            item=Phrase("matrix", index=index),
-            expected=len(_IDENTITY),
+            item=Phrase("bindings matrix {index}", index=index),
+            expected=counted(len(_IDENTITY), "number"),
             found=len(values),
         )
         return _IDENTITY, block.end + 1
@@ -286,5 +321,5 @@ def _skip(source: Source, word: _Word) -> int:
         if text == b"}" and depth == 0:
             return position
     if depth:
-        raise source.fault("F002.open", word.start(), word=word.group())
+        raise source.fault(wording.OPEN, word.start(), word=quoted(word.group()))
     return position

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Part, Phrase
+from viewer.diagnostics import Part, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, to_number
+from viewer.phrases import counted, optional, quoted
 from viewer.rig.arrays import Floats, Ints
 
 if TYPE_CHECKING:
@@ -65,7 +66,9 @@ def find_block(source: Source, name: str, header: _Word, position: int) -> Block
         position = brace.end()
     elif name != "skinweights":
         where = header.start() if brace is None else brace.start()
-        raise source.fault("F002.skin-brace", where, section=name, found=brace and brace.group())
+        raise source.fault(
+            wording.SKIN_BRACE, where, section=name, found=quoted(brace and brace.group())
+        )
     end = source.data.find(b"}", position)
     closed = end >= 0
     return Block(
@@ -79,12 +82,19 @@ def read_count(source: Source, name: str, word: _Word) -> tuple[int, int]:
     value = None if found is None else to_number(found.group())
     if found is None or value is None or value != int(value) or value < 0:
         at = word.start() if found is None else found.start()
-        raise source.fault("F002.count", at, item=name, found=found and found.group())
+        raise source.fault(
+            wording.COUNT, at, item=name, found=quoted(found.group() if found else None)
+        )
     # An entry takes at least two bytes: one character, and white space before it.
     left = len(source.data) - found.end()
     if value * 2 > left + 1:
         raise source.fault(
-            "F002.skin-too-many", found.start(), section=name, found=int(value), size=left
+            "F002.skin-too-many: {section}: expected a count that fits the file, found {found} "
+            "entries in {size} bytes",
+            found.start(),
+            section=name,
+            found=int(value),
+            size=left,
         )
     return int(value), found.end()
 
@@ -95,7 +105,7 @@ def read_rows(
     count: int,
     width: int,
     first: int = 0,
-    item: str = "of-vertex",
+    item: str = "{section} of vertex {index}",
 ) -> tuple[Floats, OffsetOf]:
     """Parse a block of rows.
 
@@ -134,17 +144,23 @@ def _faulty_rows(
     wrong = np.flatnonzero(~fits)
     if len(wrong):
         source.refuse(
-            "F002.width",
+            wording.WIDTH,
             int(words.offsets[begins[wrong[0]]]),
             len(wrong),
             part,
             wrong + first,
             item=named(int(wrong[0]) + first),
-            expected=width,
+            expected=counted(width, "number"),
             found=int(sizes[wrong[0]]),
         )
     if block.name == "triangles" and len(begins) != count:
-        source.refuse("F002.skin-triangle-rows", block.header, expected=count, found=len(begins))
+        source.refuse(
+            "F002.skin-triangle-rows: triangles: expected {expected} rows of 3 numbers, found "
+            "{found}",
+            block.header,
+            expected=count,
+            found=len(begins),
+        )
     return rows, words.offsets[begins]
 
 
@@ -166,7 +182,8 @@ def _row_begins(
 def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -> FormatError:
     if not block.closed:
         return source.fault(
-            "F002.skin-rows-end",
+            'F002.skin-rows-end: expected "}}" to close {section} (line {line}), found the end '
+            "of the file after {found} of {expected} rows",
             source.end,
             section=block.name,
             line=source.line(block.header),
@@ -174,13 +191,14 @@ def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -
             expected=count,
         )
     return source.fault(
-        "F002.skin-rows",
+        "F002.skin-rows: {section}: expected {expected} rows of {width} numbers, found "
+        "{found}{rest} (to line {end})",
         block.count,
         section=block.name,
         expected=count,
         width=width,
         found=total // width,
-        rest=total % width,
+        rest=optional(" and {} numbers", total % width),
         end=source.line(block.end),
     )
 
@@ -203,7 +221,9 @@ def words_of(source: Source, block: Block) -> Words:
 def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
     """Return the error for a block interrupted by ``found``, or by the end of the file if None."""
     line = source.line(block.header)
-    return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
+    return source.fault(
+        wording.UNCLOSED, offset, section=block.name, line=line, found=quoted(found)
+    )
 
 
 def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
@@ -223,7 +243,7 @@ def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int)
     if len(triangles):
         row = int(triangles[0])
         source.refuse(
-            "F002.skin-corner",
+            "F002.skin-corner: triangle {triangle}: expected a vertex index, found {found:g}",
             offset_of(row),
             int(wrong.sum()),
             "triangles",

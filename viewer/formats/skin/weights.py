@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats._text.number_text import dumped
 from viewer.formats._text.numbers import parse_numbers
 from viewer.formats.skin.tables import Block, OffsetOf, to_whole, words_of
+from viewer.phrases import bare, quoted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.skin import Skin
 
@@ -139,24 +140,25 @@ def _refuse_lines(
     is_count = words.values[head] >= 0 and words.values[head] % 1 == 0
     if is_count:
         source.refuse(
-            "F002.skin-influences",
+            "F002.skin-influences: skinweights of vertex {vertex}: expected {pairs} "
+            "joint-weight pairs, found {found} numbers on the line",
             int(words.offsets[head]),
             len(vertices),
             "weights",
             vertices,
             vertex=vertex,
-            pairs=words.word(head),
+            pairs=bare(words.word(head)),
             found=int(after[vertex]) - head - 1,
         )
     else:
         source.refuse(
-            "F002.skin-influence-count",
+            wording.SKIN_INFLUENCE_COUNT,
             int(words.offsets[head]),
             len(vertices),
             "weights",
             vertices,
             vertex=vertex,
-            found=words.word(head),
+            found=quoted(words.word(head)),
         )
 
 
@@ -174,7 +176,9 @@ def _faulty_pairs(
         source,
         words,
         at,
-        lambda word: Phrase("of-vertex", section="skinweights", index=vertices[word]),
+        lambda word: Phrase(
+            "{section} of vertex {index}", section="skinweights", index=vertices[word]
+        ),
         "weights",
         owners[bad],
     )
@@ -183,13 +187,14 @@ def _faulty_pairs(
     if len(wrong):
         place = int(places[wrong[0]])
         source.refuse(
-            "F002.skin-joint",
+            "F002.skin-joint: skinweights of vertex {vertex}: expected a joint index, found "
+            "{found}",
             int(words.offsets[place]),
             len(wrong),
             "weights",
             owners[wrong],
             vertex=int(owners[wrong[0]]),
-            found=words.word(place),
+            found=quoted(words.word(place)),
         )
     lost = np.isnan(joints) | np.isnan(weights) | (whole != joints)
     return np.where(lost, 0, whole).astype(np.int32), np.where(lost, 0.0, weights)
@@ -210,15 +215,16 @@ def _no_influences(
         length = numbers[position]
         if length < 0 or length != int(length):
             return source.fault(
-                "F002.skin-influence-count",
+                wording.SKIN_INFLUENCE_COUNT,
                 int(words.offsets[position]),
                 vertex=len(heads) - 1,
-                found=words.word(position),
+                found=quoted(words.word(position)),
             )
         position += 1 + 2 * int(length)
     if not block.closed:
         return source.fault(
-            "F002.skin-weights-end",
+            'F002.skin-weights-end: expected "}}" to close skinweights (line {line}), found '
+            "the end of the file after {found} of {expected} vertices",
             source.end,
             line=source.line(block.header),
             found=len(heads),
@@ -227,16 +233,26 @@ def _no_influences(
     if len(heads) < count:
         end = source.line(block.end)
         return source.fault(
-            "F002.skin-weights", block.count, expected=count, found=len(heads), end=end
+            "F002.skin-weights: skinweights: expected {expected} vertices, found {found} (to "
+            "line {end})",
+            block.count,
+            expected=count,
+            found=len(heads),
+            end=end,
         )
     if count == 0:
-        return source.fault("F002.skin-no-weights", block.count, found=len(words.values))
+        return source.fault(
+            "F002.skin-no-weights: skinweights: expected no vertices, found {found} numbers",
+            block.count,
+            found=len(words.values),
+        )
     head = heads[-1]
     return source.fault(
-        "F002.skin-influences-end",
+        "F002.skin-influences-end: skinweights of last vertex {vertex}: expected {pairs} "
+        "joint-weight pairs, found {found} numbers before the closing brace",
         int(words.offsets[head]),
         vertex=count - 1,
-        pairs=words.word(head),
+        pairs=bare(words.word(head)),
         found=len(words.values) - head - 1,
     )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.results import Options, Results, capture_of
@@ -49,7 +50,10 @@ def _file(source: Source) -> Results:
     archive = archive_of(source)
     tool = tool_of(archive)
     if tool is None:
-        raise source.fault("F002.video-unknown", found=list(archive.keys))
+        raise source.fault(
+            "F002.video-unknown: expected results of video motion capture, found keys {found}",
+            found=listed(list(archive.keys), 12),
+        )
     found: Results = module_of(tool).read(source, archive)
     unread = [printable(key, 40) for key in sorted(archive.unread())]
     ignored = (("not needed", listed(unread, _LISTED)),) if unread else ()
@@ -63,6 +67,6 @@ def _folder(source: Source) -> Results:
         return _file(source.inside(single))
     tool = folder_tool(source, names)
     if tool is None:
-        raise source.fault("F002.unknown-folder")
+        raise source.fault(wording.UNKNOWN_FOLDER)
     found: Results = module_of(tool).read_folder(source, names)
     return found

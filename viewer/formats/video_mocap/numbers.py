@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._source import Source
+from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
 
@@ -46,7 +48,10 @@ class RowBudget:
         """
         self._left -= max(count, 1)
         if self._left < 0:
-            raise self._archive.source.fault("F002.video-rows", most=self._most)
+            raise self._archive.source.fault(
+                "F002.video-rows: expected at most {most} frames of all people, found more",
+                most=self._most,
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +100,11 @@ def frames_of(archive: Archive, key: str, count: int) -> Frames:
     found = archive.array(key, shape).values()
     found = finite(archive, key, found[:, 0] if found.ndim == 2 else found)
     if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
-        raise archive.fault("F002.video-frame-numbers", item=key)
+        raise archive.fault(
+            "F002.video-frame-numbers: {item}: expected integer frame numbers, found values of "
+            "a different type",
+            item=key,
+        )
     return found.astype(np.int64)
 
 
@@ -104,7 +113,10 @@ def first_rows(source: Source, frames: ArrayLike) -> tuple[Frames, Ints]:
     numbers = np.asarray(frames, dtype=np.int64)
     found, first = np.unique(numbers, return_index=True)
     if len(found) < len(numbers):
-        source.warn("F007.video-same-frame", n=len(numbers) - len(found))
+        source.warn(
+            "F007.video-same-frame: {n} ignored: the person is in an earlier row of the same frame",
+            n=counted(len(numbers) - len(found), "row"),
+        )
     return found, first.astype(np.int32)
 
 
@@ -112,7 +124,9 @@ def numbers(archive: Archive, key: str, count: int) -> Floats:
     """Return a fixed count of numbers, in an array of any shape or a list."""
     values = finite(archive, key, archive.array(key).values().reshape(-1))
     if len(values) != count:
-        raise archive.fault("F002.video-count", item=key, expected=count, found=len(values))
+        raise archive.fault(
+            wording.VIDEO_COUNT, item=key, expected=counted(count, "number"), found=len(values)
+        )
     return values
 
 
@@ -199,7 +213,7 @@ def _rotations(archive: Archive, key: str, found: Floats) -> Floats:
     is_flat = determinants < _SMALLEST
     if is_flat.any():
         worst = float(determinants.min())
-        archive.leave_gap("F002.video-rotation", item=key, found=worst)
+        archive.leave_gap(wording.VIDEO_ROTATION, item=key, found=rounded(worst))
         is_invalid |= is_flat
     return np.where(is_invalid[..., None, None], np.nan, nearest_rotations(found)[0])
 
@@ -221,5 +235,5 @@ def _unit(archive: Archive, key: str, vectors: Floats) -> Floats:
     is_short = lengths < _SMALLEST
     if is_short.any():
         worst = float(lengths[is_short].min())
-        archive.leave_gap("F002.video-rotation", item=key, found=worst)
+        archive.leave_gap(wording.VIDEO_ROTATION, item=key, found=rounded(worst))
     return np.where(is_short, np.nan, vectors / np.where(is_short, 1.0, lengths))

@@ -473,6 +473,11 @@ def identities(value: StatedValue, count: int) -> list[int | str]:
     persons = [_identity(item) for item in chosen]
     if None in persons:
         odd = describe(chosen[persons.index(None)])
-        raise value.archive.fault("F002.video-identity", item=value.key, found=odd)
+        raise value.archive.fault(
+            "F002.video-identity: {item}: expected a number or a name for each person or "
+            "frame, found {found}",
+            item=value.key,
+            found=odd,
+        )
     known = [person for person in persons if person is not None]
     return known if len(known) == count else known[:1] * count

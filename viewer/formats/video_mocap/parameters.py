@@ -19,6 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
@@ -49,7 +51,8 @@ from viewer.formats.video_mocap.parameter_layout import (
     with_facts,
 )
 from viewer.formats.video_mocap.results import Results, Track
-from viewer.phrases import counted, printable
+from viewer.phrases import agree, counted, optional, printable
+from viewer.phrases import listed as listed_text
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, gender_of
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
@@ -107,9 +110,15 @@ def read(source: Source, archive: Archive) -> Results:
     is_camera = layout.is_in_camera
     space = "camera" if is_camera else "world"
     if any(scope.kind == ASSUMED for one in found for scope in one.around):
-        source.warn("F007.video-axes", people=len(found), frames=layout.count)
+        source.warn(
+            "F007.video-axes: poses with two axes before the joints: {people} people in "
+            "{frames} assumed, because the shorter axis is usually that of the people; add "
+            "person_id with a number for each person to be certain",
+            people=len(found),
+            frames=counted(layout.count, "frame"),
+        )
     if layout.place is None:
-        source.warn("F007.motion-place")
+        source.warn(wording.MOTION_PLACE)
     recognised = [
         f"{key} ({form.title} of {counted(form.n_joints, 'joint')})" for key, form in layout.poses
     ]
@@ -122,7 +131,13 @@ def read(source: Source, archive: Archive) -> Results:
     scopes = [scope for scope in (found[0].archive, *found[0].around) if not scope.is_list]
     ignored = [*dict.fromkeys(key for scope in scopes for key in scope.keys if key not in used)]
     rest = ", ".join(map(printable, ignored[:_LISTED]))
-    source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
+    source.warn(
+        "F007.video-parameters: SMPL parameters of {n} {people}: {recognised}{ignored}",
+        n=len(people),
+        recognised=listed_text(recognised, 12),
+        ignored=optional("; ignored: {}", rest),
+        people=agree(len(people), "person", "people"),
+    )
     n_joints = sum(form.n_joints for _, form in layout.poses)
     model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
     if layout.model is not None:
@@ -149,11 +164,18 @@ def _rate(source: Source, found: list[ParameterDict]) -> float | None:
         rate = _number(archive.get(key))
         if rate is None or not is_rate(rate):
             shown = describe(archive.get(key)) if rate is None else f"{rate:g}"
-            source.warn("F007.rate-ignored", item=key, low=SLOWEST, high=FASTEST, found=shown)
+            source.warn(
+                "F007.rate-ignored: {item}: expected {low:g} to {high:,.0f} frames per second, "
+                "found {found}: ignored",
+                item=key,
+                low=SLOWEST,
+                high=FASTEST,
+                found=shown,
+            )
         elif rate not in rates:
             rates.append(rate)
     if len(rates) > 1:
-        source.warn("F007.motion-rates", rates=[f"{rate:g}" for rate in rates])
+        source.warn(wording.MOTION_RATES, rates=listed_text([f"{rate:g}" for rate in rates]))
     return rates[0] if rates else None
 
 
@@ -228,10 +250,14 @@ def _rows_of_people(source: Source, found: list[ParameterDict], tracks: list[Tra
             persons = [*identities(one.layout.person, len(frames))]
             if one.layout.frames is None and len(set(persons)) > 1:
                 frames = _occurrences(persons)
-                source.warn("F007.video-rows", item=one.layout.person.key)
+                source.warn(
+                    "F007.video-rows: no frame numbers: the rows of each {item} are its frames, "
+                    "in order",
+                    item=one.layout.person.key,
+                )
         elif again.any():
             persons = [(index, person) for person in again.tolist()]
-            source.warn("F007.video-repeated", n=int(again.max()) + 1)
+            source.warn(wording.VIDEO_REPEATED, n=int(again.max()) + 1)
         else:
             known = (_person_named(part) for part in one.path)
             number = next((each for each in known if each is not None), None)
@@ -261,7 +287,7 @@ def _rows_of_frames(
         rows.append(_Rows(track, np.full(count, frame), own, genders))
     most = max(seen.values())
     if most > 1 and not is_known:
-        source.warn("F007.video-repeated", n=most)
+        source.warn(wording.VIDEO_REPEATED, n=most)
     return rows, span
 
 
@@ -305,7 +331,11 @@ def _on_timeline(
     frames, missing, span = _numbered(found, of_frames)
     if missing:
         spans = frame_spans(np.array(missing))
-        source.warn("F007.frames-empty", n=len(missing), frames=spans)
+        source.warn(
+            "F007.frames-empty: {n} without people: {frames}",
+            n=counted(len(missing), "frame"),
+            frames=listed_text(spans),
+        )
     return frames, persons, span
 
 
@@ -349,7 +379,12 @@ def _level_of_people(
     chosen = by_place if by_place is not None else outer if sizes[outer] < sizes[inner] else inner
     if min(sizes.values()) > 1:
         other = outer if chosen == inner else inner
-        source.warn("F007.video-lists", people=sizes[chosen], frames=sizes[other])
+        source.warn(
+            "F007.video-lists: nested lists: {people} people in {frames} assumed, because no "
+            "ID, gender or shape tells the people apart; add person_id to each dict",
+            people=sizes[chosen],
+            frames=counted(sizes[other], "frame"),
+        )
     return chosen
 
 
@@ -454,14 +489,18 @@ def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
             )
             listed.setdefault(number, []).append((part, each.frames[chosen]))
     if untracked:
-        source.warn("F007.record-untracked")
+        source.warn(wording.RECORD_UNTRACKED)
     people: dict[int, Track] = {}
     for number, parts in sorted(listed.items()):
         frames, first = first_rows(source, np.concatenate([own for _, own in parts]))
         whole = _joined([track for track, _ in parts]).selected(first)
         said = [*filter(None, genders[number])]
         if len(said) > 1:
-            source.warn("F007.motion-gender", found=", ".join(said))
+            source.warn(
+                wording.MOTION_GENDER,
+                found=", ".join(said),
+                remedy=Remedy("open the model of the right gender first", "--gender sets it"),
+            )
         people[number] = replace(whole, frames=frames, gender=said[0] if len(said) == 1 else "")
     return people
 
@@ -480,7 +519,7 @@ def _numbers_of(source: Source, persons: Sequence[_Person]) -> dict[_Person, int
         f"{number}: {printable(one, 40)}" for one, number in numbers.items() if isinstance(one, str)
     ]
     if names:
-        source.warn("F007.person-names", names=names)
+        source.warn(wording.PERSON_NAMES, names=listed_text(names))
     return numbers
 
 

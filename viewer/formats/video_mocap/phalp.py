@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value
@@ -31,6 +31,7 @@ from viewer.formats.video_mocap.numbers import (
     vectors_of,
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import FAMILY
 
@@ -55,7 +56,11 @@ def read(source: Source, archive: Archive) -> Results:
     for key in archive.keys:
         frame = archive.inside(key)
         if frame is None:
-            raise archive.fault("F002.video-frame", item=key)
+            raise archive.fault(
+                "F002.video-frame: {item}: expected the detections of a frame, found a different "
+                "value",
+                item=key,
+            )
         number = int(sole(frame, "time"))
         n_cuts += bool(frame.has("shot") and frame.get("shot"))
         budget.spend(len(_whole_numbers(frame, "tid")))
@@ -66,7 +71,11 @@ def read(source: Source, archive: Archive) -> Results:
                 found[person].append((number, row))
         size = size or _size(frame)
     people = {person: _track(archive, rows) for person, rows in sorted(found.items())}
-    ghosts = Diagnostic("F007.video-ghosts", source.path, values={"n": n_ghosts})
+    ghosts = Diagnostic(
+        "F007.video-ghosts: {n} of people who are not visible omitted",
+        source.path,
+        values={"n": counted(n_ghosts, "detection")},
+    )
     facts = (("shots", f"{n_cuts + 1}"),) if n_cuts else ()
     return Results(
         "4D-Humans (PHALP)",
@@ -89,7 +98,12 @@ def _people(frame: Archive) -> list[tuple[int, Floats | None]]:
     n_places = len(places) if isinstance(places, list | tuple) else 0
     if not len(tracks) == n_bodies == n_places or (ages and len(ages) != len(tracks)):
         counts = [len(tracks), n_bodies, n_places]
-        raise frame.fault("F002.video-lists", item="tid", counts=counts)
+        raise frame.fault(
+            "F002.video-lists: {item}: expected as many bodies and cameras as tracks, found "
+            "{counts}",
+            item="tid",
+            counts=listed(counts),
+        )
     found: list[tuple[int, Floats | None]] = []
     for index, track in enumerate(tracks):
         is_lost = (ages and ages[index] != 0) or track not in seen
@@ -110,7 +124,9 @@ def _flat(body: Archive, key: str, count: int) -> NDArray[Any]:
 def _as_numbers(archive: Archive, key: str, value: Value, count: int) -> NDArray[Any]:
     values = value.values() if isinstance(value, Deferred) else np.zeros(0)
     if values.dtype.kind not in "iuf" or values.size != count:
-        raise archive.fault("F002.video-count", item=key, expected=count, found=values.size)
+        raise archive.fault(
+            wording.VIDEO_COUNT, item=key, expected=counted(count, "number"), found=values.size
+        )
     return values.reshape(count).astype(np.float64)
 
 
@@ -120,7 +136,10 @@ def _whole_numbers(frame: Archive, key: str) -> list[int]:
     if isinstance(values, Deferred):
         values = values.values().reshape(-1).tolist()
     if not isinstance(values, list | tuple) or not all(isinstance(n, int) for n in values):
-        raise frame.fault("F002.video-whole", item=key)
+        raise frame.fault(
+            "F002.video-whole: {item}: expected a list of integers, found a different value",
+            item=key,
+        )
     return [int(number) for number in values]
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import (
@@ -53,7 +54,7 @@ def read(source: Source, archive: Archive) -> Results:
         person = None if tracks is None else tracks.inside(key)
         number = person_number(key)
         if person is None or number is None:
-            raise archive.fault("F002.video-person", item=f"people.{key}")
+            raise archive.fault(wording.VIDEO_PERSON, item=f"people.{key}")
         for space, part in _SPACES.items():
             body = person.inside(part)
             if body is not None and body.has("trans"):

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics.remedy import Remedy
 from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
+from viewer.phrases import agree, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.cameras import CameraMotion, CameraView
@@ -174,11 +176,20 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     if not any(
         len(track.frames) for people in results.people.values() for track in people.values()
     ):
-        raise source.fault("F002.video-people", tool=results.tool)
+        raise source.fault(
+            "F002.video-people: expected at least one person in results of {tool}, found none",
+            tool=results.tool,
+        )
     space = options.space or next(iter(results.people))
     if space not in results.people:
         found = [*results.people]
-        raise source.fault("F002.video-space", space=space, found=found, tool=results.tool)
+        raise source.fault(
+            "F002.video-space: expected people in {space} space, found them only in {found} "
+            "space ({tool})",
+            space=space,
+            found=listed(found),
+            tool=results.tool,
+        )
     frames = [track.frames for people in results.people.values() for track in people.values()]
     most = max(len(track.frames) for track in results.people[space].values())
     results, gaps = _without_invalid(source, results)
@@ -187,11 +198,21 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     numbers = np.concatenate([*frames, np.asarray(results.span, np.int64)])
     first, last = int(numbers.min()), int(numbers.max())
     if first < 0 or last - first >= _MOST_FRAMES or last >= 1 << 30:
-        raise source.fault("F002.video-frames", most=_MOST_FRAMES, low=first, high=last)
+        raise source.fault(
+            "F002.video-frames: expected at most {most} frames, numbered from 0 or above, "
+            "found {low} to {high}",
+            most=_MOST_FRAMES,
+            low=first,
+            high=last,
+        )
     known = options.frame_rate, results.frame_rate, options.video_rate
     rate = capture_rate(*known)
     if not any(known) and last > first:
-        source.warn("F007.no-rate", rate=rate)
+        source.warn(
+            wording.NO_RATE,
+            rate=rate,
+            remedy=Remedy("Frames per second in the Timeline sets it", "--fps sets it"),
+        )
     source.used_options |= {"space"} | ({"average-shape"} if _shapes_vary(results) else set())
     capture = _Capture(source, results, options, first, last - first + 1, rate, gaps)
     return capture.in_space(space)
@@ -222,24 +243,55 @@ def _without_invalid(
         n_points = sum(track.n_unseen for track in people[space].values())
         people[space] = {person: track.seen() for person, track in people[space].items()}
         if n_points:
-            values = {"n": n_points, "problem": problem}
-            notes[space].append(Diagnostic("F007.points-lost", source.path, values=values))
+            values = {
+                "n": counted(n_points, "point"),
+                "problem": problem,
+                "are": agree(n_points, "is", "are"),
+            }
+            notes[space].append(
+                Diagnostic(
+                    "F007.points-lost: {n} with invalid numbers {are} not visible; first error: "
+                    "{problem}",
+                    source.path,
+                    values=values,
+                )
+            )
         for person in lost:
-            values = {"person": person_label(person), "n": len(bad[person]), "problem": problem}
-            notes[space].append(Diagnostic("F007.person-lost", source.path, values=values))
+            values = {
+                "person": person_label(person),
+                "n": counted(len(bad[person]), "frame"),
+                "problem": problem,
+            }
+            notes[space].append(
+                Diagnostic(
+                    "F007.person-lost: {person} omitted: {n}, none of them valid; first error: "
+                    "{problem}",
+                    source.path,
+                    values=values,
+                )
+            )
     cameras: dict[str, Cameras] = {}
     for space, camera in results.cameras.items():
         held, gaps = _held(camera), camera.frames[camera.invalid]
         if held is None:
             notes.setdefault(space, []).append(
-                Diagnostic("F007.camera", source.path, values={"problem": problem})
+                Diagnostic(wording.CAMERA, source.path, values={"problem": problem})
             )
             continue
         cameras[space] = held
         if len(gaps):
-            values = {"n": len(gaps), "frames": frame_spans(gaps), "problem": problem}
+            values = {
+                "n": counted(len(gaps), "frame"),
+                "frames": listed(frame_spans(gaps)),
+                "problem": problem,
+            }
             notes.setdefault(space, []).append(
-                Diagnostic("F007.camera-frames", source.path, values=values)
+                Diagnostic(
+                    "F007.camera-frames: camera: held during {n} with invalid numbers ({frames}); "
+                    "first error: {problem}",
+                    source.path,
+                    values=values,
+                )
             )
     return replace(results, people=people, cameras=cameras), notes
 
@@ -284,7 +336,12 @@ class _Capture:
         if shown is not None and (shown.intrinsics[:, [0, 1], [0, 1]] <= 0.0).any():
             # Frusta and pictures need positive focal lengths.
             focal = float(shown.intrinsics[:, [0, 1], [0, 1]].min())
-            odd = Diagnostic("F007.video-focal", self.source.path, values={"found": focal})
+            odd = Diagnostic(
+                "F007.video-focal: camera omitted: expected a positive focal length, found "
+                "{found:g} pixels",
+                self.source.path,
+                values={"found": focal},
+            )
             cameras, cameras_of, notes = None, None, (*notes, odd)
         return Capture(
             self.source.path.stem,

@@ -22,6 +22,7 @@ from collections import defaultdict
 
 import numpy as np
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.checking import within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
@@ -77,7 +78,7 @@ def read(source: Source, archive: Archive) -> Results:
         for person, row in zip(persons.tolist(), table, strict=True):
             found[person].append((number, row))
     if not is_tracked and most > 1 and len(images) > 1:
-        source.warn("F007.video-repeated", n=most)
+        source.warn(wording.VIDEO_REPEATED, n=most)
     people = {
         person: _track(source, listed, has_joints) for person, listed in sorted(found.items())
     }

@@ -32,6 +32,7 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, first_rows, intrinsics_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track
+from viewer.phrases import listed
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointLayout
 
@@ -210,7 +211,12 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
         parts = arrays.keypoints, arrays.joints, arrays.vertices[:, ::step]
         sizes = sizes or tuple(part.shape[1] for part in parts)
         if sizes != tuple(part.shape[1] for part in parts):
-            raise archive.fault("F002.video-points", item=_VERTICES, expected=sizes)
+            raise archive.fault(
+                "F002.video-points: {item}: expected {expected} keypoints, joints and vertices, as "
+                "in the first frame, found different numbers",
+                item=_VERTICES,
+                expected=listed(sizes),
+            )
         points = np.concatenate(parts, axis=1) + arrays.translations[:, None]
         own = [arrays.parameters.get(key) for key in _MODEL]
         placed[person] += [
@@ -228,7 +234,9 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
     layout = _point_layout(*(sizes or (0, 0, 0)))
     people = {person: _track(source, rows, layout) for person, rows in sorted(placed.items())}
     thinned = Diagnostic(
-        "F007.video-vertices", source.path, values={"n": sum(sizes[-1:]), "all": most}
+        "F007.video-vertices: {n} of {all} vertices kept because there are many frames",
+        source.path,
+        values={"n": sum(sizes[-1:]), "all": most},
     )
     return Results(
         "SAM 3D Body",

@@ -18,12 +18,13 @@ import re
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.formats._archive.checking import archive_of, finite, finite_array, within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, has, intrinsics_of, rotations_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track, moved
+from viewer.phrases import counted
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import members_by_numbers
 
@@ -49,7 +50,11 @@ def read_folder(source: Source, names: set[str]) -> Results:
     found = {name: int(match[1]) for name in names if (match := _RESULT.fullmatch(name))}
     last = max(sorted(found), key=lambda name: found[name])
     if len(found) > 1:
-        source.warn("F007.video-last", name=last, n=len(found))
+        source.warn(
+            "F007.video-last: {n} in the folder: opened {name}, the last iteration",
+            name=last,
+            n=counted(len(found), "result"),
+        )
     file = source.inside(last)
     return read(file, archive_of(file))
 
@@ -87,7 +92,9 @@ def _intrinsics(archive: Archive) -> Floats:
     """Return fx, fy, cx and cy; if there are several frames, of the first."""
     values = finite(archive, "intrins", archive.array("intrins").values()).reshape(-1)
     if len(values) == 0 or len(values) % 4:
-        raise archive.fault("F002.video-count", item="intrins", expected=4, found=len(values))
+        raise archive.fault(
+            wording.VIDEO_COUNT, item="intrins", expected=counted(4, "number"), found=len(values)
+        )
     return values[:4]
 
 
@@ -126,7 +133,11 @@ def _tracks(
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             masks = np.zeros(0)
         if masks.shape != (n_people, n_frames) or len(set(ids)) < n_people:
-            note = Diagnostic("F007.video-tracks", file.path)
+            note = Diagnostic(
+                "F007.video-tracks: ignored because it does not match the people in the results: "
+                "all are treated as present in every frame",
+                file.path,
+            )
             return (*usual[:2], (note,))
         return ids, [np.asarray(mask >= 0.0) for mask in masks], ()
     return usual

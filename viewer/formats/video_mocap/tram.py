@@ -33,6 +33,7 @@ from viewer.formats.video_mocap.numbers import (
     six,
 )
 from viewer.formats.video_mocap.results import Cameras, Results, Track, inverse, moved
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import FAMILY
 
@@ -96,7 +97,14 @@ def _results(people: dict[int, Archive], camera: Archive | None) -> Results:
             if len(track.frames) and not 0 <= track.frames.min() <= track.frames.max() < len(
                 placed
             ):
-                raise camera.fault("F002.video-camera", item="cam_T", n=len(placed), person=person)
+                raise camera.fault(
+                    "F002.video-camera: {item}: expected a camera in each frame of person "
+                    "{person}, "
+                    "found {n}",
+                    item="cam_T",
+                    n=counted(len(placed), "frame"),
+                    person=person,
+                )
             world[person] = moved(track, turned[track.frames], placed[track.frames])
         spaces, ups = {"world": world, **spaces}, {"world": up, **ups}
         if intrinsics is not None:

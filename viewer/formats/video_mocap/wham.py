@@ -12,6 +12,7 @@ diagonal of the video, whose size is not in the file.
 
 from __future__ import annotations
 
+from viewer.diagnostics import wording
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import (
@@ -61,7 +62,7 @@ def read(source: Source, archive: Archive) -> Results:
 def _number(archive: Archive, key: str) -> int:
     number = person_number(key)
     if number is None:
-        raise archive.fault("F002.video-person", item=key)
+        raise archive.fault(wording.VIDEO_PERSON, item=key)
     return number
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from viewer.diagnostics.template import rendered
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RenderError, ViewerError
 from viewer.rendering.gpu.context import check_errors
 from viewer.rendering.gpu.ownership import Owner
@@ -71,7 +71,7 @@ class Target:
         less = "a smaller size needs less"
         if self.samples:
             alone = _gigabytes(target_bytes(self.size, 0))
-            option = rendered("{window:?Samples in Preferences|--samples 1}", {})
+            option = Remedy("Samples in Preferences", "--samples 1")
             less = f"1 sample per pixel ({option}) needs {alone}, {less}"
         return RenderError(
             f"an image of {width} x {height} pixels{samples} needs "

@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.phrases import counted, listed, quoted
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.comparison.pairs import (
@@ -146,7 +147,12 @@ class _Comparison:
         self.notes += content_notes(first.figure, second.figure)
         if first.figure.up != second.figure.up:
             ups = {"first": first.figure.up, "second": second.figure.up}
-            self.notes.append(Diagnostic("D002.up", values=ups))
+            self.notes.append(
+                Diagnostic(
+                    "D002.up: up axes differ ({first} and {second}): compared without conversion",
+                    values=ups,
+                )
+            )
         self.factor = self._unit_factor()
 
     def _unit_factor(self) -> float:
@@ -155,14 +161,18 @@ class _Comparison:
         if units[0] == units[1] or not all(unit in METRES for unit in units):
             return 1.0
         named = {"first": UNIT_NAMES[units[0]], "second": UNIT_NAMES[units[1]]}
-        self.notes.append(Diagnostic("D002.unit", values=named))
+        self.notes.append(
+            Diagnostic(
+                "D002.unit: units differ ({first} and {second}): compared in {first}", values=named
+            )
+        )
         return METRES[units[1]] / METRES[units[0]]
 
     def _pair_skeletons(self) -> None:
         first, second = self.first.figure.skeleton, self.second.figure.skeleton
         self.joints: Pairs | None = None
         if first is None or second is None:
-            self._lone("D001.skeleton", first, second)
+            self._lone("D001.skeleton: only the {side} has a skeleton", first, second)
             return
         self.joints = pair_joints(first, second)
         self.mismatches += self.joints.mismatches
@@ -175,19 +185,25 @@ class _Comparison:
         first, second = self.first.figure.mesh, self.second.figure.mesh
         self.has_meshes, self.is_same = False, False
         if first is None or second is None:
-            self._lone("D001.mesh", first, second)
+            self._lone("D001.mesh: only the {side} has a mesh", first, second)
             return
         self.has_meshes, self.is_same = True, _is_same_topology(first, second)
         if self.is_same:
             self.vertices = self._tally("vertices", "length", first.n_vertices)
             return
         counts = {
-            "vertices": first.n_vertices,
-            "triangles": first.n_triangles,
-            "other_vertices": second.n_vertices,
-            "other_triangles": second.n_triangles,
+            "vertices": counted(first.n_vertices, "vertex"),
+            "triangles": counted(first.n_triangles, "triangle"),
+            "other_vertices": counted(second.n_vertices, "vertex"),
+            "other_triangles": counted(second.n_triangles, "triangle"),
         }
-        self.notes.append(Diagnostic("D002.meshes", values=counts))
+        self.notes.append(
+            Diagnostic(
+                "D002.meshes: meshes differ ({vertices}, {triangles}; {other_vertices}, "
+                "{other_triangles}): closest points are compared",
+                values=counts,
+            )
+        )
         self.vertices = self._tally("surface, from the first", "length", first.n_vertices)
         self.back = self._tally("surface, from the second", "length", second.n_vertices)
 
@@ -195,7 +211,7 @@ class _Comparison:
         first, second = self.first.figure.points, self.second.figure.points
         self.points: Pairs | None = None
         if first is None or second is None:
-            self._lone("D001.point-set", first, second)
+            self._lone("D001.point-set: only the {side} has captured points", first, second)
             return
         self.points = pair_names(first.names, second.names, "point")
         self.mismatches += self.points.mismatches
@@ -218,8 +234,10 @@ class _Comparison:
         n_searches = min(count, _MOST_SEARCHES)
         searched = set(np.linspace(0, count - 1, n_searches).round().astype(int).tolist())
         if self.has_meshes and not self.is_same and count > _MOST_SEARCHES:
-            values = {"n": n_searches, "all": count}
-            self.notes.append(Diagnostic("D002.searched", values=values))
+            values = {"n": counted(n_searches, "frame", of=count), "all": count}
+            self.notes.append(
+                Diagnostic("D002.searched: closest points computed in {n}", values=values)
+            )
         absent = 0
         for number in range(count):
             step = self.steps.pose(number, self.first, self.second)
@@ -237,7 +255,12 @@ class _Comparison:
             self._compare_points(step)
             self._compare_meshes(step, number in searched)
         if absent:
-            self.mismatches.append(Diagnostic("D001.absent", values={"n": absent}))
+            self.mismatches.append(
+                Diagnostic(
+                    "D001.absent: only one of the two is present in {n}",
+                    values={"n": counted(absent, "frame")},
+                )
+            )
         self._pose_at_worst()
         measures = [tally.result() for tally in self.tallies]
         return Difference(
@@ -416,8 +439,8 @@ def _lone(what: str, first: Sequence[str], second: Sequence[str]) -> list[Diagno
     for side, names, others in (("first", first, second), ("second", second, first)):
         lone = sorted(set(names) - set(others))
         if lone:
-            values = {"what": what, "side": side, "names": lone}
-            notes.append(Diagnostic("D002.only", values=values))
+            values = {"what": what, "side": side, "names": listed(lone)}
+            notes.append(Diagnostic("D002.only: {what} only in the {side}: {names}", values=values))
     return notes
 
 
@@ -430,8 +453,10 @@ def _materials(first: Figure, second: Figure) -> list[Diagnostic]:
     for name in one.keys() & other.keys():
         properties = _different(one[name], other[name])
         if properties:
-            values = {"name": name, "properties": properties}
-            notes.append(Diagnostic("D002.material", values=values))
+            values = {"name": quoted(name), "properties": listed(properties)}
+            notes.append(
+                Diagnostic("D002.material: material {name} differs: {properties}", values=values)
+            )
     return sorted(notes, key=lambda note: str(note.values.get("name", "")))
 
 

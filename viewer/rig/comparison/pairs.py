@@ -9,15 +9,25 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.skeleton import Skeleton, joint_labels
 from viewer.rig.skin import Skin, owners, row_norms, skin_rows
 
 _KEYS = {
-    "joint": ("D001.joints", "D002.joints-by-index"),
-    "DOF": ("D001.dofs", "D002.dofs-by-index"),
-    "point": ("D001.points", "D002.points-by-index"),
+    "joint": (
+        "D001.joints: {n} only in the {side}: {names}",
+        "D002.joints-by-index: no joint names in common: compared by index",
+    ),
+    "DOF": (
+        "D001.dofs: {n} only in the {side}: {names}",
+        "D002.dofs-by-index: no DOF names in common: compared by index",
+    ),
+    "point": (
+        "D001.points: {n} only in the {side}: {names}",
+        "D002.points-by-index: no point names in common: compared by index",
+    ),
 }
 """Messages about each kind of item: unmatched names, and no names in common."""
 
@@ -49,8 +59,12 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
         for above in (skeleton.parents[found],)
     ]
     other = np.flatnonzero(parents[0] != parents[1])
-    values = {"names": [pairs.names[place] for place in other]}
-    moved = [Diagnostic("D001.parents", values=values)] if len(other) else []
+    values = {"names": listed([pairs.names[place] for place in other])}
+    moved = (
+        [Diagnostic("D001.parents: different parents: {names}", values=values)]
+        if len(other)
+        else []
+    )
     return replace(
         pairs,
         mismatches=(*pairs.mismatches, *moved),
@@ -75,7 +89,13 @@ def _order_notes(pairs: Pairs, second: Skeleton) -> list[Diagnostic]:
         return []
     place = int(other[0])
     here, there = pairs.names[place], _unique_labels(second)[int(pairs.second[order[place]])]
-    return [Diagnostic("D002.order", values={"first": here, "second": there})]
+    return [
+        Diagnostic(
+            "D002.order: joints are in a different order, which matters for .skin and .anim "
+            "files: where the first has {first}, the second has {second}",
+            values={"first": here, "second": there},
+        )
+    ]
 
 
 def _places(found: Ints, count: int) -> Ints:
@@ -103,7 +123,7 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
         known = set(others)
         lone = [name for name in names if name not in known]
         if lone:
-            values = {"n": len(lone), "side": ordinal, "names": lone}
+            values = {"n": counted(len(lone), what), "side": ordinal, "names": listed(lone)}
             mismatches.append(Diagnostic(_KEYS[what][0], values=values))
     names = tuple(first[number] for number in both[:, 0])
     return Pairs(both[:, 0], both[:, 1], names, tuple(mismatches))

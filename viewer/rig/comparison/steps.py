@@ -9,6 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion.clip import Clip
@@ -95,7 +96,7 @@ def _still_steps(first: Actor, second: Actor, n_poses: int) -> Steps:
     none = np.zeros(0, dtype=np.int32)
     if (first.clip is None) != (second.clip is None):
         lacking = "second" if second.clip is None else "first"
-        still = Diagnostic("D001.no-motion", values={"side": lacking})
+        still = Diagnostic("D001.no-motion: the {side} has no motion", values={"side": lacking})
         return Steps(np.zeros(0), np.zeros((0, 0)), none, none, 0, (still,))
     if first.figure.skeleton is None or second.figure.skeleton is None or n_poses == 0:
         return Steps(np.zeros(0), np.zeros((0, 0)), none, none)
@@ -108,12 +109,20 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
     lasts = clips[0].end - clips[0].start, clips[1].end - clips[1].start
     mismatches = []
     if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:
-        values = {"first": lasts[0], "second": lasts[1]}
-        mismatches.append(Diagnostic("D001.durations", values=values))
+        values: dict[str, object] = {"first": rounded(lasts[0], 6), "second": rounded(lasts[1], 6)}
+        mismatches.append(
+            Diagnostic("D001.durations: durations differ: {first} s and {second} s", values=values)
+        )
     notes = []
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
         values = {"first": rates[0], "second": rates[1]}
-        notes.append(Diagnostic("D002.rates", values=values))
+        notes.append(
+            Diagnostic(
+                "D002.rates: frame rates differ ({first:g} and {second:g} fps): compared at the "
+                "first",
+                values=values,
+            )
+        )
     base = 0
     if not isinstance(clips[0], Clip | TransformClip):
         base = clips[0].timing.first_frame
@@ -139,12 +148,20 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
         dof = int(other[0])
         own, others = limits[0][dof].tolist(), limits[1][dof].tolist()
         values = {
-            "n": len(other),
+            "n": counted(len(other), "DOF", "has", "have"),
             "dof": pairs.names[dof],
-            **dict(zip(("low", "high"), own, strict=True)),
-            **dict(zip(("other_low", "other_high"), others, strict=True)),
+            "low": rounded(own[0], 6),
+            "high": rounded(own[1], 6),
+            "other_low": rounded(others[0], 6),
+            "other_high": rounded(others[1], 6),
         }
-        mismatches.append(Diagnostic("D001.limits", values=values))
+        mismatches.append(
+            Diagnostic(
+                "D001.limits: {n} different limits, such as {dof}: {low} to {high} and {other_low} "
+                "to {other_high}",
+                values=values,
+            )
+        )
     dofs = _random_dofs(first, pairs.first, limits, n_poses)
     none = np.zeros(0)
     return Steps(none, dofs, pairs.first, pairs.second, 0, tuple(mismatches), pairs.notes)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.phrases import agree, counted, listed, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, typical_place
@@ -44,8 +45,8 @@ and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and ``"joints"``, r
 class Fault:
     """A message about elements of a figure."""
 
-    key: str
-    """A key of ``MESSAGES``."""
+    message: str
+    """Key and sentence, as of ``Diagnostic``."""
     at: tuple[str, int]
     """Kind and index of the element to look at first, as for ``Source.remember``."""
     values: Mapping[str, Any]
@@ -97,9 +98,18 @@ def _sums(skin: Skin, moved: Bools) -> Iterator[Fault]:
         off = off[np.argsort(-errors[off], kind="stable")]
         worst = int(off[0])
         error = float(errors[worst])
-        values = {"n": len(off), "sum": float(sums[worst]), "vertex": worst, "error": error}
+        values = {
+            "n": counted(len(off), "vertex"),
+            "sum": rounded(float(sums[worst]), 6),
+            "vertex": worst,
+            "error": rounded(error),
+        }
         severity = "warning" if error > _WRONG else "note"
-        yield Fault("W001.sums", ("weights", worst), values, off, severity=severity)
+        message = (
+            "W001.sums: weights of {n} do not sum to 1 (worst: {sum} at vertex {vertex}, an error "
+            "of {error})"
+        )
+        yield Fault(message, ("weights", worst), values, off, severity=severity)
 
 
 def _negative(figure: Figure, skin: Skin) -> Iterator[Fault]:
@@ -108,13 +118,13 @@ def _negative(figure: Figure, skin: Skin) -> Iterator[Fault]:
         negative = negative[np.argsort(skin.weights[negative], kind="stable")]
         vertices, joints = owners(skin)[negative], skin.joints[negative]
         values = {
-            "n": len(negative),
-            "weight": float(skin.weights[negative[0]]),
+            "n": counted(len(negative), "negative weight"),
+            "weight": rounded(float(skin.weights[negative[0]]), 6),
             "vertex": int(vertices[0]),
             "joint": _labels(figure, joints[:1])[0],
         }
         yield Fault(
-            "W002.negative",
+            "W002.negative: {n} (first: {weight} at vertex {vertex} for joint {joint})",
             ("weights", int(vertices[0])),
             values,
             _distinct(vertices),
@@ -137,15 +147,32 @@ def _bare(mesh: Mesh, bare: Bools) -> Iterator[Fault]:
         vertices = np.unique(mesh.triangles[lost])
         first = int(vertices[0])
         n_islands = len(np.unique(islands[lost]))
-        values = {"n": n_islands, "n_vertices": len(vertices), "vertex": first}
-        yield Fault("W005.islands", ("weights", first), values, vertices, np.flatnonzero(lost))
+        values = {
+            "n": counted(n_islands, "island"),
+            "n_vertices": counted(len(vertices), "vertex"),
+            "have": agree(n_islands, "has", "have"),
+            "stay": agree(n_islands, "stays", "stay"),
+            "vertex": first,
+        }
+        message = (
+            "W005.islands: {n} with {n_vertices} {have} no weights and {stay} in the bind pose "
+            "(first: at vertex {vertex})"
+        )
+        yield Fault(message, ("weights", first), values, vertices, np.flatnonzero(lost))
         bare = bare.copy()
         bare[vertices] = False
     single = np.flatnonzero(bare)
     if len(single):
         first = int(single[0])
-        values = {"n": len(single), "vertex": first}
-        yield Fault("W004.vertices", ("weights", first), values, single)
+        values = {
+            "n": counted(len(single), "vertex", "has", "have"),
+            "stay": agree(len(single), "stays", "stay"),
+            "vertex": first,
+        }
+        message = (
+            "W004.vertices: {n} no influence and {stay} in the bind pose (first: vertex {vertex})"
+        )
+        yield Fault(message, ("weights", first), values, single)
 
 
 def are_singular(matrices: Floats) -> Bools:
@@ -166,18 +193,31 @@ def bind_faults(figure: Figure, invalid: Invalid) -> Iterator[Fault]:
     conditions = np.zeros(len(linear))
     conditions[~flat] = np.linalg.cond(linear[~flat])
     off = affine_errors(skin) * known
-    for key, wrong, numbers in (
-        ("B002.singular", flat, determinants),
-        ("B003.ill-conditioned", conditions > _NEARLY, conditions),
-        ("B005.reflected", (determinants < 0.0) & ~flat, determinants),
-        ("B006.not-affine", off > _AFFINE, off),
+    for message, wrong, numbers in (
+        ("B002.singular: {n} singular: {names} (determinant {value})", flat, determinants),
+        (
+            "B003.ill-conditioned: {n} ill-conditioned: {names} (condition number {value})",
+            conditions > _NEARLY,
+            conditions,
+        ),
+        (
+            "B005.reflected: {n} reflected: {names} (determinant {value})",
+            (determinants < 0.0) & ~flat,
+            determinants,
+        ),
+        ("B006.not-affine: {n} not affine: {names} (error {value})", off > _AFFINE, off),
     ):
         joints = np.flatnonzero(wrong)
         if len(joints):
             first, names = int(joints[0]), _labels(figure, joints)
-            values = {"n": len(joints), "all": len(linear), "names": names}
-            values["value"] = float(numbers[first])
-            yield Fault(key, ("bindings", first), values, joints=joints)
+            values = {
+                "n": counted(len(joints), "bind matrix", "is", "are", of=len(linear)),
+                "all": len(linear),
+                "names": listed(names),
+                # Adding 0 makes -0 positive.
+                "value": rounded(float(numbers[first]) + 0.0),
+            }
+            yield Fault(message, ("bindings", first), values, joints=joints)
 
 
 def affine_errors(skin: Skin) -> Floats:
@@ -206,8 +246,16 @@ def stray_vertices(figure: Figure) -> Iterator[Fault]:
     far = np.flatnonzero(distances > _FAR * typical)
     far = far[np.argsort(-distances[far], kind="stable")]
     first = int(far[0])
-    values = {"n": len(far), "vertex": first, "ratio": float(distances[first] / typical)}
-    yield Fault("M010.vertices", ("positions", first), values, far)
+    values = {
+        "n": counted(len(far), "stray vertex"),
+        "vertex": first,
+        "ratio": rounded(float(distances[first] / typical), 2),
+    }
+    message = (
+        "M010.vertices: {n} (worst: vertex {vertex}, {ratio} times the typical distance from the "
+        "centre)"
+    )
+    yield Fault(message, ("positions", first), values, far)
 
 
 def _labels(figure: Figure, joints: Indices) -> list[str]:

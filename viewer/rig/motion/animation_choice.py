@@ -10,6 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.near_names import name_hint
+from viewer.phrases import quoted
 from viewer.rig.figure import Figure
 from viewer.rig.motion.transform_clip import Animation, TransformClip
 from viewer.rig.motion.upright import own_up
@@ -68,7 +69,10 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
         return every[int(wanted) - 1]
     names = tuple(dict.fromkeys(label for label, _ in named))
     raise RigError(
-        Diagnostic("F004.animation", values={"name": wanted, "hint": name_hint(wanted, names)})
+        Diagnostic(
+            "F004.animation: no animation is called {name}; {hint}",
+            values={"name": quoted(wanted), "hint": name_hint(wanted, names)},
+        )
     )
 
 

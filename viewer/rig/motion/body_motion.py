@@ -13,6 +13,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Floats, freeze, frozen
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.coefficients import apply_coefficients, space_misfit, unused_coefficients
@@ -121,7 +122,12 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     if skeleton is None or motion.joint_names[0] not in skeleton.names:
         joint = motion.joint_names[0]
         names = {"motion": motion.name, "joint": joint, "figure": figure.name}
-        raise RigError(Diagnostic("F004.body-joint", values=names))
+        raise RigError(
+            Diagnostic(
+                "F004.body-joint: {motion} moves the joint {joint}, which {figure} does not have",
+                values=names,
+            )
+        )
     vectors: dict[int, Floats] = {}  # of each joint that moves
     lost = []
     for column, name in enumerate(motion.joint_names):
@@ -131,8 +137,12 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
             lost.append(name)
     notes = said + _put_hands(motion, figure, vectors)
     if lost:
-        values = {"n": len(lost), "figure": figure.name, "names": lost}
-        notes.append(Diagnostic("F007.joints-left-out", values=values))
+        values = {"n": counted(len(lost), "joint"), "figure": figure.name, "names": listed(lost)}
+        notes.append(
+            Diagnostic(
+                "F007.joints-left-out: {n} missing from {figure} omitted: {names}", values=values
+            )
+        )
     weights, more = _weights(motion, figure)
     # One joint at a time, because long motions fill much of the memory.
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (motion.n_rows, skeleton.n_joints, 1))
@@ -244,12 +254,23 @@ def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -
         if hand is None:
             if coefficients.any():
                 values = {"side": side or "only", "figure": figure.name}
-                notes.append(Diagnostic("F007.hand-left-out", values=values))
+                notes.append(
+                    Diagnostic(
+                        "F007.hand-left-out: {side} hand omitted: {figure} has no hand components",
+                        values=values,
+                    )
+                )
             continue
         used = min(coefficients.shape[1], len(hand.components))
         if coefficients[:, used:].any():
             values = {"most": used, "figure": figure.name}
-            notes.append(Diagnostic("F007.hand-components-left-out", values=values))
+            notes.append(
+                Diagnostic(
+                    "F007.hand-components-left-out: hand components beyond the {most} of {figure} "
+                    "omitted",
+                    values=values,
+                )
+            )
         fingers = coefficients[:, :used] @ hand.components[:used]
         if not motion.flat_hands:
             fingers = fingers + hand.mean

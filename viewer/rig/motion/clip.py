@@ -19,6 +19,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
+from viewer.phrases import all_of, counted
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.memo import Memo
 from viewer.rig.motion.samples import Samples
@@ -308,9 +309,15 @@ def suits(clip: Clip, skeleton: Skeleton) -> bool:
 def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
     """Return the reason why a clip cannot move a skeleton, phrased to follow its name, or None."""
     if not is_course_rig(skeleton):
-        return Phrase("not-course-rig", reason=_first_misfit(skeleton))
+        return Phrase(
+            "is not a .skel-style rig, in which clips translate the root along x, y, z and "
+            "rotate each joint about x, y, z: {reason}",
+            reason=_first_misfit(skeleton),
+        )
     if len(clip.channels) != skeleton.n_dofs:
-        return Phrase("clip-needs", n=skeleton.n_dofs, joints=skeleton.n_joints)
+        return Phrase(
+            "needs {n} (3 + 3 x {joints} joints)", n=skeleton.n_dofs, joints=skeleton.n_joints
+        )
     return None
 
 
@@ -322,9 +329,14 @@ def check_fit(clip: Clip, skeleton: Skeleton) -> None:
     found = misfit(clip, skeleton)
     if found is None:
         return
-    values = {"clip": clip.name, "n": len(clip.channels), "misfit": found}
+    values = {"clip": clip.name, "n": counted(len(clip.channels), "channel"), "misfit": found}
     raise RigError(
-        Diagnostic("C009.channels" if is_course_rig(skeleton) else "C009.rig", values=values)
+        Diagnostic(
+            "C009.channels: clip {clip} has {n}, the skeleton {misfit}"
+            if is_course_rig(skeleton)
+            else "C009.rig: clip {clip}: the skeleton {misfit}",
+            values=values,
+        )
     )
 
 
@@ -348,6 +360,6 @@ def _first_misfit(skeleton: Skeleton) -> Phrase:
         if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
             label = joint_label(skeleton, joint)
             if not kinds:
-                return Phrase("joint-without-dofs", joint=label)
-            return Phrase("joint-with-dofs", joint=label, kinds=kinds)
-    return Phrase("dofs-unordered")
+                return Phrase("joint {joint} has no DOFs", joint=label)
+            return Phrase("joint {joint} has DOFs {kinds}", joint=label, kinds=all_of(kinds))
+    return Phrase("its DOFs are not in the order of its joints")

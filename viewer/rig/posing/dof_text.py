@@ -40,7 +40,26 @@ def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str =
     )
     label = dof_label(skeleton, dof)
     if math.isfinite(low) and math.isfinite(high):
-        return Phrase("beyond-limits", dof=label, value=shown, when=when, low=least, high=most)
+        return Phrase(
+            "{dof} is {value}{when}; its limits are {low} and {high}",
+            dof=label,
+            value=shown,
+            when=when,
+            low=least,
+            high=most,
+        )
     if value < low:
-        return Phrase("below-minimum", dof=label, value=shown, when=when, low=least)
-    return Phrase("above-maximum", dof=label, value=shown, when=when, high=most)
+        return Phrase(
+            "{dof} is {value}{when}; its minimum is {low}",
+            dof=label,
+            value=shown,
+            when=when,
+            low=least,
+        )
+    return Phrase(
+        "{dof} is {value}{when}; its maximum is {high}",
+        dof=label,
+        value=shown,
+        when=when,
+        high=most,
+    )

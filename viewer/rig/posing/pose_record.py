@@ -9,8 +9,9 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import RigError
+from viewer.phrases import agree, counted, listed
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.bodies.smpl_family import ShapeSpace, members_by_numbers
 from viewer.rig.coefficients import apply_coefficients
@@ -167,7 +168,7 @@ def apply_record(
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(Diagnostic("F004.pose", values={"figure": figure.name}))
+        raise RigError(Diagnostic(wording.POSE, values={"figure": figure.name}))
     if record.joint_rotations is not None and not has_layout_of(record.joint_rotations, figure):
         work, notes = rotate_joints(record.joint_rotations, figure, pose)
         _take_over(work, pose)
@@ -212,14 +213,18 @@ def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
     place = record.translation is not None and np.any(record.translation)
     shapes = (values is not None and np.any(values) for values in (record.shape, record.expression))
     left = {
-        "left-moves": bool(moved) or shifts,
-        "left-place": place,
-        "left-size": record.scale not in (None, 1.0),
-        "left-scales": rotations is not None and rotations.scales is not None,
-        "left-shape": any(shapes),
+        "joint translations": bool(moved) or shifts,
+        "figure translation": place,
+        "figure scale": record.scale not in (None, 1.0),
+        "joint scales": rotations is not None and rotations.scales is not None,
+        "figure shape": any(shapes),
     }
     names = [Phrase(key) for key, says in left.items() if says]
-    return [Diagnostic("F007.left-as-they-were", values={"names": names})] if names else []
+    return (
+        [Diagnostic("F007.left-as-they-were: unchanged: {names}", values={"names": listed(names)})]
+        if names
+        else []
+    )
 
 
 def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
@@ -227,16 +232,25 @@ def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
     notes = []
     scale = pose.figure_scale
     if not _SMALLEST <= scale <= _LARGEST:
-        fault = Phrase("scale-out-of-range", low=_SMALLEST, high=_LARGEST, found=scale)
+        fault = Phrase(
+            "scale: expected {low:g} to {high:g}, found {found:g}",
+            low=_SMALLEST,
+            high=_LARGEST,
+            found=scale,
+        )
         if scale <= 0.0:
-            fault = Phrase("scale-not-positive", found=scale)
+            fault = Phrase("scale: expected a positive number, found {found:g}", found=scale)
         kept = {"fault": fault, "scale": before.figure_scale}
-        notes.append(Diagnostic("F007.scale-kept", values=kept))
+        notes.append(Diagnostic("F007.scale-kept: {fault}; kept at {scale:g}", values=kept))
         pose.figure_scale = before.figure_scale
     far = float(np.abs(pose.figure_translation).max())
     if far > _FARTHEST:
-        fault = Phrase("translation-too-far", most=_FARTHEST, found=far)
-        notes.append(Diagnostic("F007.translation-kept", values={"fault": fault}))
+        fault = Phrase(
+            "translation: expected at most {most:g}, found {found:g}", most=_FARTHEST, found=far
+        )
+        notes.append(
+            Diagnostic("F007.translation-kept: {fault}; unchanged", values={"fault": fault})
+        )
         pose.figure_translation = before.figure_translation.copy()
     return notes
 
@@ -262,12 +276,26 @@ def _dof(figure: Figure, label: str) -> int:
         # The label is removed here, as the caller adds it.
         why = str(problem).removeprefix(f'"{label}": ')
         values = {"figure": figure.name, "found": label, "reason": why}
-        raise RigError(Diagnostic("F002.pose-unknown-dof", values=values)) from None
+        raise RigError(
+            Diagnostic(
+                'F002.pose-unknown-dof: expected a DOF of {figure}, found "{found}": {reason}',
+                values=values,
+            )
+        ) from None
 
 
 def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
     count = int((clamp_dofs(skeleton, dofs) != dofs).sum())
-    return [Diagnostic("F007.pose-clamped", values={"n": count})] if count else []
+    return (
+        [
+            Diagnostic(
+                "F007.pose-clamped: {n} of the pose clamped to {their} limits",
+                values={"n": counted(count, "DOF"), "their": agree(count, "its", "their")},
+            )
+        ]
+        if count
+        else []
+    )
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
@@ -285,7 +313,12 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     names = members_by_numbers().get(len(vector)) if is_family else None
     if names is None:
         values = {"expected": own, "figure": figure.name, "found": len(vector)}
-        raise RigError(Diagnostic("F002.pose-vector", values=values))
+        raise RigError(
+            Diagnostic(
+                "F002.pose-vector: expected {expected} pose values for {figure}, found {found}",
+                values=values,
+            )
+        )
     # Joints that the model of the vector lacks are reset to rest.
     joints = np.arange(skeleton.n_joints, dtype=np.int32)
     wanted = np.zeros((skeleton.n_joints, 3))
@@ -297,8 +330,17 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
         else:
             lost += bool(row.any())
     _turn(figure, pose, joints, wanted.ravel())
-    values = {"n": lost, "figure": figure.name}
-    return [Diagnostic("F007.pose-joints-left-out", values=values)] if lost else []
+    values = {"n": counted(lost, "joint"), "figure": figure.name}
+    return (
+        [
+            Diagnostic(
+                "F007.pose-joints-left-out: {n} of the pose omitted: missing from {figure}",
+                values=values,
+            )
+        ]
+        if lost
+        else []
+    )
 
 
 def _apply_part(
@@ -314,7 +356,12 @@ def _apply_part(
     known = [joint for joint in PARTS[name] if joint in skeleton.names]
     if not known:
         if values.any():
-            return [Diagnostic("F007.part-left-out", values={"part": name, "figure": figure.name})]
+            return [
+                Diagnostic(
+                    "F007.part-left-out: {part} omitted: {figure} has no such joint",
+                    values={"part": name, "figure": figure.name},
+                )
+            ]
         return []
     if len(values) != 3:
         raise _odd_length(name, 3, len(values))
@@ -329,8 +376,14 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
     own = _BODY if has_more else skeleton.n_joints - 1
     most = _LONGEST_BODY if has_more else own
     if len(values) % 3 or len(values) > 3 * most:
-        numbers = {"most": most, "found": len(values)}
-        raise RigError(Diagnostic("F002.pose-body", values=numbers))
+        numbers = {"most": most, "found": counted(len(values), "number")}
+        raise RigError(
+            Diagnostic(
+                "F002.pose-body: body_pose: expected 3 numbers per joint for at most {most} "
+                "joints, found {found}",
+                values=numbers,
+            )
+        )
     taken = values[: 3 * own]
     _turn(figure, pose, np.arange(1, len(taken) // 3 + 1, dtype=np.int32), taken)
     return [_left_out(values[3 * own :], own)] if values[3 * own :].any() else []
@@ -338,12 +391,19 @@ def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
 
 def _odd_length(name: str, expected: int, found: int) -> RigError:
     values = {"item": name, "expected": expected, "found": found}
-    return RigError(Diagnostic("F002.pose-part", values=values))
+    return RigError(
+        Diagnostic(
+            "F002.pose-part: {item}: expected {expected} numbers, found {found}", values=values
+        )
+    )
 
 
 def _left_out(rest: Floats, own: int) -> Diagnostic:
     count = int(rest.reshape(-1, 3).any(axis=1).sum())
-    return Diagnostic("F007.body-joints-left-out", values={"n": count, "own": own})
+    return Diagnostic(
+        "F007.body-joints-left-out: {n} in the pose beyond the body's {own} omitted",
+        values={"n": counted(count, "joint"), "own": own},
+    )
 
 
 def _hand(figure: Figure, name: str) -> Hand | None:
@@ -371,7 +431,10 @@ def _apply_hand(
     if hand is None:
         if values.any():
             return [
-                Diagnostic("F007.hand-part-left-out", values={"part": name, "figure": figure.name})
+                Diagnostic(
+                    "F007.hand-part-left-out: {part} omitted: {figure} has no hand components",
+                    values={"part": name, "figure": figure.name},
+                )
             ]
         return []
     as_coefficients = record.hand_coefficients

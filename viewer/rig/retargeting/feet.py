@@ -12,6 +12,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.remedy import Remedy
+from viewer.phrases import counted
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.frames import in_frame_order
@@ -154,7 +156,13 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         return []
     called = {"motion": found.source.figure.name, "figure": figure.name}
     if not changes.is_better:
-        key = "F007.feet-kept" if changes.n_contacts else "F007.feet-no-contacts"
+        key = (
+            "F007.feet-kept: feet of {figure} not planted: they already slide as little as "
+            "those of {motion}"
+            if changes.n_contacts
+            else "F007.feet-no-contacts: feet of {figure} not planted: no ground contacts found in "
+            "{motion}"
+        )
         return [Diagnostic(key, values=called)]
 
     def text(length: float) -> str:
@@ -162,19 +170,44 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
 
     values = {
         **called,
-        "n": changes.n_contacts,
+        "n": counted(changes.n_contacts, "contact"),
         "source": text(changes.source),
         "before": text(changes.before),
         "after": text(changes.after),
+        "remedy": Remedy("Feet on the ground in the Actors panel", "--feet off"),
     }
-    notes = [Diagnostic("F007.feet-planted", values=values)]
+    notes = [
+        Diagnostic(
+            "F007.feet-planted: feet of {figure} planted during {n}: they slide by {after} "
+            "instead of {before} ({source} in {motion}); {remedy} disables this",
+            values=values,
+        )
+    ]
     own = {"figure": figure.name}
     gaps = own | {"gap_before": text(changes.gap_before), "gap": text(changes.gap_after)}
-    notes.append(Diagnostic("F007.feet-gap", values=gaps))
+    notes.append(
+        Diagnostic(
+            "F007.feet-gap: soles of {figure} are at most {gap} from the ground during "
+            "contacts, instead of {gap_before}",
+            values=gaps,
+        )
+    )
     if changes.lowered > _ROUNDING * changes.size:
         length = text(changes.lowered)
-        notes.append(Diagnostic("F007.feet-lowered", values=own | {"length": length}))
+        notes.append(
+            Diagnostic(
+                "F007.feet-lowered: {figure} is lowered by up to {length}, so that its feet reach "
+                "the ground",
+                values=own | {"length": length},
+            )
+        )
     if changes.ground_speed:
         speed = f"{text(changes.ground_speed)}/s"
-        notes.append(Diagnostic("F007.feet-ground", values=own | {"speed": speed}))
+        notes.append(
+            Diagnostic(
+                "F007.feet-ground: ground moves at {speed}, as on a treadmill: planted feet of "
+                "{figure} move with it",
+                values=own | {"speed": speed},
+            )
+        )
     return notes

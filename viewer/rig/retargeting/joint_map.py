@@ -11,6 +11,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.near_names import name_hint
+from viewer.phrases import quoted
 from viewer.rig.arrays import Ints
 from viewer.rig.skeleton import Skeleton, joint_labels, shown_joints
 
@@ -70,8 +71,16 @@ def mapped_partners(
         at = joint_map.path, line
         joint = _find(joints[1], target, mine, titles[1], at)
         if partners[joint] != UNMAPPED:
-            values = {"joint": mine, "figure": titles[1]}
-            raise RigError(Diagnostic("F004.mapping-again", *at, values=values))
+            values = {"joint": quoted(mine), "figure": titles[1]}
+            raise RigError(
+                Diagnostic(
+                    "F004.mapping-again: expected each joint of {figure} at most once, found "
+                    "{joint} "
+                    "again",
+                    *at,
+                    values=values,
+                )
+            )
         partners[joint] = _find(joints[0], source, theirs, titles[0], at) if theirs else -1
     return partners
 
@@ -93,10 +102,15 @@ def _find(
         return joints[name]
     same = [label for label, joint in joints.items() if skeleton.names[joint] == name]
     values = {
-        "joint": name,
+        "joint": quoted(name),
         "figure": title,
         "n": len(same),
         "near": name_hint(name, same or joints),
     }
-    key = "F004.mapping-joints" if same else "F004.mapping-joint"
+    key = (
+        "F004.mapping-joints: expected one joint of {figure}, found {joint}, a name shared "
+        "by {n}; {near}"
+        if same
+        else "F004.mapping-joint: expected a joint of {figure}, found {joint}; {near}"
+    )
     raise RigError(Diagnostic(key, *at, values=values))

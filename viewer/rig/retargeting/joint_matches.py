@@ -11,7 +11,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
+from viewer.phrases import counted, listed
 from viewer.rig.arrays import Ints
 from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, map_from_pairs, mapped_partners
 from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place
@@ -170,11 +172,21 @@ def _misfit(
     values = {
         "motion": titles[0],
         "figure": titles[1],
-        "n": int((partners >= 0).sum()),
-        "unused": unused,
-        "idle": idle,
+        "n": counted(int((partners >= 0).sum()), "matching joint"),
+        "unused": listed(unused),
+        "idle": listed(idle),
+        "remedy": Remedy(
+            "in the Joint match panel", "in the Joint match panel or with --joint-map"
+        ),
     }
-    return RigError(Diagnostic("F004.joints-unmatched", values=values))
+    return RigError(
+        Diagnostic(
+            "F004.joints-unmatched: {motion} does not match {figure}: expected hips and a leg "
+            "or an arm in both, found {n}; not recognised in {motion}: {unused}; in {figure}: "
+            "{idle}; match them {remedy}",
+            values=values,
+        )
+    )
 
 
 def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str], list[str]]:
@@ -190,7 +202,7 @@ def _notes(
     """Return messages about matched and unmatched joints."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
-        Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])
+        Phrase("{joint} by {partner}", joint=moved[joint], partner=movers[partner])
         for joint, partner in enumerate(partners)
         if partner >= 0 and target.names[joint] != source.names[partner]
     ]
@@ -199,14 +211,28 @@ def _notes(
         "figure": titles[1],
         "n": int((partners >= 0).sum()),
         "all": target.n_joints,
-        "pairs": pairs,
+        "pairs": listed(pairs),
     }
-    key = "F007.joints-matched-as-follows" if pairs else "F007.joints-matched"
+    key = (
+        "F007.joints-matched-as-follows: {motion} drives {n} of {all} joints of {figure}: {pairs}"
+        if pairs
+        else "F007.joints-matched: {motion} drives {n} of {all} joints of {figure}"
+    )
     notes = [Diagnostic(key, values=values)]
     unused, idle = _left(source, target, partners)
     if idle:
-        notes.append(Diagnostic("F007.joints-at-rest", values={"names": idle}))
+        notes.append(
+            Diagnostic(
+                "F007.joints-at-rest: joints kept at rest: {names}",
+                values={"names": listed(idle, 12)},
+            )
+        )
     if unused:
-        values = {"motion": titles[0], "names": unused}
-        notes.append(Diagnostic("F007.joints-without-partner", values=values))
+        values = {"motion": titles[0], "names": listed(unused, 12)}
+        notes.append(
+            Diagnostic(
+                "F007.joints-without-partner: joints of {motion} that drive nothing: {names}",
+                values=values,
+            )
+        )
     return notes

@@ -61,7 +61,12 @@ def joint_partners(figure: Figure) -> Ints:
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(Diagnostic("F004.mirror", values={"figure": figure.name}))
+        raise RigError(
+            Diagnostic(
+                "F004.mirror: figure {figure} has no skeleton to mirror",
+                values={"figure": figure.name},
+            )
+        )
     joints = rest_joints(figure)
     mirrored = joints.copy()
     axis = mirror_axis(figure)
@@ -75,8 +80,13 @@ def joint_partners(figure: Figure) -> Ints:
     size = box_size(bounding_box(joints))
     far = np.flatnonzero(distances[np.arange(len(joints)), partners] > _NEAR * size)
     if len(far) or (partners[partners] != np.arange(len(joints))).any():
-        name = skeleton.names[int(far[0])] if len(far) else Phrase("two-joints")
-        raise RigError(Diagnostic("F004.asymmetric", values={"joint": name}))
+        name = skeleton.names[int(far[0])] if len(far) else Phrase("two joints")
+        raise RigError(
+            Diagnostic(
+                "F004.asymmetric: {joint} has no mirror counterpart: the skeleton is not symmetric",
+                values={"joint": name},
+            )
+        )
     return partners
 
 

@@ -22,9 +22,9 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import RigError
-from viewer.phrases import printable
+from viewer.phrases import listed, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import (
@@ -166,12 +166,17 @@ def rotate_joints(
     """
     other = target.skeleton
     if other is None:
-        raise RigError(Diagnostic("F004.pose", values={"figure": target.name}))
+        raise RigError(Diagnostic(wording.POSE, values={"figure": target.name}))
     partners = _partners(source, other)
     found = np.flatnonzero(partners >= 0)
     if not len(found):
-        values = {"pose": source.figure or Phrase("the-pose"), "figure": target.name}
-        raise RigError(Diagnostic("F004.no-common-joint", values=values))
+        values = {"pose": source.figure or Phrase("the pose"), "figure": target.name}
+        raise RigError(
+            Diagnostic(
+                "F004.no-common-joint: {pose} and {figure} have no joint names in common",
+                values=values,
+            )
+        )
     to_target = _up_rotation(source.up, target.up)
     if source.meanings or other.humanoid is not None:
         up = np.eye(3)["xyz".index(target.up)]
@@ -255,14 +260,28 @@ def _notes(
     used = set(partners[partners >= 0].tolist())
     whose = printable(source.figure) or "the pose"
     values: dict[str, object] = {"n": len(used), "all": len(source.names), "figure": whose}
-    notes = [Diagnostic("F007.joints-taken-over", values=values)]
+    notes = [
+        Diagnostic(
+            "F007.joints-taken-over: transferred {n} of {all} joints of {figure}", values=values
+        )
+    ]
     lacking = [name or f"#{joint}" for joint, name in enumerate(source.names) if joint not in used]
     if lacking:
-        values = {"figure": target.name, "names": [printable(name, 40) for name in lacking]}
-        notes.append(Diagnostic("F007.joints-lacking", values=values))
+        values = {
+            "figure": target.name,
+            "names": listed([printable(name, 40) for name in lacking], 12),
+        }
+        notes.append(
+            Diagnostic("F007.joints-lacking: {figure} has no joint named {names}", values=values)
+        )
     if missed:
-        values = {"names": [printable(skeleton.names[joint], 40) for joint in missed]}
-        notes.append(Diagnostic("F007.joints-limited", values=values))
+        values = {"names": listed([printable(skeleton.names[joint], 40) for joint in missed], 12)}
+        notes.append(
+            Diagnostic(
+                "F007.joints-limited: rotated as far as DOFs and limits allow: {names}",
+                values=values,
+            )
+        )
     return notes
 
 

@@ -20,7 +20,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
+from viewer.phrases import agree, counted, listed, one_of, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure
@@ -92,7 +94,11 @@ def retargeted(
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
-        raise RigError(Diagnostic("F004.no-skeleton", values={"figure": named}))
+        raise RigError(
+            Diagnostic(
+                "F004.no-skeleton: {figure} has no skeleton to animate", values={"figure": named}
+            )
+        )
     motion = _in_path_unit(motion)
     source = motion.figure.require_skeleton()
     matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
@@ -121,7 +127,10 @@ def retargeted(
         figure_translations=place,
         shape_weights=weights,
     )
-    scaled = Diagnostic("F007.path-scaled", values={"scale": scale, "by": by})
+    scaled = Diagnostic(
+        "F007.path-scaled: path of the root scaled by {scale}, {by}",
+        values={"scale": rounded(scale), "by": by},
+    )
     idle = [] if mapping else _limbs_at_rest(motion, figure, matches, rotations)
     notes = [*matches.notes, *idle, *rested, scaled, *notes, *missing]
     return Retargeted(clip, notes, motion, matches, job.to_target, scale)
@@ -264,16 +273,16 @@ def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[f
     matched = np.flatnonzero(partners >= 0)
     bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
     choices = [
-        ("ratio-of-legs", _pairs(_LIMBS[0], place)),
-        ("ratio-of-arms", _pairs(_LIMBS[1], place)),
-        ("ratio-of-bones", bones),
+        ("the ratio of leg lengths", _pairs(_LIMBS[0], place)),
+        ("the ratio of arm lengths", _pairs(_LIMBS[1], place)),
+        ("the ratio of bone lengths", bones),
     ]
     for what, pairs in choices:
         mine, theirs = length(pairs)
         if mine > 0.0 and theirs > 0.0:
             ratio = mine / theirs
             return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), Phrase(what)
-    return 1.0, Phrase("ratio-of-nothing")
+    return 1.0, Phrase("because no lengths can be compared")
 
 
 def _pairs(limb: tuple[str, ...], place: dict[str, int]) -> list[tuple[int, int]]:
@@ -386,11 +395,18 @@ def _dropped_translations(job: _Job) -> list[Diagnostic]:
         return []
     worst = int(found[largest[found].argmax()])
     values = {
-        "n": len(found),
-        "most": float(largest[worst]),
+        "n": counted(len(found), "joint"),
+        "most": rounded(float(largest[worst])),
         "joint": joint_label(job.source, worst),
+        "their": agree(len(found), "its parent", "their parents"),
     }
-    return [Diagnostic("F007.joint-positions-left-out", values=values)]
+    return [
+        Diagnostic(
+            "F007.joint-positions-left-out: translations of {n} relative to {their} omitted "
+            "(largest: {most} at {joint})",
+            values=values,
+        )
+    ]
 
 
 def _ground_offset(job: _Job, scale: float) -> Floats:
@@ -450,7 +466,16 @@ def expression_weights(
             columns[_plain(preset)] = int(row)
     found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
     missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
-    notes = [Diagnostic("F007.expressions-unmatched", values={"names": missing})] if missing else []
+    notes = (
+        [
+            Diagnostic(
+                "F007.expressions-unmatched: the figure lacks expressions: {names}",
+                values={"names": listed(missing, 12)},
+            )
+        ]
+        if missing
+        else []
+    )
     if not found:
         return None, notes
     count = len(next(iter(expressions.values())))
@@ -492,12 +517,42 @@ def _limbs_at_rest(
         used = set(matches.partners.tolist())
         # Joints without a meaning are the likely ones.
         unused = [name for j, name in enumerate(theirs) if j not in used and not meanings[j]]
-        values = {**called, "n": len(unmatched), "names": unmatched, "unused": unused}
-        found.append(Diagnostic("C018.limbs-unmatched", values=values))
+        values = {
+            **called,
+            "n": len(unmatched),
+            "names": listed(unmatched),
+            "unused": listed(unused),
+            "stay": agree(len(unmatched), "stays", "stay"),
+            "these": agree(len(unmatched), "this joint", "these joints"),
+            "them": agree(len(unmatched), "it", "them"),
+            "remedy": Remedy("", " or with --joint-map"),
+        }
+        found.append(
+            Diagnostic(
+                "C018.limbs-unmatched: {names} of {figure} {stay} at rest: nothing in {motion} is "
+                "recognised as {these} (unused: {unused}); match {them} in the Joint match "
+                "panel{remedy}",
+                values=values,
+            )
+        )
     if unknown:
         idle = [mine[j] for j in np.flatnonzero(matches.partners < 0) if not matches.names[j]]
-        values = {**called, "n": len(unknown), "parts": unknown, "idle": idle}
-        found.append(Diagnostic("C018.limbs-unknown", values=values))
+        values = {
+            **called,
+            "n": len(unknown),
+            "parts": one_of(unknown),
+            "idle": listed(idle),
+            "them": agree(len(unknown), "it", "them"),
+            "remedy": Remedy("", " or with --joint-map"),
+        }
+        found.append(
+            Diagnostic(
+                "C018.limbs-unknown: no joint of {figure} is recognised as {parts}: {motion} "
+                "cannot move {them} (at rest: {idle}); match {them} in the Joint match "
+                "panel{remedy}",
+                values=values,
+            )
+        )
     is_still, is_moving = _extent(rotations)
     for upper, lower, _ in _LIMBS:
         joints = [places.get(f"{side}_{part}", -1) for part in (upper, lower) for side in _SIDES]
@@ -506,10 +561,19 @@ def _limbs_at_rest(
         if is_moving[joints[:2]].all() and is_still[joints[2:]].all():
             values = {
                 **called,
-                "names": [mine[joint] for joint in joints[2:]],
-                "partners": [theirs[matches.partners[joint]] for joint in joints[2:]],
+                "names": listed([mine[joint] for joint in joints[2:]]),
+                "partners": listed([theirs[matches.partners[joint]] for joint in joints[2:]]),
+                "remedy": Remedy("", " or with --joint-map"),
             }
-            found.append(Diagnostic("C018.limbs-still", values=values))
+            found.append(
+                Diagnostic(
+                    "C018.limbs-still: {names} of {figure} never bend, because {partners} of "
+                    "{motion} "
+                    "never do; if this is wrong, match other joints in the Joint match "
+                    "panel{remedy}",
+                    values=values,
+                )
+            )
     return found
 
 

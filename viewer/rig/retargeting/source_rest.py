@@ -13,7 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
+from viewer.phrases import listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -39,6 +41,10 @@ _A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the h
 _T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal
 _UPRIGHT = np.cos(np.radians(40.0))  # maximum angle between the legs and an axis
 _ROLLED = np.cos(np.radians(60.0))  # maximum roll of the limbs in a T- or A-pose
+_AXES = (
+    "F007.rest-axes: rest pose of {motion}: a T-pose, in which its joint axes are parallel to the "
+    "body's, because its zero pose is not a standing pose{remedy}"
+)
 
 
 def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
@@ -48,7 +54,11 @@ def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
         return None
     last = timing.first_frame + timing.n_frames - 1
     values = {"first": timing.first_frame, "last": last, "found": choice}
-    return Diagnostic("F004.rest-frame", values=values)
+    return Diagnostic(
+        "F004.rest-frame: --source-rest: expected a frame from {first} to {last} with a "
+        "pose, found {found}",
+        values=values,
+    )
 
 
 def with_source_rest(
@@ -70,7 +80,10 @@ def with_source_rest(
         return motion, []
     if not isinstance(choice, str):
         local = motion.clip.rotations[_row(motion, choice)]
-        note = Diagnostic("F007.rest-asked", values={**called, "frame": choice})
+        note = Diagnostic(
+            "F007.rest-asked: rest pose of {motion}: frame {frame}, as requested",
+            values={**called, "frame": choice},
+        )
         return _replaced(motion, skeleton, local), [note]
     still = rest_posture(skeleton, motion.figure.up)
     if still is None or _is_body(still):
@@ -81,7 +94,12 @@ def with_source_rest(
         return motion, []
     if upright is None:
         found = anatomical_rest(postures.righted(), skeleton, has_stances=False)
-        key = "F007.rest-axes" if found.is_parallel else "F007.rest-lying"
+        key = (
+            _AXES
+            if found.is_parallel
+            else "F007.rest-lying: rest pose of {motion}: estimated from trunk, knees and elbows, "
+            "with an assumed slope of the feet, because the person never stands{remedy}"
+        )
         return _placed(motion, skeleton, found.rotations), [Diagnostic(key, values=called)]
     return _estimated(motion, skeleton, upright)
 
@@ -109,23 +127,43 @@ def _estimated(
     motion: SkeletonMotion, skeleton: Skeleton, upright: Postures
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
     """Return a motion with a rest pose estimated from its upright frames."""
-    called = {"motion": motion.figure.name}
+    called = {"motion": motion.figure.name, "remedy": Remedy("", " (--source-rest overrides it)")}
     found = anatomical_rest(upright, skeleton)
     if found.is_parallel:
         # More exact than a frame, in which nobody stands perfectly.
-        note = Diagnostic("F007.rest-axes", values=called)
+        note = Diagnostic(_AXES, values=called)
         return _placed(motion, skeleton, found.rotations), [note]
     row, drop = _calibration(upright)
     if row >= 0:
         timing = motion.clip.timing
         frame = timing.first_frame + int(np.flatnonzero(timing.rows == row)[0])
-        pose = Phrase("t-pose" if drop < _T_POSE else "a-pose")
-        note = Diagnostic("F007.rest-frame", values={**called, "frame": frame, "pose": pose})
+        pose = Phrase("a T-pose" if drop < _T_POSE else "an A-pose")
+        note = Diagnostic(
+            "F007.rest-frame: rest pose of {motion}: frame {frame}, {pose}, because its zero "
+            "pose is not a standing pose{remedy}",
+            values={
+                **called,
+                "frame": frame,
+                "pose": pose,
+                "remedy": Remedy("", " (--source-rest overrides it)"),
+            },
+        )
         return _replaced(motion, skeleton, motion.clip.rotations[row]), [note]
-    notes = [Diagnostic("F007.rest-anatomy", values=called)]
+    notes = [
+        Diagnostic(
+            "F007.rest-anatomy: rest pose of {motion}: estimated from trunk, soles, knees and "
+            "elbows, because neither its zero pose nor any frame is a T- or A-pose{remedy}",
+            values=called,
+        )
+    ]
     if found.unseen:
-        values = {**called, "names": list(found.unseen)}
-        notes.append(Diagnostic("F007.rest-straight", values=values))
+        values = {**called, "names": listed(list(found.unseen))}
+        notes.append(
+            Diagnostic(
+                "F007.rest-straight: roll assumed for limbs of {motion} that hardly bend: {names}",
+                values=values,
+            )
+        )
     return _placed(motion, skeleton, found.rotations), notes
 
 
