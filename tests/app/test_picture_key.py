@@ -10,7 +10,7 @@ import pytest
 from app.driver import make_state
 
 import viewer
-from viewer.app.pace import PictureKeys
+from viewer.app.pace import picture_key
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rig.motion.clip_edit import clip_from_pose
@@ -154,56 +154,51 @@ CHANGES = CAMERA | OPTIONS | LIGHTS | KEY_LIGHT | SKINNING | POSE | ACTOR | REST
 
 @pytest.mark.parametrize("name", CHANGES)
 def test_every_visible_change_changes_the_key(state, name):
-    keys = PictureKeys()
-    before = keys.key(state, SIZE)
-    assert keys.key(state, SIZE) == before
+    before = picture_key(state, SIZE)
+    assert picture_key(state, SIZE) == before
     CHANGES[name](state)
-    after = keys.key(state, SIZE)
+    after = picture_key(state, SIZE)
     assert after != before
-    assert keys.key(state, SIZE) == after
+    assert picture_key(state, SIZE) == after
 
 
 def test_size_and_overlays_are_part_of_the_key(state):
-    keys, marks = PictureKeys(), Marks(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2, 3)))
+    marks = Marks(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2, 3)))
     known = [
-        keys.key(state, SIZE),
-        keys.key(state, (64, 49)),
-        keys.key(state, SIZE, marks),
-        keys.key(state, SIZE, copy.copy(marks)),
-        keys.key(state, SIZE, None, "ghost"),
-        keys.key(state, SIZE, None, None, ("annotation",)),
+        picture_key(state, SIZE),
+        picture_key(state, (64, 49)),
+        picture_key(state, SIZE, marks),
+        picture_key(state, SIZE, copy.copy(marks)),
+        picture_key(state, SIZE, None, "ghost"),
+        picture_key(state, SIZE, None, None, ("annotation",)),
     ]
     assert all(one != other for row, one in enumerate(known) for other in known[:row])
-    assert keys.key(state, SIZE, marks) == known[2]
+    assert picture_key(state, SIZE, marks) == known[2]
 
 
 def test_key_includes_time_only_if_motion_paths_are_drawn(state):
-    keys = PictureKeys()
-    before = keys.key(state, SIZE)
+    before = picture_key(state, SIZE)
     state.scene.time = 1.0
-    assert keys.key(state, SIZE) == before
+    assert picture_key(state, SIZE) == before
     state.options.path_joints = ((0, 0),)
-    before = keys.key(state, SIZE)
+    before = picture_key(state, SIZE)
     state.scene.time = 2.0
-    assert keys.key(state, SIZE) != before
+    assert picture_key(state, SIZE) != before
 
 
 def test_restored_values_have_an_equal_key(state):
-    keys = PictureKeys()
-    before = keys.key(state, SIZE)
+    before = picture_key(state, SIZE)
     state.actor.pose.dofs[0] += 0.5
-    keys.key(state, SIZE)
+    picture_key(state, SIZE)
     state.actor.pose.dofs[0] -= 0.5
-    assert keys.key(state, SIZE) == before
+    assert picture_key(state, SIZE) == before
 
 
 def test_unchanged_scene_is_not_copied(state, monkeypatch):
-    keys = PictureKeys()
-    before = keys.key(state, SIZE)
-    monkeypatch.setattr("viewer.app.pace.copy.deepcopy", None)
-    monkeypatch.setattr("viewer.app.pace.NumberKey", None)
+    before = picture_key(state, SIZE)
+    monkeypatch.setattr("viewer.app.core.scene_version.copy.deepcopy", None)
     monkeypatch.setattr("viewer.rig.pose.NumberKey", None)
-    assert keys.key(state, SIZE) == before
+    assert picture_key(state, SIZE) == before
 
 
 def test_frame_is_drawn_if_and_only_if_the_key_changes(hand, monkeypatch):

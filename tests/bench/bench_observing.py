@@ -12,7 +12,7 @@ from measure import interleaved, median_ratio, report
 import viewer
 from viewer.app.core.state import AppState
 from viewer.app.headless import HeadlessApp
-from viewer.app.pace import PictureKeys
+from viewer.app.pace import picture_key
 from viewer.loading import bundled_body
 from viewer.rendering.offscreen import default_camera
 from viewer.rendering.options import DisplayOptions
@@ -47,7 +47,6 @@ class Observed:
 
     def __init__(self, state: AppState) -> None:
         self._state = state
-        self._keys = PictureKeys()
 
     def pose(self) -> None:
         """Pose all actors for the next frame of the motion."""
@@ -58,12 +57,12 @@ class Observed:
     def observe(self) -> None:
         """Adopt the poses that the clock has set, and look for edits."""
         state = self._state
-        state.history.follow(state.clock.time)
-        state.history.observe(state.scene, state.options, busy=False)
+        state.history.follow(state.update_version(), state.clock.time)
+        state.observe()
 
     def key(self) -> None:
         """Build the key of the picture."""
-        self._keys.key(self._state, SIZE)
+        picture_key(self._state, SIZE)
 
 
 def whole_frame(parts: Observed, app: HeadlessApp) -> None:

@@ -150,7 +150,7 @@ def _job(state: AppState) -> Job | None:
 def _edits(state: AppState) -> list[_Unsaved]:
     """Return the unsaved edits that the user has not agreed to lose."""
     # The edits of this frame count too.
-    state.history.observe(state.scene, state.options, busy=False)
+    state.observe()
     return [] if state.of(Closing).discards else unsaved_edits(state)
 
 

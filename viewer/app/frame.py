@@ -26,7 +26,7 @@ from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse, is_held, stops_time
 from viewer.app.overlays import draw_hints
-from viewer.app.pace import Pace, PictureKeys, Step
+from viewer.app.pace import Pace, Step, picture_key
 from viewer.app.palette import draw_palette
 from viewer.app.posing.gizmo import draw_gizmo
 from viewer.app.posing.shape_panel import drop_unreadable_shapes
@@ -65,7 +65,7 @@ class Frame:
         self.outlines = OutlineLayer(self.context)
         self._drawn: object = None
         self._n_frames = 0
-        self._keys, self.pace = PictureKeys(), Pace()
+        self.pace = Pace()
         self._is_software = is_software(self.context)
         state.stats.renderer = self.context.info["GL_RENDERER"]
         state.stats.version = self.context.info["GL_VERSION"]
@@ -108,10 +108,10 @@ class Frame:
         if state.advance_job():
             state.of(Closing).withdraw()  # the user may want to export again
         # Edits are recorded before the clock poses the scene, which is not an edit.
-        state.history.observe(state.scene, state.options, is_held(state))
+        state.observe(is_held(state))
         take_streamed(state)
         if state.clock.pose(state.actor):
-            state.history.follow(state.clock.time)
+            state.history.follow(state.update_version(), state.clock.time)
         follow_actor(state)
         keep_fitting(state, state.of(Files).stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
@@ -139,7 +139,7 @@ class Frame:
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)
-        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
+        key = picture_key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         self._drawn = key
         # If drawing fails, it is retried only after a change.
         step = self.pace.step(key, state.options, time.perf_counter())

@@ -66,7 +66,7 @@ def test_display_change_is_not_an_undo_step(hand):
     hand.step(2)
     steps = hand.undo_steps
     state.actor.visible = False
-    state.history.accept(state.scene, state.options)
+    state.history.accept(state.update_version())
     hand.step(2)
     assert hand.undo_steps == steps
     hand.key("z", "ctrl")
@@ -80,7 +80,7 @@ def test_people_that_appear_while_loading_are_added_to_every_undo_step(drive, ri
     hand.step(2)
     late = Actor(state.actor.figure)
     state.scene.actors.append(late)
-    state.history.add_actors(state.scene, state.options)
+    state.history.add_actors(state.update_version())
     hand.step(2)
     assert hand.undo_steps == 1
     hand.key("z", "ctrl")

@@ -8,6 +8,7 @@ from app.captured import dots, people, walk
 from numpy.testing import assert_array_equal
 
 import viewer
+from viewer.app.core.scene_version import version_of
 from viewer.app.core.undo_history import History
 from viewer.app.files.files import keep_rate
 from viewer.app.playback.timeline_panel import foreign_rate, rate_of, set_rate
@@ -30,7 +31,7 @@ def rising(drive, rig):
     hand = drive(*rig, size=SIZE, samples=1)
     hand.state.actor.clip = keyed()
     hand.step(4)
-    hand.state.history.start(hand.state.scene, hand.state.options)
+    hand.state.history.start(hand.state.update_version(), hand.state.clock.time)
     return hand
 
 
@@ -171,12 +172,12 @@ def test_people_appearing_while_loading_get_the_chosen_rate(rig):
 def test_undoing_the_rate_while_loading_keeps_loaded_frames(rig):
     scene, options = people(rig, [True, True, False, False]), DisplayOptions()
     actor, history = scene.actors[0], History()
-    history.start(scene, options)
+    history.start(version_of(scene, options), 0.0)
     actor.clip = with_rate(actor.clip, 25.0)
-    assert history.observe(scene, options, busy=False)
+    assert history.observe(version_of(scene, options), busy=False)
     count = actor.figure.skeleton.n_joints
     actor.clip = walk([True] * 4, count, rate=25.0)  # as if more frames were read
-    history.add_actors(scene, options)
-    assert not history.observe(scene, options, busy=False)
+    history.add_actors(version_of(scene, options))
+    assert not history.observe(version_of(scene, options), busy=False)
     history.undo(scene, options, lambda time: None)
     assert (actor.clip.timing.frame_rate, actor.clip.n_rows) == (10.0, 4)

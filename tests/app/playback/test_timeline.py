@@ -35,7 +35,7 @@ def moving(drive, rig):
     hand.dof_row, hand.dof_start = dof, start
     assert "Scrubber" not in hand.state.item_rects  # nothing has moved yet
     hand.step(3)
-    hand.state.history.start(hand.state.scene, hand.state.options)
+    hand.state.history.start(hand.state.update_version(), hand.state.clock.time)
     return hand
 
 

@@ -209,7 +209,7 @@ def test_undo_of_other_edits_keeps_frames_loaded_since(panel):
     panel.step(2)
     # As if another part of a capture had been loaded.
     actor.clip, actor.drive = replace(actor.clip), drive
-    state.history.add_actors(state.scene, state.options)
+    state.history.add_actors(state.update_version())
     panel.key("z", "ctrl")
     panel.step(2)
     assert actor.color is None and actor.drive is drive and shown_match(state).drive is drive

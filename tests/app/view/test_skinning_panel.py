@@ -29,7 +29,7 @@ def _posed(hand, dofs):
     """Show the panel of a figure with this initial pose."""
     hand.show_panel("Skinning")
     hand.state.actor.pose.dofs[:] = dofs
-    hand.state.history.start(hand.state.scene, hand.state.options)
+    hand.state.history.start(hand.state.update_version(), hand.state.clock.time)
     hand.step(2)
     return hand
 

@@ -23,7 +23,7 @@ def pinned(drive, rig):
     """A driver on a column with vertex 4 pinned, which has equal weights for root and arm."""
     hand = drive(*rig, size=(1280, 1000), pixels_per_point=0.5)
     hand.state.actor.pose.dofs[hand.dof_index("arm.z")] = 0.9
-    hand.state.history.start(hand.state.scene, hand.state.options)
+    hand.state.history.start(hand.state.update_version(), hand.state.clock.time)
     pin_vertex(hand.state, 0, 4)
     hand.step(4)
     return hand

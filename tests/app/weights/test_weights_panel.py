@@ -39,7 +39,7 @@ def _posed(hand, dofs):
     hand.state.actor.pose.dofs[:] = dofs
     hand.state.options.skinning.max_influences = 4
     hand.state.options.scalar = "pruning"
-    hand.state.history.start(hand.state.scene, hand.state.options)
+    hand.state.history.start(hand.state.update_version(), hand.state.clock.time)
     hand.step(2)
     return hand
 

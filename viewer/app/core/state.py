@@ -16,6 +16,7 @@ from viewer.app.core.framing import Framing
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
 from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.scene_version import SceneVersion, version_of
 from viewer.app.core.undo_history import History
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
@@ -87,6 +88,9 @@ class AppState:
     """All messages, and those currently shown."""
     stats: Stats = field(default_factory=Stats)
     """Statistics of the last frame."""
+    version: SceneVersion = SceneVersion((), DisplayOptions())
+    """The scene as it was last compared: after the edits of a frame, and again once the clock has
+    posed it."""
     history: History = field(default_factory=History)
     """Undo history."""
     framing: Framing = field(default_factory=Framing)
@@ -165,10 +169,19 @@ class AppState:
     def _begin(self) -> None:
         """Go to the start of the scene's motion, with an empty history."""
         self.clock.show(self.scene)
-        self.history.start(self.scene, self.options)
+        self.history.start(self.update_version(), self.clock.time)
         self.put(Animations())  # those of the previous scene would keep its actors in memory
         self.put(SavedWork()).add_actors(self.scene.actors)
         self.say(*self.scene.diagnostics)
+
+    def update_version(self) -> SceneVersion:
+        """Return the current version of the scene, the same object if nothing has changed."""
+        self.version = version_of(self.scene, self.options, self.version)
+        return self.version
+
+    def observe(self, busy: bool = False) -> None:
+        """Record an edit of the scene; while a widget is held, the edit is in progress."""
+        self.history.observe(self.update_version(), busy)
 
     def set_front(self, front: Front) -> None:
         """Set or estimate the axis that the figures face; the camera rotates with it.

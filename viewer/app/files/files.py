@@ -341,7 +341,7 @@ def take_loaded(
 def _add(state: AppState, contents: Contents) -> None:
     """Apply poses and textures to the chosen actor."""
     saved = state.of(SavedWork)
-    state.history.observe(state.scene, state.options, busy=False)
+    state.observe()
     try:
         actor, notes = add_to_actor(contents, state.actor)
     except ViewerError as problem:
@@ -382,8 +382,8 @@ def take_streamed(state: AppState) -> None:
         state.scene.actors += new
         state.of(SavedWork).add_actors(new)
         state.clock.pose(state.actor, again=True)
-        state.history.add_actors(state.scene, state.options)
-        state.history.follow(state.clock.time)
+        state.history.add_actors(state.update_version())
+        state.history.follow(state.version, state.clock.time)
     state.say(*notes)
     if stream.is_done:
         files.stream = None

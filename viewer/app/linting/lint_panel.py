@@ -9,8 +9,10 @@ from dataclasses import field, replace
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.clock import PosedFor
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.scene_version import ActorVersion, SceneVersion
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
 from viewer.app.core.theme import ink
@@ -34,8 +36,8 @@ from viewer.phrases import counted, printable
 from viewer.rendering.overlay.annotation import Marks
 from viewer.rendering.picking import Pick
 from viewer.rig.mesh import box_size
-from viewer.rig.pose import pose_key
-from viewer.rig.scene import Actor, Scene, scene_unit
+from viewer.rig.pose import PoseKey
+from viewer.rig.scene import Scene, scene_unit
 
 _COLORS = {
     "error": (1.0, 0.42, 0.36, 1.0),
@@ -63,6 +65,8 @@ class Checked:
     """The scene that the window shows."""
     scene: Scene
     """A copy of the scene, made when the check began."""
+    version: SceneVersion
+    """The scene at that time."""
     options: LintOptions
     """Limits of the check."""
     findings: tuple[Finding, ...]
@@ -103,8 +107,8 @@ class Linting:
     """Whether the camera moves to the chosen finding once the scene is posed."""
     is_edited: bool = False
     """Whether a moving actor was posed by hand since the check."""
-    seen: tuple[object, ...] = ()
-    """Time and poses of moving actors in the previous frame."""
+    seen: tuple[PosedFor | None, SceneVersion] | None = None
+    """Key of the clock's poses, and the scene, in the previous frame."""
     marks: Marks | None = None
     """Marks of the chosen finding."""
     marks_key: object = None
@@ -391,13 +395,15 @@ def start_check(state: AppState) -> None:
     if no_job_room(state):
         return
     source, options, running = state.scene, _options(state), _Running()
-    copy, paths = _copied(source), state.paths
+    copy, version, paths = _copied(source), state.update_version(), state.paths
     settings, since = state.motion_settings, state.opened_at
 
     def check() -> list[str]:
         found = recheck(copy, paths, options, settings, since)
         findings = tuple(worst_first(found.findings))
-        running.result = Checked(source, copy, options, findings, found.n_files, found.notes)
+        running.result = Checked(
+            source, copy, version, options, findings, found.n_files, found.notes
+        )
         return [f"Checked: {summary(findings)}"]
 
     running.job = state.job = ThreadJob(_TITLE, check)
@@ -425,7 +431,7 @@ def _take_findings(state: AppState) -> None:
         result = None if was_cancelled else running.result
         if result is not None and result.source is state.scene:
             view.checked, view.chosen = result, -1
-            view.is_edited, view.seen = False, _moving(state)
+            view.is_edited, view.seen = False, (state.clock.posed_for, state.version)
     if view.checked is not None and view.checked.source is not state.scene:
         view.checked, view.chosen = None, -1
 
@@ -439,11 +445,11 @@ def _is_stale(state: AppState) -> bool:
     known = view.checked
     if known is None:
         return False
-    before, view.seen = view.seen, _moving(state)
-    if before[0] == view.seen[0] and before[1:] != view.seen[1:]:
-        view.is_edited = True
-    actors, old, options = state.scene.actors, known.scene.actors, _options(state)
-    if [actor.clip for actor in actors] != [actor.clip for actor in old]:
+    before, view.seen = view.seen, (state.clock.posed_for, state.version)
+    if before is not None and before[0] == view.seen[0]:
+        view.is_edited |= _moving(before[1]) != _moving(state.version)
+    actors, old, options = state.version.actors, known.version.actors, _options(state)
+    if [one.clip for one in actors] != [one.clip for one in old]:
         # Other animations may have a different frame rate.
         options = replace(options, frame_rate=known.options.frame_rate)
     return (
@@ -454,24 +460,21 @@ def _is_stale(state: AppState) -> bool:
     )
 
 
-def _moving(state: AppState) -> tuple[object, ...]:
-    """Return the key of the scene's poses, and the poses of moving actors."""
-    poses = [actor.pose for actor in state.scene.actors if actor.clip is not None]
-    return (state.clock.posed_for, *(pose_key(pose) for pose in poses if pose is not None))
+def _moving(version: SceneVersion) -> list[PoseKey | None]:
+    """Return the poses of moving actors."""
+    return [one.pose for one in version.actors if one.clip is not None]
 
 
-def _differs(actor: Actor, old: Actor) -> bool:
-    if actor.figure is not old.figure:
+def _differs(now: ActorVersion, old: ActorVersion) -> bool:
+    if now.figure is not old.figure:
         return True
     # All animations of the file were checked.
-    is_known = any(animation.plays(actor.clip) for animation in actor.figure.animations)
-    if actor.clip is not old.clip and not is_known:
+    is_known = any(animation.plays(now.clip) for animation in now.figure.animations)
+    if now.clip is not old.clip and not is_known:
         return True
-    if actor.offset != old.offset or (actor.placement != old.placement).any():
+    if now.offset != old.offset or now.placement != old.placement:
         return True
-    if actor.clip is not None or actor.pose is None or old.pose is None:
-        return False
-    return pose_key(actor.pose) != pose_key(old.pose)
+    return now.clip is None and None not in (now.pose, old.pose) and now.pose != old.pose
 
 
 def _choose_finding(state: AppState, index: int) -> None:

@@ -176,9 +176,9 @@ def switch_version(state: AppState) -> None:
 def _show_version(state: AppState, name: str) -> None:
     """Show one of ``_versions`` without recording an undo step."""
     # Other changes in this frame keep their own undo step.
-    state.history.observe(state.scene, state.options, busy=False)
+    state.observe()
     _look(state, name)
-    state.history.accept(state.scene, state.options)
+    state.history.accept(state.update_version())
     text = "Original mesh" if name == TARGET else f"Rigged, method {name}"
     state.say_status(text)
 
