@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._frames import add_frame_arguments
-from viewer.commands._one_pose import check_frame_options
 from viewer.commands._pose import (
     PoseOptions,
     add_pose_arguments,
@@ -36,16 +35,18 @@ from viewer.commands._scene import (
     scene_options,
 )
 from viewer.commands._settings import settings_of, stated
-from viewer.commands._writing.baked_springs import bake_springs
-from viewer.commands._writing.motion_export import (
+from viewer.commands._writing import (
     add_motion_arguments,
+    add_vrm_arguments,
+    bake_springs,
+    check_frame_options,
     check_kind,
+    check_meta,
     check_numbered,
     export_options,
     requested_frames,
     selected,
 )
-from viewer.commands._writing.vrm_meta import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found

@@ -34,7 +34,7 @@ from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, settings_of
-from viewer.commands._writing.vrm_meta import add_vrm_arguments, check_meta
+from viewer.commands._writing import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found

@@ -1,1 +1,0 @@
-"""Parts of ``convert`` that write motions and characters."""
