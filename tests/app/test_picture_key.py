@@ -152,53 +152,59 @@ REST = {
 CHANGES = CAMERA | OPTIONS | LIGHTS | KEY_LIGHT | SKINNING | POSE | ACTOR | REST
 
 
+def key_of(state, *given):
+    """Return the key of the current picture."""
+    state.update_version()
+    return picture_key(state, *given)
+
+
 @pytest.mark.parametrize("name", CHANGES)
 def test_every_visible_change_changes_the_key(state, name):
-    before = picture_key(state, SIZE)
-    assert picture_key(state, SIZE) == before
+    before = key_of(state, SIZE)
+    assert key_of(state, SIZE) == before
     CHANGES[name](state)
-    after = picture_key(state, SIZE)
+    after = key_of(state, SIZE)
     assert after != before
-    assert picture_key(state, SIZE) == after
+    assert key_of(state, SIZE) == after
 
 
 def test_size_and_overlays_are_part_of_the_key(state):
     marks = Marks(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2, 3)))
     known = [
-        picture_key(state, SIZE),
-        picture_key(state, (64, 49)),
-        picture_key(state, SIZE, marks),
-        picture_key(state, SIZE, copy.copy(marks)),
-        picture_key(state, SIZE, None, "ghost"),
-        picture_key(state, SIZE, None, None, ("annotation",)),
+        key_of(state, SIZE),
+        key_of(state, (64, 49)),
+        key_of(state, SIZE, marks),
+        key_of(state, SIZE, copy.copy(marks)),
+        key_of(state, SIZE, None, "ghost"),
+        key_of(state, SIZE, None, None, ("annotation",)),
     ]
     assert all(one != other for row, one in enumerate(known) for other in known[:row])
-    assert picture_key(state, SIZE, marks) == known[2]
+    assert key_of(state, SIZE, marks) == known[2]
 
 
 def test_key_includes_time_only_if_motion_paths_are_drawn(state):
-    before = picture_key(state, SIZE)
+    before = key_of(state, SIZE)
     state.scene.time = 1.0
-    assert picture_key(state, SIZE) == before
+    assert key_of(state, SIZE) == before
     state.options.path_joints = ((0, 0),)
-    before = picture_key(state, SIZE)
+    before = key_of(state, SIZE)
     state.scene.time = 2.0
-    assert picture_key(state, SIZE) != before
+    assert key_of(state, SIZE) != before
 
 
 def test_restored_values_have_an_equal_key(state):
-    before = picture_key(state, SIZE)
+    before = key_of(state, SIZE)
     state.actor.pose.dofs[0] += 0.5
-    picture_key(state, SIZE)
+    key_of(state, SIZE)
     state.actor.pose.dofs[0] -= 0.5
-    assert picture_key(state, SIZE) == before
+    assert key_of(state, SIZE) == before
 
 
 def test_unchanged_scene_is_not_copied(state, monkeypatch):
-    before = picture_key(state, SIZE)
+    before = key_of(state, SIZE)
     monkeypatch.setattr("viewer.app.core.scene_version.copy.deepcopy", None)
     monkeypatch.setattr("viewer.rig.pose.NumberKey", None)
-    assert picture_key(state, SIZE) == before
+    assert key_of(state, SIZE) == before
 
 
 def test_frame_is_drawn_if_and_only_if_the_key_changes(hand, monkeypatch):

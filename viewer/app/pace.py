@@ -104,7 +104,7 @@ def picture_key(
     ``marks``, ``ghost``, ``annotations``: items drawn over the scene in this frame; compared by
     identity.
     """
-    camera, version = state.camera, state.update_version()
+    camera, version = state.camera, state.version
     place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
     lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
     # Motion paths show the motion around the current time, and cameras show their current images.

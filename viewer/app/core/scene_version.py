@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from operator import is_
+from typing import NamedTuple
 
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
@@ -14,8 +15,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor, Motion, Scene, Swinging
 
 
-@dataclass(frozen=True, slots=True)
-class ActorVersion:
+class ActorVersion(NamedTuple):  # a tuple is compared quickly, also for hundreds of actors
     """What can change about an actor; figures and motions are replaced and never mutated."""
 
     actor: Actor
@@ -32,7 +32,7 @@ class ActorVersion:
     springs: Swinging | None
     drive: Drive | None
     placement: NumberKey
-    points: NumberKey
+    points: NumberKey | None
 
     @property
     def look(self) -> tuple[object, ...]:
@@ -68,7 +68,9 @@ def version_of(
 
 def _version_of(actor: Actor, last: ActorVersion | None) -> ActorVersion:
     placement = NumberKey() if last is None else last.placement
-    points = NumberKey() if last is None else last.points
+    points = None
+    if actor.points is not None:
+        points = ((last and last.points) or NumberKey()).updated(actor.points)
     now = ActorVersion(
         actor,
         actor.figure,
@@ -84,6 +86,6 @@ def _version_of(actor: Actor, last: ActorVersion | None) -> ActorVersion:
         actor.springs,
         actor.drive,
         placement.updated(actor.placement),
-        points.updated(*([] if actor.points is None else [actor.points])),
+        points,
     )
     return last if last is not None and last == now else now

@@ -264,7 +264,7 @@ def _extended(old: ActorVersion, new: ActorVersion | None) -> ActorVersion:
     if new is None:
         return old
     # Joints cannot be matched by hand while the motion grows.
-    return replace(old, clip=_grown(old.clip, new.clip), drive=new.drive)
+    return old._replace(clip=_grown(old.clip, new.clip), drive=new.drive)
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
