@@ -385,8 +385,13 @@ def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _
         when = "at that time" if able[0].frames is None else f"in {_span(able[0])}"
         raise RigError(f"no person is present {when}: there is nothing to write")
     omitted = [_absent_note(part) for part in able if not part.present.any()]
+    lacking = (
+        "X003.no-mesh: {figure}: no mesh, not written"
+        if kind.needs == "mesh"
+        else "X003.no-skeleton: {figure}: no skeleton, not written"
+    )
     omitted += [
-        Diagnostic(f"X003.no-{kind.needs}", values={"figure": part.actor.name})
+        Diagnostic(lacking, values={"figure": part.actor.name})
         for part in selection.parts
         if part not in able
     ]
