@@ -84,8 +84,6 @@ SUBMISSION_ZIP = (
     "F002.submission-zip: expected a folder or a zip archive, found a damaged archive ({reason})"
 )
 
-ROOT = "F002.root: {item}: joint 0: expected the root, whose parent is -1, found {found:g}"
-
 SMPL_KEYS = "F002.smpl-keys: expected a body model; keys missing: {missing}; keys found: {found}"
 
 SMPL_POSEDIRS = "F007.smpl-posedirs: no `posedirs`: plain linear blend skinning"
@@ -250,10 +248,6 @@ JOBLIB_WRAPPER = "expected a standard array description, found an unusual {name}
 COUNT = "F002.count: {item}: expected a count, found {found}"
 
 JOINT_OPEN = 'F002.joint-open: expected "}}" to close {joint} (line {line}), found {found}'
-
-LATE_PARENT = "S001.parent: {item}: joint {joint}: expected a parent before it, found {found:g}"
-
-CYCLIC_PARENT = "S002.parent: {item}: joint {joint}: expected a parent before it, found {found:g}"
 
 NOT_FINITE = "finite: {item}: expected finite numbers, found {found:g}{at}"
 

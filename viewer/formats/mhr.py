@@ -34,7 +34,7 @@ from viewer.formats._archive.checking import (
 from viewer.formats._archive.values import Archive
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import Source
-from viewer.phrases import listed, quoted
+from viewer.phrases import listed, optional, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.bodies.model_parameters import PER_JOINT, ModelParameters, driven_dofs
@@ -42,6 +42,7 @@ from viewer.rig.bodies.offsets import SparseOffsets
 from viewer.rig.bodies.pose_features import NetworkFeature
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.hierarchy import parent_faults
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, skin_from_entries
@@ -173,19 +174,16 @@ def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
     offsets = finite_array(archive, "joint_offsets", (None, 3))
     count = len(offsets)
     parents = archive.array("joint_parents", (count,)).values()
-    places = np.arange(count)
-    is_root = parents < 0
-    wrong = np.flatnonzero((parents >= places) | (parents % 1 != 0) | (is_root != (places == 0)))
-    if len(wrong):
-        joint = int(wrong[0])
-        key = wording.ROOT if joint == 0 else wording.LATE_PARENT
+    parents = np.where(parents < 0, -1, parents)
+    for joint, key in parent_faults(parents):
         found = float(parents[joint])
-        raise archive.fault(key, item="joint_parents", joint=joint, found=found)
+        item = optional("{}: ", "joint_parents")
+        raise archive.fault(key, item=item, joint=joint, found=found)
     rotations = _quaternions(archive, "joint_prerotations", count)
     joints, kinds = driven_dofs(parameters.transform)
     return Skeleton(
         names=tuple(map(str, archive.array("joint_names", (count,), "SU").values().tolist())),
-        parents=np.where(is_root, -1, parents).astype(np.int32),
+        parents=parents.astype(np.int32),
         rest_translations=offsets,
         rest_rotations=rotations,
         rest_scales=np.ones((count, 3)),

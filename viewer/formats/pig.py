@@ -41,7 +41,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import JointRegressor, regress_joints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.hierarchy import cycle_members
+from viewer.rig.hierarchy import parent_faults
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
@@ -311,35 +311,13 @@ def _neutral_mesh(parts: dict[str, _Part]) -> Floats:
 def _parents(part: _Part) -> Ints:
     parents = part.values[:, 0]
     result = parents.copy()
-    for joint, parent in enumerate(parents.tolist()):
-        if 0 <= parent < joint and parent == int(parent) if joint else parent == -1.0:
-            continue
-        if not np.isnan(parent):  # NaN has already been recorded with its row
-            _refuse_parent(part, parents, joint)
+    for joint, key in parent_faults(parents):
+        if not np.isnan(parents[joint]):  # NaN has already been recorded with its row
+            values = {"joint": joint, "found": float(parents[joint])}
+            offset, item = part.offset(joint), optional("{}: ", part.item(joint))
+            part.source.refuse(key, offset, 1, "joints", [joint], item=item, **values)
         result[joint] = 0.0 if joint else -1.0
     return result.astype(np.int32)
-
-
-def _refuse_parent(part: _Part, parents: Floats, joint: int) -> None:
-    found, values = float(parents[joint]), {"joint": joint}
-    if joint == 0:
-        key = "F002.pig-root: {item}joint 0: expected the root, whose parent is -1, found {found:g}"
-        values = {}
-    elif found == -1.0:
-        key = "F002.pig-roots: {item}joint {joint}: expected one root, found a second"
-    else:
-        key = "S002.parent" if cycle_members(parents)[joint] else "S001.parent"
-        key += ": {item}joint {joint}: expected a parent before it, found {found:g}"
-    part.source.refuse(
-        key,
-        part.offset(joint),
-        1,
-        "joints",
-        [joint],
-        item=optional("{}: ", part.item(joint)),
-        found=found,
-        **values,
-    )
 
 
 def _count_fault(part: _Part, wanted: int, other: _Part) -> FormatError:

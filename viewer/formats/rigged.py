@@ -47,13 +47,13 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
-from viewer.phrases import counted, quoted
+from viewer.phrases import counted, optional, quoted
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bytes, Deferred, Floats
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
-from viewer.rig.hierarchy import cycle_members
+from viewer.rig.hierarchy import parent_faults
 from viewer.rig.material import TEXTURES, Material, Outline, Rim, Texture
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
@@ -262,26 +262,21 @@ def _skeleton(archive: Archive) -> Skeleton:
 def _parents(archive: Archive, count: int) -> NDArray[Any]:
     """Return the parents; refuse parents that do not precede their joints, which become roots."""
     parents = _numbers(archive, "parents", (count,))
-    late = np.flatnonzero((parents >= np.arange(count)) | (parents < -1))
-    if len(late) == 0:
-        return parents
-    cycles = cycle_members(parents)
-    for key, joints in (
-        (wording.CYCLIC_PARENT, late[cycles[late]]),
-        (wording.LATE_PARENT, late[~cycles[late]]),
-    ):
-        if len(joints):
-            archive.refuse(
-                key,
-                item="parents",
-                count=len(joints),
-                part="joints",
-                places=joints,
-                joint=int(joints[0]),
-                found=parents[joints[0]],
-            )
+    late: dict[str, list[int]] = {}
+    for joint, key in parent_faults(parents, many_roots=True):
+        late.setdefault(key, []).append(joint)
     mended = parents.copy()
-    mended[late] = -1
+    for key, joints in sorted(late.items(), reverse=True):
+        archive.refuse(
+            key,
+            item=optional("{}: ", "parents"),
+            count=len(joints),
+            part="joints",
+            places=joints,
+            joint=joints[0],
+            found=parents[joints[0]],
+        )
+        mended[joints] = -1
     return mended
 
 

@@ -35,6 +35,7 @@ from viewer.rig.bodies.pose_features import MappedFeature
 from viewer.rig.bodies.smpl_family import ShapeSpace, gender_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.hierarchy import parent_faults
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, skin_from_entries
@@ -110,14 +111,13 @@ def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
 
 def _parents(archive: Archive) -> Ints:
     table = archive.array("osim_kintree_table", (2, len(JOINTS))).values().astype(np.float64)
-    places = np.arange(len(JOINTS))
-    inner = table[0, 1:]
-    if (table[1] != places).any() or ((inner < 0) | (inner >= places[1:]) | (inner % 1 != 0)).any():
+    parents = np.append(-1.0, table[0, 1:])
+    if (table[1] != np.arange(len(JOINTS))).any() or parent_faults(parents):
         raise archive.fault(
             "F002.skel-tree: {item}: expected 24 joints in order, parents before children",
             item="osim_kintree_table",
         )
-    return np.append(-1, inner).astype(np.int32)
+    return parents.astype(np.int32)
 
 
 def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:

@@ -32,7 +32,7 @@ from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._published_models import published_name
 from viewer.formats._source import Source
-from viewer.phrases import axes, listed, printable, rounded
+from viewer.phrases import axes, listed, optional, printable, rounded
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
@@ -49,7 +49,7 @@ from viewer.rig.bodies.smpl_family import (
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.hands import Hand
-from viewer.rig.hierarchy import cycle_members
+from viewer.rig.hierarchy import parent_faults
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
@@ -168,47 +168,22 @@ def _parents(archive: Archive, used: list[str]) -> Ints:
             "found different indices",
             item="kintree_table",
         )
-    parents = rows[0].copy()
-    if np.isin(parents[0], (*_ROOTS, 0.0)):
+    parents = np.where(np.isin(rows[0], _ROOTS), -1.0, rows[0])
+    if parents[0] == 0.0:
         parents[0] = -1.0
     result = parents.copy()
-    for joint, parent in enumerate(parents):
-        if parent == -1 if joint == 0 else 0 <= parent < joint and parent % 1 == 0:
-            continue
-        _refuse_parent(archive, parents, joint)
+    for joint, key in parent_faults(parents):
+        archive.refuse(
+            key,
+            item=optional("{}: ", "kintree_table"),
+            part="joints",
+            places=[joint],
+            joint=joint,
+            found=float(parents[joint]),
+        )
         result[joint] = 0.0 if joint else -1.0
     used.append("kintree_table")
     return result.astype(np.int32)
-
-
-def _refuse_parent(archive: Archive, parents: Floats, joint: int) -> None:
-    key, found = "kintree_table", float(parents[joint])
-    is_cycle = cycle_members(parents)[joint]
-    if joint and np.isin(found, _ROOTS):
-        archive.refuse(
-            "F002.roots: {item}: expected one root, found joints 0 and {joint}",
-            item=key,
-            part="joints",
-            places=[joint],
-            joint=joint,
-        )
-    elif joint:
-        code = wording.CYCLIC_PARENT if is_cycle else wording.LATE_PARENT
-        archive.refuse(
-            code,
-            item=key,
-            part="joints",
-            places=[joint],
-            joint=joint,
-            found=found,
-        )
-    else:
-        code = (
-            "S002.root: {item}: joint 0: expected the root, whose parent is -1, found {found:g}"
-            if is_cycle
-            else wording.ROOT
-        )
-        archive.refuse(code, item=key, part="joints", places=[0], found=found)
 
 
 def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:

@@ -31,6 +31,37 @@ def cycle_members(parents: Floats | Ints) -> Bools:
     return members
 
 
+_PARENT = "{item}joint {joint}: expected a parent before it, found {found:g}"
+_ROOT = "{item}joint 0: expected the root, whose parent is -1, found {found:g}"
+
+
+def parent_faults(parents: Floats | Ints, many_roots: bool = False) -> list[tuple[int, str]]:
+    """Return the joints whose parents in a file cannot be used, with the messages.
+
+    Parents come before their children. Joint 0 is the root, whose parent is -1, and the only one
+    unless ``many_roots``.
+
+    >>> [(joint, text[:4]) for joint, text in parent_faults(np.array([-1, 2, 1, 0, -1, 7]))]
+    [(1, 'S002'), (4, 'F002'), (5, 'S001')]
+    """
+    joints = np.arange(len(parents))
+    with np.errstate(invalid="ignore"):
+        valid = (parents >= 0) & (parents < joints) & (parents == np.floor(parents))
+    valid |= (parents == -1) & (many_roots | (joints == 0))
+    if valid.all():
+        return []
+    in_cycle, found = cycle_members(parents), []
+    for joint in np.flatnonzero(~valid).tolist():
+        if joint == 0 and not many_roots:
+            text = f"{'S002' if in_cycle[0] else 'F002'}.root: {_ROOT}"
+        elif parents[joint] == -1:
+            text = "F002.roots: {item}expected one root, found joints 0 and {joint}"
+        else:
+            text = f"{'S002' if in_cycle[joint] else 'S001'}.parent: {_PARENT}"
+        found.append((joint, text))
+    return found
+
+
 def depth_first(parents: Ints) -> Ints:
     """Return the joints in depth-first order: each before its children, siblings by index.
 

@@ -132,7 +132,7 @@ def test_files_without_correctives_are_read_with_a_note(tmp_path):
 WRONG_RIGS = [
     ({"schema_version": np.array(9)}, "F002.mhr-version"),
     ({"joint_parents": np.array([-1, 0, 3, 1, 3])}, "S001.parent"),
-    ({"joint_parents": np.array([0, 0, 1, 1, 3])}, "F002.root"),
+    ({"joint_parents": np.array([0, 0, 1, 1, 3])}, "S002.root"),  # its own parent
     ({"joint_prerotations": np.zeros((N_JOINTS, 4))}, "F002.mhr-quaternion"),
     ({"inverse_bind_pose": np.zeros((N_JOINTS, 8))}, "F002.mhr-quaternion"),
     ({"joint_names": None}, "F002.mhr-keys"),

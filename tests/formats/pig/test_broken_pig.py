@@ -119,10 +119,10 @@ def folder(tmp_path):
          {"item": "", "noun": "vertex", "last": 4, "found": 9.0,
          "proof": "vertices.txt has 5 rows"})),
         # The hierarchy
-        ({"parents": "-1\n0\n-1\n"}, ("pig/parents.txt", "F002.pig-roots", 3, {"item": "",
+        ({"parents": "-1\n0\n-1\n"}, ("pig/parents.txt", "F002.roots", 3, {"item": "",
          "found": -1.0, "joint": 2})),
-        ({"parents": "0\n0\n1\n"}, ("pig/parents.txt", "F002.pig-root", 1, {"item": "",
-         "found": 0.0})),
+        ({"parents": "0\n0\n1\n"}, ("pig/parents.txt", "S002.root", 1, {"item": "",
+         "found": 0.0, "joint": 0})),
         ({"parents": "-1\n2\n0\n"}, ("pig/parents.txt", "S001.parent", 2, {"item": "",
          "found": 2.0, "joint": 1})),
         ({"parents": "-1\n1\n0\n"}, ("pig/parents.txt", "S002.parent", 2, {"item": "",

@@ -218,7 +218,7 @@ BROKEN = {
     ),
     "cycle": (
         {"parents": np.array([1, 0])},
-        ("S002.parent", None, {"item": "parents", "joint": 0, "found": 1}),
+        ("S002.parent", None, {"item": "parents: ", "joint": 0, "found": 1}),
     ),
     "skin": (
         {"skin_joints": np.array([0, 1, 0, 2])},
