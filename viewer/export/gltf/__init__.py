@@ -8,7 +8,7 @@ it if it is in another unit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from viewer.export.gltf.keyed import Clips
 from viewer.export.gltf.losses import Written, not_held
 from viewer.export.gltf.materials import material_losses
 from viewer.export.gltf.nodes import Tree, to_metres
-from viewer.export.gltf.reading import GltfFile, parsed
+from viewer.export.gltf.reading import GltfFile
 from viewer.export.gltf.sampled import (
     add_sampled,
     common_name,
@@ -107,7 +107,7 @@ def write_poses(
     (data,) = _files([(path, document)])
     notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]
     notes += _beside(data, path, document)
-    file = _unplaced(data, placing)
+    file = GltfFile(path, [*data.values()], placing)
     for actor, each in zip(actors, added, strict=True):
         own_notes = _figure_notes(path, actor, each, file, skinning, extend is not None)
         several = len(actors) > 1
@@ -188,7 +188,7 @@ def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagno
             *_beside(data, file, document),
         ]
         notes += _quantization(file, made, animation.figure)
-        written = Written(file, parsed([*data.values()]), made.tree, made.meshes, span[0])
+        written = Written(file, GltfFile(file, [*data.values()]), made.tree, made.meshes, span[0])
         lost += sampled_losses(written, sampled, options, span)
     notes += _remarks(sampled.body, sampled.up) + motion_remarks(sampled, options)
     lost += resampling_losses(path, animation, options.skinning)
@@ -228,7 +228,7 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
     seconds = max(start_of(each) + seconds_of(each.animation) for each in parts) - begin
     notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
     notes += _beside(data, path, document)
-    file = _unplaced(data, placing)
+    file = GltfFile(path, [*data.values()], placing)
     for part, sampled, made in zip(parts, found, built, strict=False):
         own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
         own += motion_remarks(sampled, options)
@@ -260,14 +260,6 @@ def _motions_written(
         path,
         values=values,
     )
-
-
-def _unplaced(data: Mapping[Path, bytes], placing: Sequence[int]) -> GltfFile:
-    """Return a written file without placements, because errors are measured in figure space."""
-    file = parsed([*data.values()])
-    for node in placing:
-        del file.root["nodes"][node]["matrix"]
-    return file
 
 
 def _figure_notes(

@@ -32,12 +32,17 @@ from viewer.export.gltf.nodes import locals_of, to_metres
 from viewer.export.gltf.reading import GltfFile, Keys
 from viewer.export.gltf.skin import shape_of
 from viewer.phrases import agree, counted, listed, optional
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.motion.animation_choice import still_pose
 from viewer.rig.motion.evaluation import Frames, frames_of, still_frames
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.transform_clip import (
+    Interpolation,
+    TransformChannel,
+    TransformClip,
+    sample_transforms,
+)
 from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
@@ -48,8 +53,7 @@ from viewer.rig.skinning import Skinning
 _MOST_VERTICES = 4_000_000
 _FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
 _BLOCK = 64  # number of times per block
-_DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
-_PARALLEL = 1.0 - 1e-9  # rotations with a larger cosine are interpolated linearly
+_MODES: dict[str, Interpolation] = {"STEP": "step", "LINEAR": "linear", "CUBICSPLINE": "cubic"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -345,10 +349,12 @@ def _sampled(
 
 def _still(file: GltfFile, node: int, path: str) -> Floats:
     """Return the value of a property that is not animated."""
-    item = file.root["nodes"][node]
+    tree = file.tree
     if path == "weights":
-        return np.array(file.root["meshes"][item["mesh"]]["weights"], dtype=np.float64)
-    return np.array(item.get(path, _DEFAULTS[path]), dtype=np.float64)
+        mesh = file.root["meshes"][int(tree.meshes[node])]
+        return np.array(mesh["weights"], dtype=np.float64)
+    still = {"translation": tree.translations, "rotation": tree.rotations, "scale": tree.scales}
+    return still[path][node]
 
 
 def _one(parts: list[Frames]) -> Frames:
@@ -373,10 +379,6 @@ def _one(parts: list[Frames]) -> Frames:
     )
 
 
-# Evaluation of the animations of a glTF file written by this program.
-#
-# The evaluation follows glTF 2.0, section 3.11 and appendix C, in double precision, and shares no
-# code with other parts of the program.
 def key_times(animation: dict[str, Any], file: GltfFile) -> Floats:
     """Return all key times of an animation, increasing: (T,)."""
     inputs = {sampler["input"] for sampler in animation["samplers"]}
@@ -385,51 +387,29 @@ def key_times(animation: dict[str, Any], file: GltfFile) -> Floats:
 
 def _keys_at(file: GltfFile, animation: dict[str, Any], times: Floats) -> Keys:
     """Return the animated values at times (T,), by node and path: (T, C) each."""
-    found: Keys = {}
+    channels, shapes = list[TransformChannel](), dict[int, Ints]()
     for channel in animation["channels"]:
         sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
         inputs = file.floats(sampler["input"])[:, 0]
-        kind = sampler.get("interpolation", "LINEAR")
-        count = len(inputs) * (3 if kind == "CUBICSPLINE" else 1)
-        values = file.floats(sampler["output"]).reshape(count, -1)
-        is_rotation = target["path"] == "rotation"
-        found[target["node"], target["path"]] = _values(inputs, values, kind, is_rotation, times)
-    return found
-
-
-def _values(inputs: Floats, values: Floats, kind: str, is_rotation: bool, times: Floats) -> Floats:
-    before = np.clip(np.searchsorted(inputs, times, side="right") - 1, 0, len(inputs) - 1)
-    after = np.minimum(before + 1, len(inputs) - 1)
-    spans = inputs[after] - inputs[before]
-    passed = np.clip(times - inputs[before], 0.0, spans)
-    u = np.divide(passed, spans, out=np.zeros_like(passed), where=spans > 0.0)[:, None]
-    if kind == "STEP":
-        return values[before]
-    if kind == "CUBICSPLINE":
-        rows = values.reshape(len(inputs), 3, -1)
-        h = spans[:, None]
-        found = (
-            (2 * u**3 - 3 * u**2 + 1) * rows[before, 1]
-            + h * (u**3 - 2 * u**2 + u) * rows[before, 2]
-            + (3 * u**2 - 2 * u**3) * rows[after, 1]
-            + h * (u**3 - u**2) * rows[after, 0]
-        )
-        return np.asarray(found)
-    if is_rotation:
-        return _slerp(values[before], values[after], u)
-    return np.asarray(values[before] + u * (values[after] - values[before]))
-
-
-def _slerp(first: Floats, second: Floats, u: Floats) -> Floats:
-    """Return sin((1 - u) a) / sin a q0 + sin(u a) / sin a q1 along the shorter arc."""
-    first = first / np.linalg.norm(first, axis=1, keepdims=True)
-    second = second / np.linalg.norm(second, axis=1, keepdims=True)
-    cosines = np.einsum("ta,ta->t", first, second)[:, None]
-    second = np.where(cosines < 0.0, -second, second)
-    cosines = np.abs(cosines)
-    near = cosines > _PARALLEL
-    angles = np.arccos(np.where(near, 0.0, cosines))
-    sines = np.sin(angles)
-    one = np.where(near, 1.0 - u, np.sin((1.0 - u) * angles) / sines)
-    other = np.where(near, u, np.sin(u * angles) / sines)
-    return np.asarray(one * first + other * second)
+        kind = _MODES[sampler.get("interpolation", "LINEAR")]
+        # Each key of a cubic curve has an incoming tangent, a value and an outgoing tangent.
+        rows = file.floats(sampler["output"]).reshape(len(inputs), 3 if kind == "cubic" else 1, -1)
+        values, tangents = rows[:, rows.shape[1] // 2], rows[:, (0, 2)] if kind == "cubic" else None
+        node, path, own = target["node"], target["path"], None
+        if path == "weights":
+            first = sum(map(len, shapes.values()))
+            shapes[node] = own = np.arange(first, first + values.shape[1], dtype=np.int32)
+        joint = -1 if path == "weights" else node
+        channels.append(TransformChannel(joint, path, inputs, values, kind, tangents, own))
+    found = sample_transforms(TransformClip("", tuple(channels), 0.0, 0.0), times)
+    keys: Keys = {}
+    for path, nodes, sampled in (
+        ("rotation", found.rotated, found.rotations),
+        ("translation", found.translated, found.translations),
+        ("scale", found.scaled, found.scales),
+    ):
+        keys |= {(node, path): sampled[:, row] for row, node in enumerate(nodes.tolist())}
+    columns = np.argsort(found.weighted)  # each weight is animated once
+    for node, own_shapes in shapes.items():
+        keys[node, "weights"] = found.shape_weights[:, columns[own_shapes]]
+    return keys

@@ -1,15 +1,14 @@
-"""Reader of glTF files written by this program: arrays, nodes in every frame, mesh and skin.
+"""Contents of a written glTF file, read by the program's own reader, in every frame of a motion.
 
-Only the output of ``viewer.export.gltf`` is supported: one buffer without strides. Joints and
-vertices are returned in the figure's space, below the node that rotates and scales the whole
-figure.
+Joints and vertices are returned in the figure's space, below the node that rotates and scales the
+whole figure.
 """
 
 from __future__ import annotations
 
-import json
-import struct
+from collections.abc import Sequence
 from dataclasses import field
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,7 +18,11 @@ from viewer.data_classes import dataclass
 from viewer.export._losses.skinned import Body, Poses, Rows, Side
 from viewer.export.gltf.mesh import Part
 from viewer.export.gltf.nodes import Tree
-from viewer.rig.arrays import Floats, Ints
+from viewer.formats import Source
+from viewer.formats._scene_graph.content import NodeTree
+from viewer.formats.gltf.document import Document, open_document, parsed_json
+from viewer.formats.gltf.nodes import read_tree
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import apply_transform
@@ -28,48 +31,42 @@ from viewer.rig.skin import Skin, influence_counts, skin_from_entries
 
 Keys: TypeAlias = dict[tuple[int, str], Floats]
 """Animated values by node and path, one row per frame."""
-_TYPES = {5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
-_HEAD = 12  # bytes before the first chunk of a .glb
-_CHUNK = 8  # bytes before a chunk's data
+_ANY = ("SCALAR", "VEC2", "VEC3", "VEC4", "MAT4")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class GltfFile:
-    """A file's JSON and the bytes of its buffer."""
+    """A written file.
 
-    root: dict[str, Any]
-    buffer: bytes
+    ``files``: bytes of a ``.glb``, or of a ``.gltf`` and its buffer, if it has one. ``unplaced``:
+    nodes whose matrices are ignored, as errors are measured in the space of each figure.
+    """
 
-    def array(self, accessor: int) -> NDArray[Any]:
-        """Return an array in its stored type: (N, components)."""
-        item = self.root["accessors"][accessor]
-        view = self.root["bufferViews"][item["bufferView"]]
-        start = view["byteOffset"] + item["byteOffset"]
-        dtype, width = np.dtype(_TYPES[item["componentType"]]), _SIZES[item["type"]]
-        whole = view.get("byteStride", width * dtype.itemsize) // dtype.itemsize
-        rows = np.frombuffer(self.buffer, dtype, item["count"] * whole, start)
-        return rows.reshape(item["count"], whole)[:, :width]
+    def __init__(self, path: Path, files: Sequence[bytes], unplaced: Sequence[int] = ()) -> None:
+        source, (first, *others) = Source(path, files[0]), files
+        if first[:4] == b"glTF":
+            self._document = open_document(source)
+        else:
+            root = parsed_json(source, first, has_lines=True)
+            for buffer in root.get("buffers", ()):
+                del buffer["uri"]
+            self._document = Document(source, root, memoryview(b"".join(others)))
+            self._document.buffers.n_bytes_read += sum(map(len, others))
+        self.root: dict[str, Any] = self._document.root.values
+        for node in unplaced:
+            del self.root["nodes"][node]["matrix"]
+        self.tree = read_tree(self._document)
 
     def floats(self, accessor: int) -> Floats:
-        """Return an array in double precision, normalised integers as fractions."""
-        values = self.array(accessor).astype(np.float64)
-        item = self.root["accessors"][accessor]
-        if not item.get("normalized"):
-            return values
-        most = np.iinfo(np.dtype(_TYPES[item["componentType"]])).max
-        return np.maximum(values / most, -1.0)
+        """Return an array, normalised integers as fractions: (N, components)."""
+        return self._document.accessors.floats(accessor, _ANY, "")
 
+    def integers(self, accessor: int) -> NDArray[np.int64]:
+        """Return an array of whole numbers: (N, components)."""
+        return self._document.accessors.integers(accessor, _ANY, "")
 
-def parsed(files: list[bytes]) -> GltfFile:
-    """Return a file from the bytes of a ``.glb``, or of a ``.gltf`` and its buffer."""
-    if files[0][:4] != b"glTF":
-        return GltfFile(json.loads(files[0]), files[1] if len(files) > 1 else b"")
-    (length,) = struct.unpack_from("<I", files[0], _HEAD)
-    end = _HEAD + _CHUNK + length
-    root = json.loads(files[0][_HEAD + _CHUNK : end])
-    return GltfFile(root, files[0][end + _CHUNK :])
+    def matrices(self, accessor: int) -> Floats:
+        """Return an array of matrices: (N, 4, 4)."""
+        return self._document.accessors.matrices(accessor, "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,10 +102,7 @@ def read_back(
     ``start``: frame of the figure that is the first in the file.
     ``sets``: number of influence sets to use, normalised to a sum of 1; all if omitted.
     """
-    nodes = file.root["nodes"]
-    parents = np.full(len(nodes), -1, dtype=np.int32)
-    for index, item in enumerate(nodes):
-        parents[item.get("children", [])] = index
+    nodes, parents = file.root["nodes"], file.tree.parents
     n_joints = len(tree.joints)
     bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
     joints = [*tree.joints, len(nodes) if tree.place < 0 else tree.place]
@@ -118,7 +112,7 @@ def read_back(
         item = nodes[placed.node]
         if "skin" in item:
             skin = file.root["skins"][item["skin"]]
-            stored = file.floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
+            stored = file.matrices(skin["inverseBindMatrices"])
             bound[: len(stored)] = stored @ np.linalg.inv(placed.decoding)
             joints[: len(skin["joints"])] = skin["joints"]
         elif placed.part.joint < 0:
@@ -129,7 +123,7 @@ def read_back(
         body, morphs = _body(file, meshes, keys, bound, targets, sets)
 
     def poses(rows: Rows) -> Poses:
-        world = _world(nodes, parents, keys, rows - start)
+        world = _world(file.tree, keys, rows - start)
         world = np.concatenate([world, np.broadcast_to(np.eye(4), (len(rows), 1, 4, 4))], axis=1)
         above = parents[tree.place] if tree.place >= 0 else -1
         if above >= 0:
@@ -148,25 +142,29 @@ def frame_keys(file: GltfFile) -> Keys:
     for animation in file.root.get("animations", ()):
         for channel in animation["channels"]:
             sampler = animation["samplers"][channel["sampler"]]
-            count = len(file.array(sampler["input"]))
+            count = len(file.floats(sampler["input"]))
             values = file.floats(sampler["output"]).reshape(count, -1)
             target = channel["target"]
             found[target["node"], target["path"]] = values
     return found
 
 
-def _world(nodes: list[dict[str, Any]], parents: Ints, keys: Keys, rows: Rows) -> Floats:
+def _world(tree: NodeTree, keys: Keys, rows: Rows) -> Floats:
     """Return the global matrices of all nodes: (F, N, 4, 4)."""
-    parts = {}
-    for path, default in _DEFAULTS.items():
-        values = np.array([item.get(path, default) for item in nodes], dtype=np.float64)
-        parts[path] = np.repeat(values[:, None], len(rows), axis=1)
-        for (node, what), moved in keys.items():
-            if what == path:
-                parts[path][node] = moved[rows]
+    still = {
+        "translation": tree.translations,
+        "rotation": tree.rotations,
+        "scale": tree.scales,
+    }
+    parts = {path: np.repeat(values[:, None], len(rows), axis=1) for path, values in still.items()}
+    for (node, path), moved in keys.items():
+        if path in parts:
+            parts[path][node] = moved[rows]
     rotations = parts["rotation"] / np.linalg.norm(parts["rotation"], axis=-1, keepdims=True)
     linear = quaternion_to_matrix(rotations) * parts["scale"][..., None, :]
-    return joint_worlds(parents, np.swapaxes(linear, 0, 1), np.swapaxes(parts["translation"], 0, 1))
+    return joint_worlds(
+        tree.parents, np.swapaxes(linear, 0, 1), np.swapaxes(parts["translation"], 0, 1)
+    )
 
 
 def _body(
@@ -239,7 +237,7 @@ def _skin(
     if not numbers:
         last = np.full(count, slot)
         return skin_from_entries(count, np.arange(count), last, np.ones(count), bound)
-    joints = np.concatenate([file.array(attributes[f"JOINTS_{n}"]) for n in numbers], axis=1)
+    joints = np.concatenate([file.integers(attributes[f"JOINTS_{n}"]) for n in numbers], axis=1)
     weights = np.concatenate([file.floats(attributes[f"WEIGHTS_{n}"]) for n in numbers], axis=1)
     if sets is not None:
         weights = weights / weights.sum(axis=1, keepdims=True)
