@@ -261,9 +261,9 @@ def test_error_while_loading_is_shown_and_the_scene_stays(streaming):
             if part.stop > 20:
                 raise FormatError(
                     Diagnostic(
-                        "F001.unreadable",
+                        "F001.unreadable: cannot be read: {reason}",
                         Path("take/000020.json"),
-                        values={"reason": "Input/output error", "near": ""},
+                        values={"reason": "Input/output error"},
                     )
                 )
             yield part
