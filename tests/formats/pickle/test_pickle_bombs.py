@@ -310,6 +310,15 @@ def test_huge_memo_index_does_not_allocate_memory() -> None:
     assert cost(lambda: opened(data)) < 1 << 20
 
 
+def test_nested_tuples_are_refused_as_a_key_before_they_are_hashed() -> None:
+    """Hashing a tuple hashes its items, on the stack of the process."""
+    assert refusal(saved(v=b"}N" + b"\x85" * 900_000 + b"Ns")) == (
+        "F002.pickle",
+        None,
+        {"problem": "expected a string or a number as a key, found a tuple"},
+    )
+
+
 @pytest.mark.parametrize("step", [b"N", b"(", b"]", b"}", b"2", b")"])
 def test_endless_opcodes_terminate(step: bytes) -> None:
     data = b"\x80\x02]" + step * 1_100_000

@@ -18,8 +18,6 @@ from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn,
 from viewer.formats._source import InvalidValueError
 from viewer.phrases import listed, printable
 
-__all__ = ["SPARSE", "as_key", "build", "call", "create", "find"]
-
 # Numpy 2 and scipy 1.8 renamed modules; files keep the old names. A rule for prefixes would be
 # unsafe: numpy.testing.runstring executes any string.
 _FACTORIES = ("dict", "list", "int", "float")  # allowed factories of defaultdict
