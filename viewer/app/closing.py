@@ -27,9 +27,7 @@ from viewer.data_classes import dataclass
 from viewer.formats import opened_text
 from viewer.phrases import printable
 from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.spring_motion import release_springs
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, pose_of
 from viewer.rig.scene import Actor, figure_pose
 
@@ -207,9 +205,9 @@ def _keys(state: AppState) -> list[_Unsaved]:
     """Return the edited keys, including those of animations that are not being played."""
     saved, found = state.of(SavedWork), list[_Unsaved]()
     for row, actor in enumerate(state.scene.actors):
-        name, clip = printable(actor.name, _LONGEST), actor.clip
+        name, clip = printable(actor.name, _LONGEST), actor.keyed
         is_read = any(animation.plays(clip) for animation in actor.figure.animations)
-        if isinstance(clip, Clip | TransformClip) and clip not in saved and not is_read:
+        if clip is not None and clip not in saved and not is_read:
             text = f"{name}: keys of {printable(clip.name, _LONGEST)}"
             found.append(_Unsaved(text, partial(_ask_for_keys, row=row, index=-1)))
         for index, aside in edited_aside(state.of(Animations), actor).items():
@@ -224,7 +222,7 @@ def _ask_for_keys(state: AppState, row: int, index: int) -> None:
     state.choose_actor(row)
     if index >= 0:
         choose_animation(state, index)
-    if isinstance(state.actor.clip, Clip):
+    if state.actor.keyed is not None and state.actor.transforms is None:
         ask_for_clip(state)
         return
     # Only an export of the whole motion contains all keys.

@@ -118,20 +118,17 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     ``actors``: actors with or without motions.
     ``rate``: frames per second; if omitted, the rate of the longest capture, or 30.
     """
-    from viewer.rig.captures.points import PointClip
-    from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.evaluation import scene_rate, time_span
-    from viewer.rig.motion.sampled_clip import SampledClip
     from viewer.rig.motion.timing import frame_at
 
-    captures = [a.clip for a in actors if isinstance(a.clip, SampledClip | PointClip)]
+    captures = [actor.captured for actor in actors if actor.captured is not None]
     longest = max(captures, key=lambda clip: clip.end - clip.start, default=None)
     own = scene_rate(actors)
     counted = rate or own
     first = longest.timing.first_frame if longest is not None and counted == own else 0
     start, end = time_span(actors)
     count = frame_at(end - start, counted) + 1
-    runs_on = any(isinstance(actor.clip, Clip) for actor in actors)
+    runs_on = any(actor.keyed and not actor.transforms for actor in actors)
     return Numbering(first, count, start, end, counted, runs_on, holds=not captures and not runs_on)
 
 

@@ -25,11 +25,11 @@ _NO_NAME = "(no name)"
 def describe_clip(clip: Motion) -> dict[str, Any]:
     """Return the description of a motion as JSON data."""
     facts: dict[str, Any] = {"name": clip.name, "range": [clip.start, clip.end]}
-    if isinstance(clip, Clip):
+    if clip.kind == "curves":
         return facts | _describe_keys(clip)
-    if isinstance(clip, TransformClip):
+    if clip.kind == "transforms":
         return facts | _describe_transforms(clip)
-    facts["kind"] = "points" if isinstance(clip, PointClip) else "sampled"
+    facts["kind"] = clip.kind
     return facts | _describe_timing(clip.timing) | _describe_rows(clip)
 
 
@@ -73,7 +73,7 @@ def _describe_timing(timing: Timing) -> dict[str, Any]:
 
 
 def _describe_rows(clip: SampledClip | PointClip) -> dict[str, Any]:
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         seen = clip.points[..., 3] > 0.0
         return {"points": clip.points.shape[1], "seen": float(seen.mean()) if seen.size else 0.0}
     shapes = 0 if clip.shape_weights is None else clip.shape_weights.shape[1]

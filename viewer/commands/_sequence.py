@@ -229,21 +229,11 @@ def _too_few(option: str, found: int, wanted: int) -> list[str]:
     return [f"--{option}: there {frames}, not {wanted}; no frame is shown twice"]
 
 
-def _moves_shapes(scene: Scene) -> bool:
-    """Return whether keyed transforms set weights of blend shapes."""
-    from viewer.rig.motion.transform_clip import TransformClip
-
-    clips = [actor.clip for actor in scene.actors if isinstance(actor.clip, TransformClip)]
-    return any(channel.path == "weights" for clip in clips for channel in clip.channels)
-
-
 def _overridden(pose: PoseOptions, scene: Scene) -> list[str]:
     """Return messages about shape and pose options that the motion overrides."""
-    from viewer.rig.motion.sampled_clip import SampledClip
-
     names = ["pose", "dof", "mirror"]
-    clips = [actor.clip for actor in scene.actors if isinstance(actor.clip, SampledClip)]
-    if any(clip.shape_weights is not None for clip in clips) or _moves_shapes(scene):
+    clips = [actor.joint_motion for actor in scene.actors]
+    if any(clip is not None and clip.sets_shape for clip in clips):
         names += ["shape", "expression"]
     given = [name for name in names if getattr(pose, name)]
     return [f"--{name}: applies only to figures without a motion" for name in given]

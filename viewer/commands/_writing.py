@@ -25,9 +25,7 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import PERSON, is_together
 from viewer.phrases import agree, all_of, counted, printable
-from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
-from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.single_frame import upright_single_frame
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
 from viewer.rig.motion.timing import frame_at
@@ -63,9 +61,9 @@ def _is_motion(key: str, frames: Frames, output: Path, scene: Scene) -> bool:
         return True
     if not any("pose" in kind.stores for kind in kinds):
         return True
-    moves = any(isinstance(actor.clip, JointMotion) for actor in scene.actors)
+    moves = any(actor.joint_motion for actor in scene.actors)
     if any("points" in kind.stores for kind in kinds) and scene.actors:
-        moves = moves or all(isinstance(actor.clip, PointClip) for actor in scene.actors)
+        moves = moves or all(actor.moves_points for actor in scene.actors)
     # Many files are written on request only.
     return (
         moves and not frames.is_one and not any(kind.is_numbered for kind in exporters_at(output))
@@ -171,7 +169,7 @@ def _whole_motion(
 ) -> Part:
     """Return the requested frames of an actor."""
     fills = frames.interpolates
-    if isinstance(actor.clip, PointClip):
+    if actor.moves_points:
         if options.gaps not in ("", "interpolate"):
             raise ViewerError(f"--gaps: expected interpolate for keypoints, found {options.gaps}")
         fills = options.gaps == "interpolate"
@@ -183,7 +181,7 @@ def _exporter(kind: str, frames: Frames, output: Path, scene: Scene) -> str:
     """Return the requested exporter, or the first one for the suffix and the figures."""
     exporters_of(output, "frames")
     first = _written_actors(frames, output, scene)[0]
-    if isinstance(first.clip, PointClip):
+    if first.moves_points:
         (key,) = exporters_of(output, "points")
         if kind not in ("", key):
             exporters_of("", "points")
@@ -298,14 +296,14 @@ def _pose_note(frames: Frames, scene: Scene) -> Diagnostic:
 
 
 def _moving(scene: Scene) -> list[Actor]:
-    return [actor for actor in scene.actors if isinstance(actor.clip, JointMotion)]
+    return [actor for actor in scene.actors if actor.joint_motion]
 
 
 def _left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
     """Return notes about omitted data: still figures, and keypoints of people with bodies."""
     left = [actor for actor in scene.actors if actor not in written]
     still = [actor.name for actor in left if actor.clip is None]
-    points = [actor.name for actor in left if isinstance(actor.clip, PointClip)]
+    points = [actor.name for actor in left if actor.moves_points]
     moves = any(actor.clip is not None for actor in written)
     key = (
         "X003.no-motion: {figure}: no motion, not written"
@@ -326,7 +324,7 @@ def _left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
 
 def _pose_or_point_actors(scene: Scene) -> list[Actor]:
     """Return the actors whose current pose is written: captured points only if there is no body."""
-    figures = [actor for actor in scene.actors if not isinstance(actor.clip, PointClip)]
+    figures = [actor for actor in scene.actors if not actor.moves_points]
     return figures or list(scene.actors)
 
 
@@ -346,7 +344,7 @@ def _moving_actors(scene: Scene) -> list[Actor]:
     Raises RigError if nothing moves.
     """
     moving = [actor for actor in scene.actors if actor.clip is not None]
-    bodies = [actor for actor in moving if not isinstance(actor.clip, PointClip)]
+    bodies = [actor for actor in moving if not actor.moves_points]
     if not moving:
         raise RigError("no file has a motion: a motion cannot be written")
     return bodies or moving
@@ -355,7 +353,7 @@ def _moving_actors(scene: Scene) -> list[Actor]:
 def bake_springs(bakes: bool, fps: float | None, scene: Scene, output: Path) -> list[Diagnostic]:
     """Replace motions of figures with spring joints by frames, if requested; return notes."""
     holds_motion = not any(kind.joints == "human" for kind in exporters_at(output))
-    actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
+    actors = [actor for actor in scene.actors if actor.joint_motion and has_springs(actor)]
     actors = actors if holds_motion else []
     if bakes and not holds_motion:
         raise ViewerError(

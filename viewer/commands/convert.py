@@ -71,7 +71,6 @@ from viewer.loading import Contents, MotionSettings, begin
 from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import printable
 from viewer.rig.motion.sampled_animation import SampledAnimation, frame_range
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
@@ -316,9 +315,7 @@ def _opened(asked: SceneOptions, options: ExportOptions) -> _Request | None:
     scene, _ = begin(contents, settings)
     warnings = [*scene.diagnostics, *apply_pose(scene, asked.pose, asked.frames)]
     actor = scene.actors[0]
-    assert isinstance(actor.clip, SampledClip)  # that of the stream
-    span = frame_range(
-        actor.clip, actor.clip.timing.frame_rate, requested_frames(asked.frames, actor)
-    )
+    clip = actor.require_clip()
+    span = frame_range(clip, clip.frame_rate, requested_frames(asked.frames, actor))
     up = sampled("bvh", options, scene, actor, frames=(0, 1)).up
     return _Request(stream, settings, scene, warnings, span, up)

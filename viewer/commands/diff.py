@@ -340,10 +340,10 @@ def _with_clips(
     ``lone``: the unpaired actors of the same scene; their clips may belong to paired actors.
     ``partners``: the motion of each actor's counterpart.
     """
-    pool = [actor.clip for actor in (*actors, *lone) if isinstance(actor.clip, Clip)]
+    pool = [c for actor in (*actors, *lone) if (c := actor.clip) is not None and c.kind == "curves"]
     if not pool:
         return list(actors), []
-    moves = [actor.clip is None or isinstance(actor.clip, Clip) for actor in actors]
+    moves = [actor.clip is None or actor.clip.kind == "curves" for actor in actors]
     dealt: dict[int, Clip] = {}
     for rank in range(_N_RANKS):
         for index, (actor, partner) in enumerate(zip(actors, partners, strict=True)):
@@ -363,7 +363,7 @@ def _with_clips(
 
 def _rank(clip: Clip, actor: Actor, partner: Motion | None) -> int:
     """Return the rank of a clip's match with the other motion: 0 is best, ``_N_RANKS`` no match."""
-    if isinstance(partner, Clip) and clip.name == partner.name:
+    if partner is not None and (partner.kind, partner.name) == (clip.kind, clip.name):
         return 0
     if clip is actor.clip:
         return 1

@@ -61,7 +61,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_animation import baked
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.skinning import joint_matrices, posed_mesh
@@ -431,10 +430,9 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
     scene = load(*template, resolve(name), motion=MotionSettings(frame_rate=fps))
     print_warnings(scene.diagnostics)
     for actor in scene.actors:
-        if actor.figure.is_attached and isinstance(actor.clip, TransformClip):
-            return baked(actor.figure, actor.clip, fps)
-        if actor.figure.is_attached and isinstance(actor.clip, Clip | SampledClip):
-            return actor.clip
+        clip = actor.joint_motion
+        if actor.figure.is_attached and clip is not None:
+            return baked(actor.figure, clip, fps) if clip.kind == "transforms" else clip
     raise RigError(f"--clip: expected a motion of the template, found none in {printable(name)}")
 
 

@@ -21,7 +21,6 @@ from viewer.phrases import all_of, printable
 from viewer.phrases import counted as counted_text
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.points import PointClip
 from viewer.rig.captures.sampled_points import sample_upright_points
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import upright_animation
@@ -327,7 +326,7 @@ def sampled(
     ``viewer.rig.motion.sampled_animation.upright_animation``.
     """
     check_figure(key, actor.figure)
-    if isinstance(actor.clip, PointClip):
+    if actor.moves_points:
         return Part(actor, None, *sample_upright_points(scene, actor, rate, frames, interpolate))
     keeps_world = EXPORTERS[key].keeps_world and not options.up
     found = upright_animation(scene, actor, rate, frames, interpolate, keeps_world)

@@ -14,7 +14,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.motion.evaluation import Frames, JointMotion
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.transform_clip import TransformClip, is_regular
+from viewer.rig.motion.transform_clip import is_regular
 from viewer.rig.skeleton import Skeleton
 
 _NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
@@ -96,7 +96,7 @@ def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnosti
 def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
     """Return a note about the rate that was chosen for keys at irregular times."""
     motion, rate = animation.motion, animation.frame_rate
-    if not isinstance(motion, TransformClip) or is_regular(motion) or rate != motion.frame_rate:
+    if motion.kind != "transforms" or is_regular(motion) or rate != motion.frame_rate:
         return []
     return [
         Diagnostic(

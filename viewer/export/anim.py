@@ -55,7 +55,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         raise RigError(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
-    if isinstance(animation.motion, Clip) and _is_whole(animation, animation.motion):
+    if animation.motion.kind == "curves" and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
             write(animation.motion, path)
         has_keys = animation.motion.end > animation.motion.start
@@ -167,7 +167,7 @@ def _dofs(animation: SampledAnimation, skeleton: Skeleton, frames: Frames) -> Fl
     dofs = np.zeros((frames.n_frames, skeleton.n_dofs))
     dofs[:, 3:] = angles[..., ::-1].reshape(frames.n_frames, -1)
     dofs[:, :3] = frames.translations[:, 0]
-    if isinstance(animation.motion, Clip):
+    if animation.motion.kind == "curves":
         # Use the clip's own angles instead of equivalent ones.
         targets, values = evaluate_all(animation.motion, frames.times)
         dofs[:, targets] = values

@@ -9,7 +9,6 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.lint._finding import Finding
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skinning import Skinning, deform, joint_matrices
@@ -76,7 +75,7 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
     joints, figure = finding.joints, actor.figure
     if finding.part == "clip" and not _names_places(finding):
         return _middle(actor)
-    if len(joints) and isinstance(actor.clip, PointClip):
+    if len(joints) and actor.moves_points:
         if actor.points is None:
             return np.zeros((0, 3))
         seen = actor.points[joints]
@@ -90,7 +89,7 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
 def _middle(actor: Actor) -> Floats:
     """Return the positions that stand for an actor: its roots or the mean of its points, (N, 3)."""
     figure, points = actor.figure, actor.points
-    if isinstance(actor.clip, PointClip):
+    if actor.moves_points:
         seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]
         middle = seen.mean(axis=0, keepdims=True) if len(seen) else seen
         return apply_transform(actor.placement, middle)

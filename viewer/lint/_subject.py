@@ -21,7 +21,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.lint._finding import NO_TIMES, Finding, LintOptions
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.captures.points import PointClip
 from viewer.rig.feet.body import body_size
 from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import legs_of
@@ -39,7 +38,6 @@ from viewer.rig.motion.evaluation import (
     time_span,
     world_frames,
 )
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene
@@ -241,10 +239,10 @@ def track_of(subject: Subject) -> Track | None:
 
 def _track(subject: Subject) -> Track | None:
     actor = subject.actor
-    figure, clip, skeleton = actor.figure, actor.clip, actor.figure.skeleton
-    if clip is None or skeleton is None or isinstance(clip, PointClip):
+    figure, clip, skeleton = actor.figure, actor.joint_motion, actor.figure.skeleton
+    if clip is None or skeleton is None:
         return None
-    if isinstance(clip, SampledClip):
+    if clip.timing is not None:
         timing = clip.timing
         count = timing.n_frames
         times = timing.start + np.arange(count) / timing.frame_rate
@@ -296,7 +294,7 @@ def _track(subject: Subject) -> Track | None:
 def _stepped(clip: JointMotion, skeleton: Skeleton, times: Floats) -> Bools:
     """Return where keys without interpolation move a joint or its ancestors: (F, J)."""
     result = np.zeros((len(times), skeleton.n_joints), dtype=np.bool_)
-    if not isinstance(clip, TransformClip):
+    if clip.kind != "transforms":
         return result
     for channel in clip.channels:
         if channel.joint >= 0 and channel.interpolation == "step":
@@ -337,7 +335,7 @@ def frame_numbers(subject: Subject, times: Floats) -> Ints:
 
 def _known(subject: Subject, clip: JointMotion, count: int) -> Bools:
     """Return which frames have valid data from the file: (F,)."""
-    if not isinstance(clip, SampledClip):
+    if clip.timing is None:
         return np.ones(count, dtype=np.bool_)
     rows = clip.timing.rows
     return subject.valid("frames", clip.n_rows)[rows] | (rows < 0)
@@ -367,11 +365,8 @@ def counting_of(scene: Scene, keyed_rate: float) -> Counting:
     consists of frames.
     """
     moving = [actor for actor in scene.actors if actor.clip is not None]
-    captured = [actor for actor in moving if isinstance(actor.clip, SampledClip | PointClip)]
+    captured = [(each.timing, actor.offset) for actor in moving if (each := actor.captured)]
     if not captured:
         return Counting(keyed_rate, time_span(moving)[0])
-    longest = max(captured, key=lambda actor: np.subtract(*time_span([actor])[::-1]))
-    clip = longest.clip
-    assert isinstance(clip, SampledClip | PointClip)  # only sampled motions were collected
-    timing = clip.timing
-    return Counting(clip.frame_rate, timing.start + longest.offset, timing.first_frame)
+    timing, offset = max(captured, key=lambda one: one[0].end - one[0].start)
+    return Counting(timing.frame_rate, timing.start + offset, timing.first_frame)

@@ -22,8 +22,8 @@ _SIZES = 15.0  # maximum speed of a point, in bounding box diagonals of the poin
 
 def check(subject: Subject) -> list[Finding]:
     """Check the clip of a figure that consists of captured points."""
-    clip, layout = subject.actor.clip, subject.actor.figure.points
-    if not isinstance(clip, PointClip) or layout is None:
+    clip, layout = subject.actor.captured, subject.actor.figure.points
+    if clip is None or clip.points is None or layout is None:
         return []
     count = clip.points.shape[1]
     names = [*layout.names, *(f"point {k}" for k in range(len(layout.names), count))]

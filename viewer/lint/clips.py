@@ -12,9 +12,7 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject, Track, frame_numbers, key_times, track_of
 from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip, evaluate_all
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import Skeleton, joint_labels
@@ -29,13 +27,13 @@ _MOST = 20_000  # maximum number of times at which curves are compared with thei
 
 def check(subject: Subject) -> list[Finding]:
     """Check the clip of an actor with a skeleton."""
-    clip, skeleton = subject.actor.clip, subject.actor.figure.skeleton
-    if clip is None or skeleton is None or isinstance(clip, PointClip):
+    clip, skeleton = subject.actor.joint_motion, subject.actor.figure.skeleton
+    if clip is None or skeleton is None:
         return []
     findings = []
-    if isinstance(clip, SampledClip):
+    if clip.timing is not None:
         findings += missing_frames(subject, clip.timing)
-    elif isinstance(clip, Clip):
+    elif clip.kind == "curves":
         findings += _keys(subject, clip)
         findings += _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:

@@ -12,7 +12,6 @@ from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frames import runs_of
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.skeleton import joint_labels
 
 _LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms
@@ -34,10 +33,10 @@ _TOGETHER = 2000  # frames per batch
 
 def check(subject: Subject) -> list[Finding]:
     """Check the joints or points of a captured motion."""
-    clip = subject.actor.clip
-    if isinstance(clip, PointClip):
+    clip = subject.actor.captured
+    if clip is not None and clip.points is not None:
         return _points(subject, clip)
-    if not isinstance(clip, SampledClip) or clip.timing.frame_rate < _SLOWEST:
+    if clip is None or clip.frame_rate < _SLOWEST:
         return []
     track = track_of(subject)
     skeleton = subject.actor.figure.skeleton

@@ -11,10 +11,8 @@ from viewer.lint._subject import Indices, Subject
 from viewer.phrases import counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
-from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import frames_of, rest_translations_of
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
@@ -65,10 +63,10 @@ def check(subject: Subject) -> list[Finding]:
 
 def _are_alike(one: Actor, other: Actor) -> bool:
     """Return whether two people are on one timeline, both as bodies or both as points."""
-    a, b = one.clip, other.clip
-    if not isinstance(a, SampledClip | PointClip) or type(a) is not type(b):
+    a, b = one.captured, other.captured
+    if a is None or b is None or a.kind != b.kind:
         return False
-    if one.offset != other.offset or one.title != other.title or b is None:
+    if one.offset != other.offset or one.title != other.title:
         return False
     first, second = a.timing, b.timing
     return (first.frame_rate, first.first_frame, first.n_frames) == (
@@ -147,10 +145,10 @@ def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[
 
 def _path(actor: Actor) -> _Path | None:
     """Return the path of a captured person; None without a captured motion."""
-    clip, figure = actor.clip, actor.figure
+    clip, figure = actor.captured, actor.figure
     turn, place = actor.placement[:3, :3], actor.placement[:3, 3]
     scale = float(np.cbrt(abs(np.linalg.det(turn))))
-    if isinstance(clip, PointClip):
+    if clip is not None and clip.points is not None:
         points = clip.points[np.maximum(clip.timing.rows, 0)]
         seen = points[..., 3:] > 0.0
         present = clip.timing.present & seen.any(axis=(1, 2))
@@ -161,7 +159,7 @@ def _path(actor: Actor) -> _Path | None:
         sizes = np.linalg.norm(high[present] - low[present], axis=1)
         size = float(np.median(sizes)) if len(sizes) else 0.0
         return _Path(clip.timing, present, means @ turn.T + place, scale * size)
-    if not isinstance(clip, SampledClip) or figure.skeleton is None:
+    if clip is None or figure.skeleton is None:
         return None
     times = clip.timing.start + np.arange(clip.timing.n_frames) / clip.timing.frame_rate
     frames = frames_of(figure, clip, times, actor.pose)

@@ -9,7 +9,6 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
 from viewer.phrases import counted, listed, optional
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.faults import are_singular, weight_faults
 from viewer.rig.motion.evaluation import frames_of, pose_of
@@ -177,11 +176,11 @@ def _label(subject: Subject, joint: int) -> str:
 
 def _some_poses(actor: Actor) -> list[Pose]:
     """Return the rest pose, the current pose, and some poses of the clip, or else random ones."""
-    figure, clip = actor.figure, actor.clip
+    figure, clip = actor.figure, actor.joint_motion
     assert figure.skeleton is not None and actor.pose is not None  # checked by the callers
     rest = figure_pose(figure)
     poses = [rest, actor.pose]
-    if clip is not None and not isinstance(clip, PointClip):
+    if clip is not None:
         times = np.linspace(clip.start, clip.end, _COUNT)
         frames = frames_of(figure, clip, times, actor.pose, interpolate=True)
         return poses + [

@@ -85,7 +85,7 @@ def _cleaned_in(in_space: Callable[[str], Scene], wanted: CleanUp, space: str) -
 def _cleaned_again(scene: Scene, actor: Actor, wanted: CleanUp, clip: SampledClip) -> SampledClip:
     """Return a motion that was retargeted again, cleaned up in the same way."""
     found = _cleaned(scene, replace(actor, clip=clip), clip, wanted)[0]
-    return found if isinstance(found, SampledClip) else clip
+    return clip if found.points is not None else found
 
 
 def _start(actors: Iterable[Actor]) -> float:
@@ -128,7 +128,7 @@ def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured
 def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[Diagnostic]]:
     """Return a motion whose feet do not slide during ground contact."""
     figure = actor.figure
-    if isinstance(clip, PointClip) or not legs_of(figure.require_skeleton()):
+    if clip.points is not None or not legs_of(figure.require_skeleton()):
         return clip, [
             Diagnostic(
                 "X006.no-legs: {figure}: feet not held, because no joint has the name of a leg",
@@ -180,7 +180,7 @@ def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[
 def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
     """Return a motion whose feet rest at height 0 of the scene."""
     found = resting_height(replace(actor, clip=clip), scene.up)
-    if found is None or isinstance(clip, PointClip):
+    if found is None or clip.points is not None:
         return clip, Diagnostic(
             "X006.no-feet: {figure}: not moved to the ground, because it has neither feet with "
             "a mesh nor joints of known names",
@@ -319,10 +319,10 @@ def _note(
     """Return a note that ends with the displacement of joints or points."""
     figure = actor.figure
     labels: Sequence[str] = ()
-    if isinstance(before, SampledClip) and isinstance(after, SampledClip):
+    if before.points is None and after.points is None:
         found = joint_displacement(figure, before, after)
         labels, part = joint_labels(figure.require_skeleton()), Phrase("joints")
-    elif isinstance(before, PointClip) and isinstance(after, PointClip):
+    elif before.points is not None and after.points is not None:
         found = point_displacement(before, after)
         labels = () if figure.points is None else figure.points.names
         part = Phrase("points")
@@ -367,7 +367,7 @@ def _merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
 
 def _renumbered(actor: Actor, person: int) -> Diagnostic:
     """Return a note about a body or keypoints that the first person did not have."""
-    part = Phrase("keypoints" if isinstance(actor.clip, PointClip) else "body")
+    part = Phrase("keypoints" if actor.moves_points else "body")
     values = {"part": part, "other": person_label(actor.person or 0), "kept": person_label(person)}
     return Diagnostic("X006.renumbered: {part} of {other} assigned to {kept}", values=values)
 
@@ -409,7 +409,7 @@ def _joined_drives(first: Drive | None, second: Drive | None) -> Drive | None:
         return None
     motion = first.motion
     clip = joined_tracks(motion.clip, second.motion.clip)
-    assert isinstance(clip, SampledClip)  # both clips are sampled
+    assert clip.points is None  # both clips move joints
     return replace(first, motion=replace(motion, clip=clip))
 
 
@@ -440,7 +440,7 @@ def _apart(
 
 def _places(figure: Figure, clip: Captured, frames: Ints) -> Floats:
     """Return the positions of a person, of the root or the mean of the visible points: (F, 3)."""
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         points = clip.points[clip.timing.rows[frames]]
         seen = (points[..., 3:] > 0.0).astype(float)
         return (points[..., :3] * seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1.0)
@@ -449,7 +449,7 @@ def _places(figure: Figure, clip: Captured, frames: Ints) -> Floats:
 
 
 def _size(figure: Figure, clip: Captured) -> float:
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         points = clip.points.reshape(-1, clip.points.shape[1], 4)
         sizes = [
             box_size(bounding_box(row[row[:, 3] > 0.0, :3]))

@@ -115,6 +115,31 @@ class Actor:
         """Whether it is drawn: visible and present at the current time."""
         return self.visible and self.is_present
 
+    @property
+    def joint_motion(self) -> Clip | TransformClip | SampledClip | None:
+        """Its motion if that moves joints, not captured points."""
+        return self.clip if self.clip is not None and self.clip.points is None else None
+
+    @property
+    def moves_points(self) -> bool:
+        """Whether its motion moves captured points."""
+        return self.clip is not None and self.clip.points is not None
+
+    @property
+    def keyed(self) -> Clip | TransformClip | None:
+        """Its motion if that consists of keys, not of frames."""
+        return self.clip if self.clip is not None and self.clip.timing is None else None
+
+    @property
+    def captured(self) -> SampledClip | PointClip | None:
+        """Its motion if that consists of frames, not of keys."""
+        return self.clip if self.clip is not None and self.clip.timing is not None else None
+
+    @property
+    def transforms(self) -> TransformClip | None:
+        """Its motion if that is an animation of keyed transforms."""
+        return self.clip if self.clip is not None and self.clip.kind == "transforms" else None
+
     def __post_init__(self) -> None:
         if self.pose is None and self.figure.skeleton is not None:
             self.pose = figure_pose(self.figure)

@@ -7,10 +7,8 @@ from dataclasses import field
 from typing import NamedTuple
 
 from viewer.data_classes import dataclass
-from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import pose_actors, scene_rate, time_span
 from viewer.rig.motion.timing import DEFAULT_RATE, frame_at
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene
 
@@ -112,7 +110,7 @@ class Clock:
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
         keyed, sampled = list[Actor](), list[Actor]()
         for actor in moving:
-            (keyed if isinstance(actor.clip, Clip | TransformClip) else sampled).append(actor)
+            (sampled if actor.captured else keyed).append(actor)
         if not self._is_rate_set:
             self.keyed_rate = scene_rate(keyed)
         self.has_motion, self.has_frames = bool(moving), bool(sampled)
@@ -126,9 +124,9 @@ class Clock:
 
     def _count(self, actor: Actor | None) -> None:
         """Count the frames of an actor's capture; for None, frames at the rate of keyed clips."""
-        clip = None if actor is None else actor.clip
+        clip = None if actor is None else actor.captured
         old_rate, old_origin, old_grid = self.frame_rate, self.origin, self._grid
-        if actor is None or clip is None or isinstance(clip, Clip | TransformClip):
+        if actor is None or clip is None:
             self.frame_rate, self.first_frame = self.keyed_rate, 0
             self.origin, self._grid = self.whole[0], ()
             return

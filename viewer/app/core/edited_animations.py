@@ -21,7 +21,7 @@ class Animations:
 
 def edited_aside(animations: Animations, actor: Actor) -> dict[int, TransformClip]:
     """Return the edited keys of the animations that an actor does not play now, by index."""
-    playing = actor.animation if isinstance(actor.clip, TransformClip) else -1
+    playing = -1 if actor.transforms is None else actor.animation
     found = animations.edited.items()
     return {index: clip for (owner, index), clip in found if owner is actor and index != playing}
 

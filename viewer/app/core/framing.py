@@ -16,8 +16,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box
 from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene, scene_points
 
@@ -222,11 +220,7 @@ def _growing(first: int, last: int) -> list[int]:
 
 def _own_shape(actor: Actor) -> bytes:
     """Return a key that identifies an actor's shape; empty if its motion sets the shape."""
-    clip, is_driven = actor.clip, False
-    if isinstance(clip, SampledClip):
-        is_driven = clip.shape_weights is not None
-    elif isinstance(clip, TransformClip):
-        is_driven = any(channel.path == "weights" for channel in clip.channels)
+    is_driven = actor.joint_motion is not None and actor.joint_motion.sets_shape
     return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
 
 

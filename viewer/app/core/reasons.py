@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.sampled_clip import SampledClip
 
 
 def no_motion(state: AppState) -> str:
@@ -39,7 +37,7 @@ def no_drive(state: AppState) -> str:
     A motion that matches too few joints does not move the figure yet.
     """
     actor = state.actor
-    if actor.drive is not None and (actor.clip is None or isinstance(actor.clip, SampledClip)):
+    if actor.drive is not None and actor.keyed is None:
         return ""
     return "no motion of another skeleton drives this figure"
 
@@ -62,7 +60,7 @@ def no_new_clip(state: AppState) -> str:
 
 def nothing_to_export(state: AppState) -> str:
     """Return the reason why no motion can be written."""
-    if any(isinstance(actor.clip, JointMotion) for actor in state.scene.actors):
+    if any(actor.joint_motion for actor in state.scene.actors):
         return ""
     if state.clock.has_motion:
         return "only captured points move; there are no joints to export"

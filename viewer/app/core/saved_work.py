@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from dataclasses import field
 
 from viewer.data_classes import dataclass
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import PoseKey
 from viewer.rig.scene import Actor
 
@@ -37,8 +35,7 @@ class SavedWork:
     def add_actors(self, actors: Iterable[Actor]) -> None:
         """Record the keys and the joint maps of actors that were read from files."""
         for actor in actors:
-            if isinstance(actor.clip, Clip | TransformClip):
-                self.add(actor.clip)
+            self.add(actor.keyed)
             if actor.drive is not None:
                 self.add(actor.drive.joint_map)
 

@@ -10,8 +10,7 @@ from typing import Protocol
 from viewer.app.core.scene_version import ActorVersion, SceneVersion, version_of
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.sampled_clip import SampledClip, with_rate
+from viewer.rig.motion.sampled_clip import with_rate
 from viewer.rig.pose import PoseKey, pose_of
 from viewer.rig.scene import Actor, Motion, Scene
 
@@ -269,11 +268,9 @@ def _extended(old: ActorVersion, new: ActorVersion | None) -> ActorVersion:
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
     """Return an earlier step's clip, extended by the frames read since then."""
-    if isinstance(old, SampledClip) and isinstance(new, SampledClip):
-        return with_rate(new, old.timing.frame_rate)
-    if isinstance(old, PointClip) and isinstance(new, PointClip):
-        return with_rate(new, old.timing.frame_rate)
-    return old
+    if old is None or new is None or old.timing is None or new.timing is None:
+        return old
+    return with_rate(new, old.frame_rate) if old.kind == new.kind else old
 
 
 def _is_same(one: _Snapshot, other: _Snapshot) -> bool:

@@ -41,7 +41,7 @@ from viewer.app.curves.editing import (
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
 from viewer.app.files.files import offer_files
 from viewer.rig.arrays import Floats
-from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
+from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Tangent, slopes
 from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
 
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
@@ -225,7 +225,7 @@ def _draw_tools(state: AppState) -> None:
         key_present_pose(state)
     if _button_beside(state, "Key changes", "key only the values that differ from the clip"):
         key_present_pose(state, only_changed=True)
-    if isinstance(state.actor.clip, Clip) and _button_beside(
+    if state.actor.transforms is None and _button_beside(
         state, "Save clip…", "save the clip as .anim"
     ):
         ask_for_clip(state)

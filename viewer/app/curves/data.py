@@ -70,21 +70,21 @@ def curves_of(actor: Actor) -> tuple[Curve, ...]:
     animation has the figure's position and each joint's angles about x, y and z (R = Rz Ry Rx);
     captured points have their coordinates.
     """
-    skeleton, points = actor.figure.skeleton, actor.figure.points
-    if isinstance(actor.clip, PointClip) and points is not None:
-        return _point_curves(points)
-    if skeleton is None or isinstance(actor.clip, PointClip):
+    skeleton, clip = actor.figure.skeleton, actor.clip
+    if clip is not None and clip.kind == "points":
+        return () if actor.figure.points is None else _point_curves(actor.figure.points)
+    if skeleton is None:
         return ()
-    if isinstance(actor.clip, TransformClip):
-        return _of_transforms.get(actor.clip, id(skeleton), partial(_transform_curves, actor))
-    if isinstance(actor.clip, SampledClip):
+    if actor.transforms is not None:
+        make = partial(_transform_curves, actor, actor.transforms)
+        return _of_transforms.get(actor.transforms, id(skeleton), make)
+    if actor.captured is not None:
         return _of_skeleton.get(skeleton, "frames", lambda: _joint_curves(skeleton))
     return _of_skeleton.get(skeleton, "keys", lambda: _dof_curves(skeleton))
 
 
-def _transform_curves(actor: Actor) -> tuple[Curve, ...]:
-    skeleton, clip, shapes = actor.figure.require_skeleton(), actor.clip, actor.figure.blend_shapes
-    assert isinstance(clip, TransformClip)  # checked by the caller
+def _transform_curves(actor: Actor, clip: TransformClip) -> tuple[Curve, ...]:
+    skeleton, shapes = actor.figure.require_skeleton(), actor.figure.blend_shapes
     labels = [printable(label, 60) for label in joint_labels(skeleton)]
     return tuple(
         Curve(labels[row.joint], row.joint, _PREFIXES[row.path] + _AXES[row.component],
@@ -177,7 +177,7 @@ def _line(clip: SampledClip | PointClip, row: int, first: int, step: int) -> Poi
     rows = timing.rows[frames]
     present = rows >= 0
     values = np.full(len(frames), np.nan)
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         seen = clip.points[rows[present], row // 3]
         values[present] = np.where(seen[:, 3] > 0.0, seen[:, row % 3], np.nan)
     elif row < 3:

@@ -390,9 +390,9 @@ def keyed_of(actor: Actor) -> KeyedMotion | None:
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None:
         return None
-    if isinstance(clip, Clip):
+    if clip is not None and clip.kind == "curves":
         return DofKeys(clip, skeleton)
-    return TransformKeys(clip, skeleton) if isinstance(clip, TransformClip) else None
+    return None if actor.transforms is None else TransformKeys(actor.transforms, skeleton)
 
 
 def can_have_keys(state: AppState) -> bool:
@@ -423,7 +423,7 @@ def key_present_pose(state: AppState, only_changed: bool = False) -> None:
 
 def _n_keys(clip: Motion | None) -> int:
     """Return the number of keys of a clip."""
-    if not isinstance(clip, Clip | TransformClip):
+    if clip is None or clip.timing is not None:
         return 0
     return sum(len(channel.times) for channel in clip.channels)
 
@@ -443,5 +443,5 @@ def ask_for_clip(state: AppState) -> None:
 def save_clip(state: AppState, path: Path) -> None:
     """Write the chosen actor's clip if it is keyed."""
     clip = state.actor.clip
-    if isinstance(clip, Clip):
+    if clip is not None and clip.kind == "curves":
         save_files(state, lambda: write(clip, path), [path], saved=clip)

@@ -30,9 +30,7 @@ from viewer.app.curves.editing import (
 from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.points import PointClip
 from viewer.rig.memo import Memo
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Motion
 
@@ -175,7 +173,7 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     if keyed is not None:
         shown = keyed.values(rows, np.linspace(low, high, _MOST_SAMPLES))
         parts.append((shown * factors).ravel())
-    elif isinstance(clip, SampledClip | PointClip):
+    elif clip is not None and clip.timing is not None:
         parts += [
             factor * sampled_points(clip, row, low, high)[1]
             for row, factor in zip(rows, factors, strict=True)
@@ -193,7 +191,7 @@ def _draw_line(plot: _Plot, row: int) -> None:
     """Draw one curve, solid between its keys and dashed where extrapolated."""
     clip, color, factor = plot.state.actor.clip, plot.color(row), plot.factor(row)
     low, high = plot.limits[:2]
-    if isinstance(clip, SampledClip | PointClip):
+    if clip is not None and clip.timing is not None:
         times, values = sampled_points(clip, row, low, high)
         implot.plot_line(f"##{row}", times, factor * values, _spec(color))
         return

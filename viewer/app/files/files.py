@@ -255,9 +255,9 @@ def keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
     """Set the frame rate of new people to that of the people in the scene."""
     for first in known:
         for actor in new:
-            if actor.clip is not None and actor.clip.timing is not None:
+            if actor.captured is not None:
                 rate = DEFAULT_RATE if first.clip is None else first.clip.frame_rate
-                actor.clip = with_rate(actor.clip, rate)
+                actor.clip = with_rate(actor.captured, rate)
 
 
 def ask_for_files(state: AppState) -> None:

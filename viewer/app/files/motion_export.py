@@ -39,14 +39,9 @@ from viewer.formats import all_or_none, check_folder_target, check_targets, file
 from viewer.phrases import agree, all_of, counted, printable
 from viewer.progress import part_of_work, report
 from viewer.rig.bodies.smpl_family import member_of
-from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.timing import frame_at
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
 
@@ -132,7 +127,7 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
 
 def _moving_actors(state: AppState) -> list[Actor]:
     """Return the actors whose joints are moved by a motion."""
-    return [a for a in state.scene.actors if isinstance(a.clip, JointMotion)]
+    return [actor for actor in state.scene.actors if actor.joint_motion]
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -251,7 +246,7 @@ def _motions(
         # Edits made during the export must not change the written motion.
         copied = selected[index] = actor.copy()
         copied.figure = with_edited_keys(state.of(Animations), actor)
-        if actor.springs is not None and isinstance(actor.clip, JointMotion):
+        if actor.springs is not None and actor.joint_motion:
             copied.springs = None
             release_springs(copied)
             springs = actor.figure.require_skeleton().springs
@@ -263,13 +258,13 @@ def _motions(
                 "remedy": Remedy("can write", "--bake-springs writes"),
             }
             notes.append(Diagnostic(wording.SPRINGS, values=values))
-        is_keyed = isinstance(actor.clip, Clip | TransformClip)
+        is_keyed = actor.keyed is not None
         rate = state.clock.frame_rate if is_keyed else None
         saved = () if frames is not None else _written_keys(state, actor, file)
         motions.append(_Motion(copied, file, frames, rate, saved))
     if not motions:
         raise RigError("all actors are absent in the playback range: nothing to export")
-    points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
+    points = [actor for actor in state.scene.actors if actor.moves_points]
     if everyone and points:
         names = [actor.name for actor in points]
         notes.append(
@@ -329,7 +324,7 @@ def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
     clock, clip = state.clock, actor.clip
     if (clock.start, clock.end) == clock.whole or clip is None:
         return None
-    rate = clip.timing.frame_rate if isinstance(clip, SampledClip) else clock.frame_rate
+    rate = clock.frame_rate if clip.timing is None else clip.frame_rate
     count = frame_at(clip.end - clip.start, rate) + 1
     first = -frame_at(clip.start + actor.offset - clock.start, rate)
     stop = frame_at(clock.end - actor.offset - clip.start, rate) + 1

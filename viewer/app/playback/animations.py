@@ -31,7 +31,7 @@ def played(actor: Actor) -> int:
     """Return the index of an actor's animation, -1 for none, or ``NOT_ONE`` for another motion."""
     if actor.clip is None:
         return -1
-    return actor.animation if isinstance(actor.clip, TransformClip) else NOT_ONE
+    return NOT_ONE if actor.transforms is None else actor.animation
 
 
 def animation_texts(actor: Actor) -> dict[int, str]:
@@ -111,11 +111,12 @@ def _put_aside(state: AppState, actor: Actor) -> None:
     index, edited = played(actor), state.of(Animations).edited
     for key in [key for key in edited if key[0] not in state.scene.actors]:
         del edited[key]
-    if index < 0 or not isinstance(actor.clip, TransformClip):
+    clip = actor.transforms
+    if index < 0 or clip is None:
         return
     edited.pop((actor, index), None)
-    if actor.clip is not actor.figure.animations[index].clip():
-        edited[actor, index] = actor.clip
+    if clip is not actor.figure.animations[index].clip():
+        edited[actor, index] = clip
 
 
 def step_animation(state: AppState, by: int) -> None:

@@ -26,11 +26,8 @@ from viewer.app.core.widgets import (
 from viewer.app.files.files import Files, offer_files
 from viewer.app.playback.animations import animation_texts, choose_animation, played
 from viewer.app.playback.tracks import draw_tracks
-from viewer.rig.captures.points import PointClip
 from viewer.rig.memo import Memo
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.sampled_clip import SampledClip, with_rate
-from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.sampled_clip import with_rate
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Motion
 
@@ -184,23 +181,22 @@ def _no_gaps(state: AppState) -> str:
 
 
 def _has_gaps(clip: Motion) -> bool:
-    if isinstance(clip, Clip | TransformClip):
+    timing = clip.timing
+    if timing is None:
         return False
-    return _gaps.get(clip, None, lambda: not clip.timing.holds or not clip.timing.present.all())
+    return _gaps.get(clip, None, lambda: not timing.holds or not timing.present.all())
 
 
 def rate_of(state: AppState) -> float:
     """Return the frame rate of the chosen actor's motion, frames per second."""
-    clip = state.actor.clip
-    if isinstance(clip, SampledClip | PointClip):
-        return clip.timing.frame_rate
-    return state.clock.frame_rate
+    clip = state.actor.captured
+    return state.clock.frame_rate if clip is None else clip.frame_rate
 
 
 def foreign_rate(state: AppState) -> str:
     """Return the reason why the actor's rate cannot be set: another actor defines the frames."""
     clock = state.clock
-    if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
+    if not clock.has_frames or state.actor.captured is not None:
         return ""
     return "the frames belong to another motion: select its actor"
 
@@ -218,27 +214,24 @@ def set_rate(state: AppState, rate: float) -> None:
         low, high = _LIMITS
         state.say(f"frames per second: expected {low:g} to {high:g}, found {rate:g}")
         return
-    clip = state.actor.clip
-    if not isinstance(clip, SampledClip | PointClip):
+    if state.actor.captured is None:
         state.clock.count_by(rate)
         state.say_status(f"Frames of keyed clips are numbered at {rate:g} frames per second")
         return
     together = [actor for actor in state.scene.actors if _is_together(actor, state.actor)]
     for actor in together:
-        if isinstance(actor.clip, SampledClip | PointClip):
-            actor.clip = with_rate(actor.clip, rate)
+        if actor.captured is not None:
+            actor.clip = with_rate(actor.captured, rate)
     who = f" for {len(together)} actors of this capture" if len(together) > 1 else ""
     state.say_status(f"{rate:g} frames per second{who}")
 
 
 def _is_together(one: Actor, other: Actor) -> bool:
     """Return whether two actors are identical or belong to the same capture."""
-    first, second = one.clip, other.clip
+    first, second = one.captured, other.captured
     if one is other:
         return True
-    if not isinstance(first, SampledClip | PointClip):
-        return False
-    if not isinstance(second, SampledClip | PointClip):
+    if first is None or second is None:
         return False
     if one.person is None or other.person is None or first.name != second.name:
         return False

@@ -154,9 +154,9 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     ``shortest``: gaps shorter than this, in seconds, are ignored, because they would be invisible.
     Returns start and end times in the clip's own time, seconds.
     """
-    if isinstance(clip, Clip | TransformClip):
-        return [(clip.start, clip.end)]
     timing = clip.timing
+    if timing is None:
+        return [(clip.start, clip.end)]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], timing.present, [False]])))
     first, stop = edges[::2], edges[1::2]
     starts = timing.start + first / timing.frame_rate
@@ -227,8 +227,8 @@ def key_times(actor: Actor, joint: int) -> Floats:
 
     Returns (N,), scene times in seconds, increasing.
     """
-    clip, skeleton = actor.clip, actor.figure.skeleton
-    if skeleton is None or not isinstance(clip, Clip | TransformClip):
+    clip, skeleton = actor.keyed, actor.figure.skeleton
+    if skeleton is None or clip is None:
         return np.zeros(0)
     dof_joints = skeleton.dof_joints
 

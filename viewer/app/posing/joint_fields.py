@@ -61,8 +61,8 @@ def toggle_transform(state: AppState, joint: int) -> None:
 
 def moved_joints(state: AppState) -> frozenset[int]:
     """Return the joints whose translation and scale are listed: animated or unlocked ones."""
-    clip = state.actor.clip
-    if not isinstance(clip, TransformClip):
+    clip = state.actor.transforms
+    if clip is None:
         return unlocked_joints(state)
     skeleton = state.actor.figure.require_skeleton()
     animated = _animated.get(clip, skeleton, lambda: _animated_joints(clip, skeleton))

@@ -23,8 +23,6 @@ from viewer.export.pose import export as export_pose
 from viewer.formats import FORMATS, Source, file_stem
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.pose import Pose, pose_key
 from viewer.rig.posing.pose_record import PoseRecord, record_of
@@ -169,11 +167,7 @@ def pause_for_edit(state: AppState) -> None:
         return
     stopped = "Paused: the" if clock.playing else "The"
     clock.playing = False
-    kept = (
-        "press Key to keep it"
-        if isinstance(clip, Clip | TransformClip)
-        else "sampled motions cannot be keyed"
-    )
+    kept = "press Key to keep it" if clip.timing is None else "sampled motions cannot be keyed"
     state.say_status(f"{stopped} clip overwrites this pose when the time changes; {kept}")
 
 

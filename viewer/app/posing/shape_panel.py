@@ -27,7 +27,6 @@ from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.memo import Memo
 from viewer.rig.morph_target import MORPH_GROUP
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 
@@ -159,7 +158,7 @@ def _draw_slider(state: AppState, name: str, index: int, weights: Floats, column
         "%.2f",
     )
     note_item(state, f"coefficient {index}")
-    if imgui.is_item_activated() and isinstance(state.actor.clip, TransformClip):
+    if imgui.is_item_activated() and state.actor.transforms is not None:
         pause_for_edit(state)
     changed = changed and abs(value) < 1e6  # "nan" and "1e99" can be typed into a slider
     if changed:

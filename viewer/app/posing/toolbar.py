@@ -21,8 +21,6 @@ from viewer.app.curves.editing import key_present_pose
 from viewer.app.posing.move_tool import longest_chain, shifts, used_chain
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing.posing import ORIENTATIONS, TOOLS, Posing, copy_pose, mirror, paste_pose
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.posing.joint_rotation import rotates_freely, rotation_dofs
 from viewer.rig.skeleton import joint_label
 
@@ -245,6 +243,6 @@ def no_keys(state: AppState) -> str:
     clip = state.actor.clip
     if clip is None:
         return no_pose(state) or "there is no clip: create one with Edit > New clip"
-    if not isinstance(clip, Clip | TransformClip):
+    if clip.timing is not None:
         return "this motion is sampled and has no keys"
     return ""

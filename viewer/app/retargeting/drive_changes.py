@@ -99,7 +99,7 @@ def _is_together(actor: Actor, first: Actor) -> bool:
     """Return whether two actors are the same, or people of the same capture."""
     if actor is first:
         return True
-    if actor.drive is None or first.drive is None or not isinstance(actor.clip, SampledClip):
+    if actor.drive is None or first.drive is None or actor.captured is None:
         return False
     is_same = actor.figure is first.figure and actor.title == first.title
     return is_same and actor.drive.joint_map is first.drive.joint_map

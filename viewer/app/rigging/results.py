@@ -37,10 +37,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import Pairs, row_distances
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.motion.clip import Channel, Clip
-from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_animation import baked
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
@@ -223,7 +220,7 @@ def plays_motion(result: Result) -> bool:
 def plays_trial(result: Result) -> bool:
     """Return whether a result plays the trial motion."""
     clip = result.actor.clip
-    return isinstance(clip, Clip) and clip.name == _TRIAL
+    return clip is not None and clip.kind == "curves" and clip.name == _TRIAL
 
 
 def _no_trial_of(result: Result) -> str:
@@ -247,7 +244,7 @@ def _no_motion_of(result: Result | None) -> str:
     """Return the reason why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
-    if isinstance(result.template.clip, JointMotion):
+    if result.template.clip is not None and result.template.clip.points is None:
         return ""
     return "the template has no motion: it needs one before Run is pressed"
 
@@ -256,15 +253,15 @@ def _set_motion(state: AppState, result: Result, plays: bool) -> None:
     """Play the template's motion at the target's position, or pose the result like the target."""
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
     place = target_place(result.target)
-    if isinstance(clip, TransformClip):
+    if clip is not None and clip.kind == "transforms":
         clip = baked(result.template.figure, clip, base=result.template.pose)
-    if not plays or not isinstance(clip, Clip | SampledClip):
+    if not plays or clip is None or clip.points is not None:
         actor.clip, actor.pose = None, rigged.pose.copy()
         actor.placement = place @ rigged.placement
         return
     try:
         actor.clip = clip_for(rigged, clip)
-        state.of(SavedWork).add(actor.clip if isinstance(clip, Clip) else None)
+        state.of(SavedWork).add(actor.keyed)
     except RigError as problem:
         state.error = str(problem)
         return

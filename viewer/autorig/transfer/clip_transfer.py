@@ -35,7 +35,7 @@ def transfer_clip(
     path = length_scale if path_scale is None else path_scale
     roots = skeleton.parents < 0
     inside = np.where(roots, path, length_scale) * figure_scale
-    if isinstance(clip, Clip):
+    if clip.kind == "curves":
         channels = tuple(_scaled(channel, skeleton, inside) for channel in clip.channels)
         return replace(clip, channels=channels)
     if clip.n_joints != skeleton.n_joints:

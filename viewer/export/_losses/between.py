@@ -100,7 +100,7 @@ def between_losses(
     ``also`` (T,): additional times at which captures are compared, seconds.
     """
     estimate: Phrase | str = ""
-    if isinstance(animation.motion, Clip | TransformClip):
+    if animation.motion.timing is None:
         edges = np.union1d(
             animation.frames.times,
             key_times(animation.motion, *animation.frames.times[[0, -1]].tolist()),
@@ -155,7 +155,7 @@ class _WorstTimes:
 
 def key_times(clip: Clip | TransformClip, start: float, stop: float) -> Floats:
     """Return the times of all keys within a range, including repetitions of curves, seconds."""
-    if isinstance(clip, Clip):
+    if clip.kind == "curves":
         every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
     else:
         every = [channel.times for channel in clip.channels]

@@ -35,8 +35,7 @@ from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
-from viewer.rig.motion.animation_choice import still_pose
-from viewer.rig.motion.evaluation import Frames, frames_of, still_frames
+from viewer.rig.motion.evaluation import Frames, frames_of, still_frames, still_pose
 from viewer.rig.motion.transform_clip import (
     Interpolation,
     TransformChannel,

@@ -15,14 +15,11 @@ from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box
-from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import still_pose
 from viewer.rig.motion.motion_paths import MotionPath, motion_path, segments
-from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformClip, TransformPath
-from viewer.rig.pose import Pose
+from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Motion
-from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
 _WIDTH = 2.5  # width of the lines, pixels
 _HIDDEN = 0.3  # opacity of hidden parts
@@ -57,7 +54,9 @@ class MotionPathBuffers:
 
     def update(self, actor: Actor, joints: tuple[int, ...], min_confidence: float) -> None:
         """Recompute the paths if clip, joints or the pose outside the clip have changed."""
-        key = (id(actor.clip), joints, min_confidence, actor.offset, *_still(actor))
+        has_pose = actor.joint_motion is not None and actor.pose is not None
+        still = pose_key(still_pose(actor)) if has_pose else None
+        key = (id(actor.clip), joints, min_confidence, actor.offset, still)
         if key == self._key or actor.clip is None:
             return
         self._clip = actor.clip  # a reference keeps the clip alive, so that its id is not reused
@@ -88,49 +87,6 @@ class MotionPathBuffers:
         """Free the buffers."""
         self._arrays.release()
         self._owner.release()
-
-
-def _still(actor: Actor) -> tuple[object, ...]:
-    """Return the parts of a pose that affect the paths but are not animated by the clip."""
-    pose, clip, skeleton = actor.pose, actor.clip, actor.figure.skeleton
-    if pose is None or skeleton is None or clip is None or isinstance(clip, PointClip):
-        return ()
-    if isinstance(clip, Clip):
-        moved = np.array([channel.target for channel in clip.channels], dtype=np.int64)
-        dofs = np.delete(pose.dofs, moved)
-        free = [dofs, pose.translations, pose.rotations, pose.shape_weights]
-        return (*(part.tobytes() for part in free), *_place(actor))
-    if isinstance(clip, TransformClip):
-        return (*(part.tobytes() for part in _unmoved(clip, skeleton, pose)), *_place(actor))
-    weights = pose.shape_weights.tobytes() if clip.shape_weights is None else b""
-    moves = clip.figure_translations is not None, clip.figure_scales is not None
-    place = _place(actor)
-    return weights, b"" if moves[0] else place[0], 0.0 if moves[1] else place[1]
-
-
-def _unmoved(clip: TransformClip, skeleton: Skeleton, pose: Pose) -> list[Floats]:
-    """Return the values of a pose that no channel sets."""
-    moved: dict[TransformPath, list[int]] = {path: [] for path in TRANSFORM_PATHS}
-    for channel in clip.channels:
-        own = [channel.joint] if channel.shapes is None else channel.shapes.tolist()
-        moved[channel.path] += own
-    follows = np.where(
-        skeleton.dof_kinds < FIRST_ROTATION,
-        np.isin(skeleton.dof_joints, moved["translation"]),
-        np.isin(skeleton.dof_joints, moved["rotation"]),
-    )
-    return [
-        pose.dofs[~follows],
-        np.delete(pose.translations, moved["translation"], axis=0),
-        np.delete(pose.rotations, moved["rotation"], axis=0),
-        np.delete(pose.scales, moved["scale"], axis=0),
-        np.delete(pose.shape_weights, moved["weights"]),
-    ]
-
-
-def _place(actor: Actor) -> tuple[bytes, float]:
-    pose = actor.require_pose()
-    return pose.figure_translation.tobytes(), pose.figure_scale
 
 
 class MotionPathPass:

@@ -20,7 +20,7 @@ from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import OPACITIES, Color, DisplayOptions
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
 
@@ -93,7 +93,7 @@ def _mean_gaps(places: Floats) -> Floats:
 def _radii_of(actor: Actor, points: Floats) -> Floats:
     """Return radii from an actor's clip, or from its current points if there is no clip."""
     clip = actor.clip
-    if not isinstance(clip, PointClip) or not len(clip.points):
+    if clip is None or clip.points is None or not len(clip.points):
         return point_radii(points[None])
     rows = np.unique(np.linspace(0, len(clip.points) - 1, _SAMPLES).astype(np.int64))
     return point_radii(clip.points[rows])

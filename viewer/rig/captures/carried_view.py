@@ -41,9 +41,9 @@ def view_in(view: CameraView, scene: Scene) -> CameraView:
     return replace(view, rotation=rotation, translation=translation, mount=None)
 
 
-def played_with(path: CameraPath, clip: object) -> Animation | None:
+def played_with(path: CameraPath, clip: TransformClip | None) -> Animation | None:
     """Return the animation of a camera that belongs to the clip of a figure; None without one."""
-    if not isinstance(clip, TransformClip) or clip.number < 0:
+    if clip is None or clip.number < 0:
         return None
     return next((each for each in path.animations if each.number == clip.number), None)
 
@@ -53,9 +53,9 @@ def moving_alone(scene: Scene) -> list[str]:
     found = []
     for view in scene.views:
         actor = carrier_of(view, scene.actors)
-        clip = None if actor is None else actor.clip
+        clip = None if actor is None else actor.transforms
         path = None if view.mount is None else view.mount.path
-        is_still = isinstance(clip, TransformClip) and not clip.channels
+        is_still = clip is not None and not clip.channels
         if path is not None and is_still and played_with(path, clip) is not None:
             found.append(view.name)
     return found
@@ -63,7 +63,7 @@ def moving_alone(scene: Scene) -> list[str]:
 
 def _moved(path: CameraPath, actor: Actor, time: float) -> Floats:
     """Return the matrix of a camera's nodes at one time of the scene's clock: (4, 4)."""
-    nodes, animation = Actor(Figure("", skeleton=path.nodes)), played_with(path, actor.clip)
+    nodes, animation = Actor(Figure("", skeleton=path.nodes)), played_with(path, actor.transforms)
     if animation is not None:
         nodes.clip, nodes.offset = animation.clip(), actor.offset
         pose_actors([nodes], time)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -41,6 +41,7 @@ class PointLayout:
 class PointClip:
     """A motion of points."""
 
+    kind: ClassVar[Literal["points"]] = "points"
     name: str
     """Display name."""
     timing: Timing

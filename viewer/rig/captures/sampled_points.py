@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.points import PointClip, PointLayout
+from viewer.rig.captures.points import PointLayout
 from viewer.rig.motion.sampled_animation import frame_range
 from viewer.rig.motion.upright import own_up
 from viewer.rig.scene import Actor, Scene
@@ -52,7 +52,7 @@ def sample_upright_points(
     the actor has no motion of points, or no frame in the range.
     """
     motion, layout = actor.clip, actor.figure.points
-    if not isinstance(motion, PointClip) or layout is None:
+    if motion is None or motion.points is None or layout is None:
         raise RigError(f"{actor.name} has no motion of points")
     own = motion.timing.frame_rate
     rate = own if rate is None else rate

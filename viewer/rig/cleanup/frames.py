@@ -68,7 +68,7 @@ def _with_rows(clip: Captured, frames: _Indices) -> Captured:
     moved = replace(
         timing, rows=rows, first_frame=timing.first_frame + first, start=timing.time(first)
     )
-    count = len(clip.points) if isinstance(clip, PointClip) else clip.n_rows
+    count = clip.n_rows
     arrays: dict[str, Any] = {}
     for field in fields(clip):
         value = getattr(clip, field.name)
@@ -102,7 +102,7 @@ def resampled(clip: Captured, rate: float) -> Captured:
     present = _present(timing, times)
     rows: Ints = np.where(present, np.cumsum(present) - 1, -1).astype(np.int32)
     again = replace(timing, frame_rate=rate, rows=rows, first_frame=0)
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         return replace(clip, timing=again, points=points_between(clip, times[present]))
     found = clip.sample(None, times[present])
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frames import Captured, in_frame_order, runs_of
 from viewer.rig.geometry.quaternion import (
     align_signs,
@@ -54,7 +53,7 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
     ordered = in_frame_order(clip)
     rate = ordered.timing.frame_rate
     runs = _rows_of_runs(ordered.timing.present)
-    if isinstance(ordered, PointClip):
+    if ordered.points is not None:
         return replace(ordered, points=_points(ordered.points, runs, chosen, rate, metres))
     rotations = ordered.rotations.copy()
     for rows in runs:
@@ -80,7 +79,7 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
 
 def run_lengths(clip: Captured) -> list[int]:
     """Return the lengths of the runs of frames that are filtered separately."""
-    if not isinstance(clip, PointClip):
+    if clip.points is None:
         return [stop - start for start, stop in runs_of(clip.timing.present)]
     rows = clip.timing.rows
     seen = (clip.points[rows, :, 3] > 0.0) & (rows >= 0)[:, None]

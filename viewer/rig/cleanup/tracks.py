@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frames import Captured, is_shared, points_between, runs_of
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip, joined
 
 Span = tuple[int, int]
 
@@ -55,10 +54,10 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
     timing = clip.timing
     times = timing.start + frames / timing.frame_rate
     rows = timing.rows.copy()
-    count = len(clip.points) if isinstance(clip, PointClip) else clip.n_rows
+    count = clip.n_rows
     rows[frames] = count + np.arange(len(frames), dtype=np.int32)
     whole = replace(timing, rows=rows)
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         points = np.concatenate([clip.points, points_between(clip, times, interpolate=True)])
         return replace(clip, timing=whole, points=points), Gaps(closed, left)
     return replace(_extended(clip, times), timing=whole), Gaps(closed, left)
@@ -104,31 +103,9 @@ def joined_tracks(first: Captured, second: Captured) -> Captured:
     count = max(a.n_frames, b.n_frames)
     rows = np.full((2, count), -1, dtype=np.int32)
     rows[0, : a.n_frames], rows[1, : b.n_frames] = a.rows, b.rows
-    n_rows = len(first.points) if isinstance(first, PointClip) else first.n_rows
-    merged = np.where(rows[0] >= 0, rows[0], np.where(rows[1] >= 0, rows[1] + n_rows, -1))
-    arrays: dict[str, Any] = {
-        field.name: _stacked(first, second, field.name)
-        for field in fields(first)
-        if field.name not in ("name", "timing")
-    }
-    timing = replace(a, rows=merged.astype(np.int32))
-    return replace(first, timing=timing, **arrays)
-
-
-def _stacked(first: Captured, second: Captured, name: str) -> Floats | None:
-    """Return the rows of one array of both clips."""
-    parts: list[Any] = [getattr(first, name), getattr(second, name)]
-    if parts[0] is None and parts[1] is None:
-        return None
-    if parts[0] is None or parts[1] is None or parts[0].shape[1:] != parts[1].shape[1:]:
-        raise RigError(f"tracks of one person: expected the same {name} in both")
-    is_shared = name in ("shape_weights", "scales") and len(parts[0]) == len(parts[1]) == 1
-    if is_shared and (parts[0] == parts[1]).all():
-        return np.asarray(parts[0])
-    counts = [
-        len(clip.points) if isinstance(clip, PointClip) else clip.n_rows for clip in (first, second)
-    ]
-    shape: tuple[int, ...] = parts[0].shape[1:]
-    return np.concatenate(
-        [np.broadcast_to(part, (n, *shape)) for part, n in zip(parts, counts, strict=True)]
-    )
+    merged = np.where(rows[0] >= 0, rows[0], np.where(rows[1] >= 0, rows[1] + first.n_rows, -1))
+    for name in (each.name for each in fields(first) if each.name not in ("name", "timing")):
+        one, two = getattr(first, name), getattr(second, name)
+        if (one is None) != (two is None) or np.shape(one)[1:] != np.shape(two)[1:]:
+            raise RigError(f"tracks of one person: expected the same {name} in both")
+    return joined((first, second), replace(a, rows=merged.astype(np.int32)))

@@ -12,9 +12,7 @@ from viewer.errors import RigError
 from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import pair_names
-from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton, dof_labels
@@ -124,7 +122,7 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
             )
         )
     base = 0
-    if not isinstance(clips[0], Clip | TransformClip):
+    if clips[0].timing is not None:
         base = clips[0].timing.first_frame
     last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
     start, end = (None, None) if frames is None else frames

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.feet.soles import extent, soles_of
-from viewer.rig.motion.evaluation import JointMotion, frames_of, world_frames
+from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.timing import frame_times
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -92,8 +92,8 @@ def resting_height(actor: Actor, up: str) -> RestingHeight | None:
 
     ``up``: either "y" or "z", up axis of the scene.
     """
-    figure, motion = actor.figure, actor.clip
-    if figure.skeleton is None or not isinstance(motion, JointMotion):
+    figure, motion = actor.figure, actor.joint_motion
+    if figure.skeleton is None or motion is None:
         return None
     rate = motion.frame_rate
     times = frame_times(motion.start, motion.end, rate)[:_MOST_FRAMES]

@@ -14,7 +14,6 @@ from typing import TypeAlias
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.captures.points import PointClip
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
@@ -149,7 +148,7 @@ def _path(actor: Actor) -> Floats:
     if clip is None or clip.end <= clip.start:
         return np.zeros((0, 3))
     times = np.linspace(clip.start, clip.end, _N_TIMES)
-    if isinstance(clip, PointClip):
+    if clip.points is not None:
         found = clip.sample(None, times)
         assert found.points is not None  # it is a motion of points
         seen = [points[points[:, 3] > 0.0, :3] for points in found.points[found.present]]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-import numpy as np
-
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.near_names import name_hint
@@ -16,7 +14,6 @@ from viewer.rig.motion.transform_clip import Animation, TransformClip
 from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skeleton import FIRST_ROTATION
 
 NONE = "none"
 """Name that selects no animation."""
@@ -135,8 +132,8 @@ def _returned(actor: Actor, pose: Pose) -> Pose:
     own = figure_pose(actor.figure)
     own.figure_scale, own.figure_translation = pose.figure_scale, pose.figure_translation
     weights = pose.shape_weights.copy()
-    if isinstance(actor.clip, TransformClip):
-        for channel in actor.clip.channels:
+    if actor.transforms is not None:
+        for channel in actor.transforms.channels:
             if channel.shapes is not None:
                 weights[channel.shapes] = own.shape_weights[channel.shapes]
     own.shape_weights = weights
@@ -151,7 +148,7 @@ def has_own_animations(actor: Actor) -> bool:
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None or skeleton.constraints:
         return False
-    return isinstance(clip, TransformClip) or (clip is None and bool(actor.figure.animations))
+    return bool(actor.figure.animations) if clip is None else clip.kind == "transforms"
 
 
 def keeps_keys(scene: Scene, actor: Actor) -> bool:
@@ -169,7 +166,7 @@ def own_animations(
     ``actor``: see ``has_own_animations``. ``only_played``: return only the one that it plays.
     Raises ``FormatError`` if the keys of an animation are invalid, and ``refused`` is not given.
     """
-    played = actor.clip if isinstance(actor.clip, TransformClip) else None
+    played = actor.transforms
     if only_played:
         clips = [] if played is None else [played]
     else:
@@ -185,25 +182,3 @@ def own_animations(
         if played is not None and actor.animation < 0:
             clips.append(played)
     return tuple(clip for clip in clips if clip.channels)
-
-
-def still_pose(actor: Actor) -> Pose:
-    """Return an actor's pose, with everything that its motion changes reset to the file's pose."""
-    own, pose = figure_pose(actor.figure), actor.require_pose().copy()
-    if not isinstance(actor.clip, TransformClip):
-        return pose
-    skeleton = actor.figure.require_skeleton()
-    rotates = skeleton.dof_kinds >= FIRST_ROTATION
-    for channel in actor.clip.channels:
-        joint, dofs = channel.joint, skeleton.dof_joints == channel.joint
-        if channel.path == "rotation":
-            pose.rotations[joint] = own.rotations[joint]
-            np.copyto(pose.dofs, own.dofs, where=dofs & rotates)
-        elif channel.path == "translation":
-            pose.translations[joint] = own.translations[joint]
-            np.copyto(pose.dofs, own.dofs, where=dofs & ~rotates)
-        elif channel.path == "scale":
-            pose.scales[joint] = own.scales[joint]
-        elif channel.shapes is not None:
-            pose.shape_weights[channel.shapes] = own.shape_weights[channel.shapes]
-    return pose

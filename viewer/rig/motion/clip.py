@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -88,6 +88,7 @@ def _tangent(given: Tangent) -> Tangent:
 class Clip:
     """A motion of one skeleton."""
 
+    kind: ClassVar[Literal["curves"]] = "curves"
     name: str
     """Display name."""
     channels: tuple[Channel, ...]
@@ -109,6 +110,11 @@ class Clip:
     @property
     def points(self) -> None:
         """None: joints move."""
+
+    @property
+    def sets_shape(self) -> bool:
+        """False: curves move joints only."""
+        return False
 
     @property
     def frame_rate(self) -> float:

@@ -86,7 +86,7 @@ def scene_rate(actors: Iterable[Actor]) -> float:
     """
     clips = [actor.clip for actor in actors if actor.clip is not None]
     captured = [clip for clip in clips if clip.timing is not None]
-    keyed = [clip for clip in clips if isinstance(clip, TransformClip)]
+    keyed = [clip for clip in clips if clip.kind == "transforms"]
     longest = max(captured or keyed, key=lambda clip: clip.end - clip.start, default=None)
     return DEFAULT_RATE if longest is None else longest.frame_rate
 
@@ -161,6 +161,30 @@ def set_poses(
             pose.figure_scale = float(found.figure_scales[row])
 
 
+def still_pose(actor: Actor) -> Pose:
+    """Return a copy of an actor's pose, with what its motion sets reset to the pose of the file."""
+    own, pose, motion = figure_pose(actor.figure), actor.require_pose().copy(), actor.joint_motion
+    if motion is None:
+        return pose
+    skeleton = actor.figure.require_skeleton()
+    found = motion.sample(skeleton, np.array([motion.start]))
+    is_rotation = skeleton.dof_kinds >= FIRST_ROTATION
+    is_set = np.isin(np.arange(skeleton.n_dofs), found.targets)
+    is_set |= np.isin(skeleton.dof_joints, found.rotated) & is_rotation
+    is_set |= np.isin(skeleton.dof_joints, found.translated) & ~is_rotation
+    pose.dofs[is_set] = own.dofs[is_set]
+    pose.rotations[found.rotated] = own.rotations[found.rotated]
+    pose.translations[found.translated] = own.translations[found.translated]
+    pose.scales[found.scaled] = own.scales[found.scaled]
+    known = found.weighted[found.weighted < len(pose.shape_weights)]
+    pose.shape_weights[known] = own.shape_weights[known]
+    if found.figure_translations is not None:
+        pose.figure_translation = own.figure_translation
+    if found.figure_scales is not None:
+        pose.figure_scale = own.figure_scale
+    return pose
+
+
 def _span(columns: Ints) -> Ints | slice:
     """Return consecutive indices as a slice, which is faster."""
     first, count = int(columns[0]) if len(columns) else 0, len(columns)
@@ -208,7 +232,7 @@ def frames_of(
     """
     if figure.skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to animate")
-    if isinstance(motion, SampledClip) and motion.n_joints != figure.skeleton.n_joints:
+    if motion.timing is not None and motion.n_joints != figure.skeleton.n_joints:
         raise RigError(
             f"clip {motion.name} has {motion.n_joints} joints, but figure {figure.name} has "
             f"{figure.skeleton.n_joints}"

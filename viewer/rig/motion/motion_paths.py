@@ -10,9 +10,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import frames_of, world_frames
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Motion
 
@@ -35,11 +33,11 @@ class MotionPath:
 
 def path_times(motion: Motion) -> Floats:
     """Return the sampling times of a path: a capture's frames, or 60 per second on curves."""
-    if isinstance(motion, Clip | TransformClip):
+    timing = motion.timing
+    if timing is None:
         length = motion.end - motion.start
         steps = int(min(np.ceil(length * _KEYED_RATE - 1e-6), _MOST - 1))
         return np.linspace(motion.start, motion.end, max(steps, 0) + 1)
-    timing = motion.timing
     return timing.start + np.arange(timing.n_frames) / timing.frame_rate
 
 
@@ -61,7 +59,7 @@ def motion_path(
     """
     times = path_times(motion) if times is None else np.asarray(times, dtype=np.float64)
     chosen: Ints = np.asarray(joints, dtype=np.int32)
-    if isinstance(motion, PointClip):
+    if motion.points is not None:
         return _point_path(motion, chosen, times, min_confidence)
     points = np.zeros((len(times), len(chosen), 3))
     present = np.zeros((len(times), len(chosen)), dtype=np.bool_)

@@ -12,7 +12,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import Frames, JointMotion, frames_of, rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing, frame_at, frame_times
@@ -60,8 +59,8 @@ def sample_animation(
     from the clip's start at that rate; all if omitted. Raises ``RigError`` if there is no clip, or
     no frame in the range.
     """
-    motion, figure = actor.clip, actor.figure
-    if not isinstance(motion, JointMotion) or figure.skeleton is None:
+    motion, figure = actor.joint_motion, actor.figure
+    if motion is None or figure.skeleton is None:
         raise RigError(f"{actor.name} has no motion of joints")
     own = motion.frame_rate
     rate = own if rate is None else rate
@@ -69,7 +68,7 @@ def sample_animation(
     times = frame_times(motion.start, motion.end, rate)[first:stop]
     if len(times) < stop - first:
         times = motion.start + np.arange(first, stop) / rate
-    shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
+    shift = motion.timing.first_frame if motion.timing is not None and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, interpolate)
     base = None if actor.pose is None else actor.pose.copy()
     gender = actor.shape_space.gender or figure.shape_space.gender
@@ -92,7 +91,7 @@ def frame_range(
     count = frame_at(motion.end - motion.start, rate) + 1
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
-    if not isinstance(motion, Clip):
+    if motion.kind != "curves":
         stop = min(stop, count)  # unlike other motions, DOF curves extend beyond their keys
     if not 0 <= first < stop:
         found = f"{first} to {'the end' if asked is None else asked}"

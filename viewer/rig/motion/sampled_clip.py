@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 class SampledClip:
     """A motion of one skeleton as frames, as captures are stored."""
 
+    kind: ClassVar[Literal["sampled"]] = "sampled"
     name: str
     """Display name."""
     timing: Timing
@@ -87,6 +88,11 @@ class SampledClip:
         """None: joints move."""
 
     @property
+    def sets_shape(self) -> bool:
+        """Whether it sets weights of blend shapes."""
+        return self.shape_weights is not None
+
+    @property
     def frame_rate(self) -> float:
         """Frames per second."""
         return self.timing.frame_rate
@@ -138,38 +144,31 @@ def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
     return start + weight * (rows[after] - start)
 
 
-def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
-    """Return one clip with the concatenated rows of several clips and a new timing."""
+_Captured = TypeVar("_Captured", bound="SampledClip | PointClip")
 
-    def stack(name: str) -> Floats | None:
-        parts = [getattr(clip, name) for clip in clips]
-        if parts[0] is None:
-            return None
-        if name in ("shape_weights", "scales"):
-            # A single row that applies to all frames must not be repeated.
-            if all(len(part) == 1 and (part == parts[0]).all() for part in parts):
-                return np.asarray(parts[0])
-            parts = [
-                np.broadcast_to(part, (clip.n_rows, *part.shape[1:]))
-                for part, clip in zip(parts, clips, strict=True)
-            ]
-        return np.concatenate(parts)
 
-    first = clips[0]
+def joined(clips: Sequence[_Captured], timing: Timing) -> _Captured:
+    """Return one clip with the rows of several clips of the same arrays, and a new timing."""
     if len(clips) == 1:
-        return replace(first, timing=timing)
-    rotations = stack("rotations")
-    assert rotations is not None  # every clip has rotations
-    return SampledClip(
-        first.name,
-        timing,
-        rotations,
-        stack("translations"),
-        stack("figure_translations"),
-        stack("figure_scales"),
-        stack("shape_weights"),
-        stack("scales"),
-    )
+        return replace(clips[0], timing=timing)
+    names = (each.name for each in fields(clips[0]) if each.name not in ("name", "timing"))
+    return replace(clips[0], timing=timing, **{name: _stacked(clips, name) for name in names})
+
+
+def _stacked(clips: Sequence[_Captured], name: str) -> Any:
+    """Return the rows of one array; a single row that applies to all frames is not repeated."""
+    parts = [getattr(clip, name) for clip in clips]
+    if parts[0] is None:
+        return None
+    if name in ("shape_weights", "scales"):
+        if all(len(part) == 1 and (part == parts[0]).all() for part in parts):
+            return parts[0]
+        counts = [clip.n_rows for clip in clips]
+        parts = [
+            np.broadcast_to(part, (n, *part.shape[1:]))
+            for part, n in zip(parts, counts, strict=True)
+        ]
+    return np.concatenate(parts)
 
 
 def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:

@@ -31,7 +31,7 @@ def single_frame(
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no joints to pose")
     frames, skeleton = still_frames(figure, pose, actor.is_present, time), figure.skeleton
-    if is_course_rig(skeleton) and not isinstance(actor.clip, SampledClip):
+    if is_course_rig(skeleton) and actor.captured is None:
         motion: Clip | SampledClip = clip_from_pose(skeleton, pose, actor.name, time, time)
     else:
         motion = SampledClip(

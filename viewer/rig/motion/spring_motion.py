@@ -12,12 +12,15 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.motion.animation_choice import still_pose
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import JointMotion, frames_of, rest_translations_of, world_frames
+from viewer.rig.motion.evaluation import (
+    JointMotion,
+    frames_of,
+    rest_translations_of,
+    still_pose,
+    world_frames,
+)
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing, frame_times
-from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, PoseKey, pose_key
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, figure_pose
@@ -47,8 +50,8 @@ class SpringMotion:
 
         ``actor``: actor with a pose; nothing happens without springs or a motion of joints.
         """
-        clip, skeleton = actor.clip, actor.figure.skeleton
-        if not isinstance(clip, JointMotion) or skeleton is None or skeleton.springs is None:
+        clip, skeleton = actor.joint_motion, actor.figure.skeleton
+        if clip is None or skeleton is None or skeleton.springs is None:
             return
         rotations = self.rotations(actor, np.array([time]))[0]
         matrices = quaternion_to_matrix(rotations)
@@ -57,10 +60,10 @@ class SpringMotion:
 
     def rotations(self, actor: Actor, times: Floats) -> Floats:
         """Return the rotations of the spring joints (F, N, 4) at times (F,) in seconds."""
-        clip, figure = actor.clip, actor.figure
-        if not isinstance(clip, JointMotion):
+        clip, figure = actor.joint_motion, actor.figure
+        if clip is None:
             raise RigError(f"{actor.name} has no motion of joints")
-        base = _still(actor, clip)
+        base = _still(actor)
         key = id(clip), pose_key(base)
         if key not in self._tracks:
             while len(self._tracks) >= _MOST_TRACKS:
@@ -120,11 +123,11 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     ``rate``: frames per second; if omitted, the motion's rate, or the simulation's rate for DOF
     curves. Raises ``RigError`` if the actor has no motion of joints.
     """
-    clip, skeleton = actor.clip, actor.figure.require_skeleton()
-    if not isinstance(clip, JointMotion) or skeleton.springs is None:
+    clip, skeleton = actor.joint_motion, actor.figure.require_skeleton()
+    if clip is None or skeleton.springs is None:
         raise RigError(f"{actor.name} has no motion of spring joints")
     if rate is None:
-        rate = STEPS_PER_SECOND if isinstance(clip, Clip) else clip.frame_rate
+        rate = STEPS_PER_SECOND if clip.kind == "curves" else clip.frame_rate
     times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(actor.figure, clip, times, actor.pose)
     rotations = frames.rotations.copy()
@@ -143,28 +146,11 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     )
 
 
-def _still(actor: Actor, clip: JointMotion) -> Pose:
+def _still(actor: Actor) -> Pose:
     """Return the part of an actor's pose that neither its clip nor its springs change."""
-    figure, pose = actor.figure, actor.require_pose()
-    skeleton = figure.require_skeleton()
-    if isinstance(clip, TransformClip):
-        base = still_pose(actor)
-    elif isinstance(clip, Clip):
-        base = pose.copy()
-        targets = [channel.target for channel in clip.channels]
-        base.dofs[targets] = figure_pose(figure).dofs[targets]
-    else:
-        base = figure_pose(figure)
-        if clip.scales is None:
-            base.scales[:] = pose.scales
-        if clip.figure_scales is None:
-            base.figure_scale = pose.figure_scale
-        if clip.figure_translations is None:
-            base.figure_translation = pose.figure_translation.copy()
-        if clip.shape_weights is None:
-            base.shape_weights = pose.shape_weights.copy()
+    base, skeleton = still_pose(actor), actor.figure.require_skeleton()
     if skeleton.springs is not None:
-        _rest(figure, skeleton.springs, base)
+        _rest(actor.figure, skeleton.springs, base)
     return base
 
 

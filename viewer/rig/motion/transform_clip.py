@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,7 @@ class TransformChannel:
 class TransformClip:
     """A motion of one figure, as keys of joint transforms and shape weights."""
 
+    kind: ClassVar[Literal["transforms"]] = "transforms"
     name: str
     """Display name."""
     channels: tuple[TransformChannel, ...]
@@ -130,6 +131,11 @@ class TransformClip:
     @property
     def points(self) -> None:
         """None: joints move."""
+
+    @property
+    def sets_shape(self) -> bool:
+        """Whether it sets weights of blend shapes."""
+        return any(channel.path == "weights" for channel in self.channels)
 
     @property
     def frame_rate(self) -> float:

@@ -82,10 +82,11 @@ def guess_up(actors: Iterable[Actor]) -> str:
     """
     directions = [np.zeros((0, 3))]
     for actor in actors:
-        if isinstance(actor.clip, SampledClip):
-            directions.append(_of_body(actor, actor.clip))
-        elif isinstance(actor.clip, PointClip):
-            directions.append(_of_points(actor, actor.clip))
+        clip = actor.captured
+        if clip is not None and clip.points is not None:
+            directions.append(_of_points(actor, clip))
+        elif clip is not None:
+            directions.append(_of_body(actor, clip))
     steps = np.concatenate(directions)
     lengths = np.linalg.norm(steps, axis=1)
     mean = (steps[lengths > 0.0] / lengths[lengths > 0.0, None]).sum(axis=0)
