@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.model_path is not None:
         save_model_folder(arguments.model_path)
     if arguments.action == "add":
-        return _add(arguments)
+        return _add((arguments.name or "").lower(), arguments.dry_run)
     if arguments.name is not None:
         action = arguments.action
         raise ViewerError(f"models {action}: unexpected {printable(arguments.name, 60)}")
@@ -77,12 +77,11 @@ def _print_kind(kind: str, found: dict[str, Path]) -> None:
         print_line("", f"{'':<9}{name:<15}{printable(path, 300)}")
 
 
-def _add(arguments: argparse.Namespace) -> int:
-    name = (arguments.name or "").lower()
+def _add(name: str, is_dry: bool) -> int:
     if name not in ADDABLE:
         wanted = name_hint(name, ADDABLE) if name else f"expected one of {', '.join(ADDABLE)}"
         raise ViewerError(f'models add: cannot add "{printable(name, 60)}": {wanted}')
-    if arguments.dry_run:
+    if is_dry:
         print(subprocess.list2cmdline(pip_command(name, data_folder())))
         return 0
     model = CATALOG[name]
