@@ -7,8 +7,10 @@ The functions return :class:`Shown`: text that keeps the value which it shows. S
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, NamedTuple
 
 _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 _BYTES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
@@ -16,6 +18,8 @@ _LONGEST = 1000  # maximum number of characters of a text in a message
 _NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 NO_VALUE = object()
 """Value of a text that is no data: a verb, a remedy."""
+_open_windows: list[None] = []
+_is_data = ContextVar("is_data", default=False)
 
 
 class Shown(str):
@@ -29,6 +33,41 @@ class Shown(str):
         shown = super().__new__(cls, text)
         shown.value = value
         return shown
+
+
+class Remedy(NamedTuple):
+    """Words of a sentence that name a control in the window, and an option elsewhere."""
+
+    in_window: str
+    elsewhere: str
+
+    def __str__(self) -> str:
+        """Return the words for the place where the sentence is shown."""
+        return self.in_window if _open_windows and not _is_data.get() else self.elsewhere
+
+
+@contextmanager
+def in_window() -> Iterator[None]:
+    """Word all messages for the window, in every thread: remedies name its controls."""
+    _open_windows.append(None)
+    try:
+        yield
+    finally:
+        _open_windows.pop()
+
+
+@contextmanager
+def as_data() -> Iterator[None]:
+    """Word the messages of this thread for the command line, even while a window is open.
+
+    For JSON and records of runs, which are read elsewhere: programs that compare them find one
+    wording, and ``render --panels`` opens a window's interface without a user in front of it.
+    """
+    before = _is_data.set(True)
+    try:
+        yield
+    finally:
+        _is_data.reset(before)
 
 
 def printable(text: object, limit: int = 200) -> str:

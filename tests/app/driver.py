@@ -12,7 +12,7 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.app.files.files import Files, open_files
 from viewer.app.headless import HeadlessApp
-from viewer.diagnostics.remedy import in_window
+from viewer.phrases import in_window
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.gpu.context import thread_graphics
 from viewer.rendering.options import DisplayOptions

@@ -14,9 +14,8 @@ from viewer.batching.execution import attempt
 from viewer.batching.items import Item
 from viewer.diagnostics import CODES, Diagnostic, Phrase, described, wording
 from viewer.diagnostics.record import note_found
-from viewer.diagnostics.remedy import Remedy, in_window
 from viewer.lint import Finding, describe
-from viewer.phrases import counted, listed, optional
+from viewer.phrases import Remedy, counted, in_window, listed, optional
 from viewer.rig.scene import Scene
 
 ROOT = Path(viewer.__file__).parent
@@ -55,6 +54,19 @@ def test_every_message_has_a_known_code() -> None:
         keys.add(key)
         assert sentence.isprintable() and all(name.isidentifier() for name in names_in(sentence))
     assert len(keys) > 800
+
+
+def test_every_call_has_a_sentence() -> None:
+    bare = re.compile(r"[A-Z]\d{3}\.[a-z0-9-]+")
+    wrong = [
+        f"{path}:{call.lineno}"
+        for path, tree in trees().items()
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call) and call.args
+        for text in [getattr(call.args[0], "value", None)]
+        if isinstance(text, str) and bare.fullmatch(text)
+    ]
+    assert wrong == []
 
 
 def test_every_call_supplies_the_values_of_its_sentence() -> None:

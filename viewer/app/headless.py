@@ -13,7 +13,7 @@ from viewer.app.core.theme import add_system_fonts, apply_theme, lacks_letters
 from viewer.app.files.files import Files
 from viewer.app.frame import Frame
 from viewer.app.preferences.preferences import Appearance
-from viewer.diagnostics.remedy import in_window
+from viewer.phrases import in_window
 from viewer.rendering.gpu.context import Graphics
 from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes

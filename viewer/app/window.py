@@ -39,12 +39,11 @@ from viewer.app.shell import Shell, create_context, create_window  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.weights_panel import start_heat_map  # noqa: E402
-from viewer.diagnostics.remedy import in_window  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
-from viewer.phrases import printable  # noqa: E402
+from viewer.phrases import in_window, printable  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.gpu.program import Programs  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402

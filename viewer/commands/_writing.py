@@ -10,7 +10,6 @@ from viewer.commands._frames import Frames, numbering_of, parse_range
 from viewer.commands._scene import SceneOptions
 from viewer.commands._settings import add_settings, number, settings_of
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -24,7 +23,7 @@ from viewer.export import (
     suited_exporter,
 )
 from viewer.export._motion_paths import PERSON, is_together
-from viewer.phrases import agree, all_of, counted, printable
+from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
 from viewer.rig.motion.single_frame import upright_single_frame
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs

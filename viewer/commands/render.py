@@ -315,7 +315,7 @@ def _draw_panels(
 ) -> Bytes:
     from viewer.app.core.state import AppState
     from viewer.app.headless import HeadlessApp
-    from viewer.diagnostics.remedy import in_window
+    from viewer.phrases import in_window
     from viewer.rendering.gpu.context import thread_graphics
 
     if min(size) < 200:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics.remedy import Remedy
+from viewer.phrases import Remedy
 
 SEVERITIES = ("note", "warning", "error")
 """Severities in ascending order."""

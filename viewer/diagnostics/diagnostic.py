@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics.remedy import Remedy, as_data
-from viewer.phrases import NO_VALUE, Shown, listed, printable
+from viewer.phrases import NO_VALUE, Remedy, Shown, as_data, listed, printable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

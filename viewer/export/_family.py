@@ -8,11 +8,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
 from viewer.export._options import ExportOptions
-from viewer.phrases import rounded
+from viewer.phrases import Remedy, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.figure import Figure

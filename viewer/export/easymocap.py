@@ -27,7 +27,6 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_output
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import OutputError, RigError
 from viewer.export._exporter import Selection
 from viewer.export._family import (
@@ -46,7 +45,7 @@ from viewer.export._options import ExportOptions
 from viewer.formats._text.number_text import fixed_texts
 from viewer.interrupts import hold, poll
 from viewer.media.unfinished import new_prefix
-from viewer.phrases import Shown, counted, printable
+from viewer.phrases import Remedy, Shown, counted, printable
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.bodies.smpl_family import Member

@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.remedy import Remedy
 from viewer.export._exporter import Selection
 from viewer.export._family import FamilyFrames, member_of_figure
 from viewer.export._options import ExportOptions
 from viewer.export.amass import padded, write_layout
-from viewer.phrases import counted
+from viewer.phrases import Remedy, counted
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 

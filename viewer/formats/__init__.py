@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._figure_cache import kept_or_read
 from viewer.formats._file_bytes import MAX_SIZE, unreadable
 from viewer.formats._source import Source
-from viewer.phrases import listed
+from viewer.phrases import Remedy, listed
 
 if TYPE_CHECKING:
     from viewer.formats._mesh.texture import read_picture

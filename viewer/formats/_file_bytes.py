@@ -8,10 +8,9 @@ from itertools import islice
 from pathlib import Path
 
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.interrupts import raising
-from viewer.phrases import optional
+from viewer.phrases import Remedy, optional
 
 MAX_SIZE = 2 << 30
 """Default size limit for files, bytes."""

@@ -14,7 +14,6 @@ from functools import partial
 from typing import Literal
 
 from viewer.diagnostics import Phrase, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
@@ -23,7 +22,7 @@ from viewer.formats._pickle.reading import named_archive
 from viewer.formats._pickle.tensors import Storage, storage_of
 from viewer.formats._pickle.values import Span, noun
 from viewer.formats._source import InvalidValueError
-from viewer.phrases import counted, printable, quoted
+from viewer.phrases import Remedy, counted, printable, quoted
 
 _PICKLE = "/data.pkl"
 _LARGEST_PICKLE = 64 << 20  # maximum bytes of the pickle, which does not contain the arrays

@@ -20,7 +20,6 @@ import math
 import numpy as np
 
 from viewer.diagnostics import wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive
@@ -28,7 +27,7 @@ from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_i
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
-from viewer.phrases import counted, listed, one_of
+from viewer.phrases import Remedy, counted, listed, one_of
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 from viewer.rig.motion.body_motion import BodyMotion

@@ -36,7 +36,6 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.opening import is_archive
@@ -54,7 +53,7 @@ from viewer.formats._text.table import read_numbers
 from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
-from viewer.phrases import axes, listed, optional, printable, quoted
+from viewer.phrases import Remedy, axes, listed, optional, printable, quoted
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from viewer.diagnostics import SEVERITIES, Diagnostic, described
-from viewer.diagnostics.remedy import as_data
 from viewer.formats import folder_name
 from viewer.lint._finding import Finding
-from viewer.phrases import counted, printable
+from viewer.phrases import as_data, counted, printable
 from viewer.rig.scene import Scene
 from viewer.rig.skeleton import joint_labels
 

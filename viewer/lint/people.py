@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics.remedy import Remedy
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject
-from viewer.phrases import counted, listed
+from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.mesh import bounding_box, box_size

@@ -9,7 +9,6 @@ from typing import Literal
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats import Source, read
 from viewer.loading.body_driving import has_joints
@@ -19,7 +18,7 @@ from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
 from viewer.models import family_model, models_of_kind, named_files
 from viewer.models.bundled import bundled_body
-from viewer.phrases import listed
+from viewer.phrases import Remedy, listed
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure
 

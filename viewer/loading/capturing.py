@@ -11,10 +11,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
 from viewer.loading.scaling import scale_to_unit
+from viewer.phrases import Remedy
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.cameras import CameraView

@@ -12,11 +12,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Collector, Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.settings import MotionSettings
-from viewer.phrases import all_of, printable
+from viewer.phrases import Remedy, all_of, printable
 from viewer.progress import report
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure, Origin

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.formats._video_images import VideoImages
 from viewer.formats.easymocap.images import ImageFolders, find_images
@@ -33,7 +32,7 @@ from viewer.loading.skeleton_motions import (
     map_refusal,
     model_refusal,
 )
-from viewer.phrases import counted, listed, rounded
+from viewer.phrases import Remedy, counted, listed, rounded
 from viewer.rig.bodies.smpl_family import FAMILY, ShapeSpace
 from viewer.rig.captures.cameras import CameraImages, CameraView
 from viewer.rig.captures.capture import Capture, capture_rate

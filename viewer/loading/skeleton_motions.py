@@ -16,11 +16,11 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.formats import Source
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
+from viewer.phrases import Remedy
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.geometry.transform import rotation_transform

@@ -11,8 +11,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError, ViewerError
+from viewer.phrases import Remedy
 from viewer.rig.arrays import Bytes
 
 _PICTURES = ("_pipe", "image2")  # FFmpeg's formats of single pictures

@@ -18,7 +18,6 @@ from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -36,7 +35,7 @@ from viewer.export._motion_paths import files_at, is_together, motion_paths, par
 from viewer.export._options import SAFE_NAMES
 from viewer.export.vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets, file_stem
-from viewer.phrases import agree, all_of, counted, printable
+from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.progress import part_of_work, report
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations

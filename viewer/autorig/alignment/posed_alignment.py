@@ -29,8 +29,7 @@ from viewer.autorig.alignment.surface_alignment import (
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
-from viewer.diagnostics.remedy import Remedy
-from viewer.phrases import rounded
+from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -22,9 +22,8 @@ from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
-from viewer.phrases import rounded
+from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
 from viewer.rig.arrays import Floats, Ints, frozen
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.export._exporter import SampledParts, Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
@@ -24,7 +23,7 @@ from viewer.export.bvh.body import BLOCK, Conversion, Space, rest_matrices, shap
 from viewer.export.bvh.reading import FileLosses
 from viewer.export.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.formats import all_or_none, save_parts
-from viewer.phrases import agree, brief, counted, optional
+from viewer.phrases import Remedy, agree, brief, counted, optional
 from viewer.phrases import listed as listed_text
 from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints

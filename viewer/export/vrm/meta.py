@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
 from viewer.export._options import VrmMeta
 from viewer.export.gltf.document import text_of
+from viewer.phrases import Remedy
 
 LICENCE = "https://vrm.dev/licenses/1.0/"
 """The VRM Public Licence, the only one that VRM 1.0 accepts."""

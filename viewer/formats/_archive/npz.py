@@ -27,12 +27,11 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Value, array_dtype, item_count, shaped
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
 from viewer.formats._source import InvalidValueError, Source
-from viewer.phrases import axes, printable
+from viewer.phrases import Remedy, axes, printable
 from viewer.rig.arrays import Deferred
 
 _MAX_AXES = 32

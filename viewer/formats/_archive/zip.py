@@ -15,11 +15,10 @@ from typing import IO, cast, overload
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import Source
-from viewer.phrases import printable
+from viewer.phrases import Remedy, printable
 
 DAMAGE = (
     zipfile.BadZipFile,

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics.remedy import Remedy
 from viewer.formats._scene_graph.bindings import bind_rigid, bind_skins, inverse_binds
 from viewer.formats._scene_graph.content import REACH, NodeFile, with_ancestors
 from viewer.formats._scene_graph.grouping import Members, group_nodes, is_skinned, scene_order
@@ -26,7 +25,7 @@ from viewer.formats._scene_graph.surfaces import (
     used_materials,
 )
 from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
-from viewer.phrases import agree, counted, quoted, rounded
+from viewer.phrases import Remedy, agree, counted, quoted, rounded
 from viewer.phrases import listed as listed_text
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure, FigureGroup, read_from

@@ -7,9 +7,8 @@ from typing import Literal
 import numpy as np
 
 from viewer.diagnostics import Phrase, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.formats._source import Source
-from viewer.phrases import Shown, bare, rounded
+from viewer.phrases import Remedy, Shown, bare, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames

@@ -11,10 +11,9 @@ from pathlib import Path
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.formats._published_models import published_names
 from viewer.formats._source import Source
-from viewer.phrases import counted, listed, printable
+from viewer.phrases import Remedy, counted, listed, printable
 
 BODIES = ("smpl_full", "smplfull", "smpl")
 """Folders of body parameters, the most complete first."""

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from viewer.diagnostics import Diagnostic, Phrase, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
@@ -27,7 +26,7 @@ from viewer.formats._text.json_places import (
 )
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST, within_text
-from viewer.phrases import counted, printable
+from viewer.phrases import Remedy, counted, printable
 
 Record = dict[str, Any]
 _TRANSLATION = "Th"

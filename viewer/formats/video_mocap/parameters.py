@@ -20,7 +20,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value, describe, texts_in
@@ -51,7 +50,7 @@ from viewer.formats.video_mocap.parameter_layout import (
     with_facts,
 )
 from viewer.formats.video_mocap.results import Results, Track
-from viewer.phrases import agree, counted, optional, printable
+from viewer.phrases import Remedy, agree, counted, optional, printable
 from viewer.phrases import listed as listed_text
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, gender_of

@@ -11,11 +11,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
-from viewer.diagnostics.remedy import Remedy
 from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
-from viewer.phrases import agree, counted, listed
+from viewer.phrases import Remedy, agree, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.cameras import CameraMotion, CameraView

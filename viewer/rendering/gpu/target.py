@@ -10,8 +10,8 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RenderError, ViewerError
+from viewer.phrases import Remedy
 from viewer.rendering.gpu.context import check_errors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms

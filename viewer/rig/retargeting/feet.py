@@ -12,8 +12,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
-from viewer.diagnostics.remedy import Remedy
-from viewer.phrases import counted
+from viewer.phrases import Remedy, counted
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.frames import in_frame_order

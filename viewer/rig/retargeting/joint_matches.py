@@ -11,9 +11,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
-from viewer.phrases import counted, listed
+from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Ints
 from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, map_from_pairs, mapped_partners
 from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place

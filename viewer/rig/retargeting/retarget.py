@@ -20,9 +20,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
-from viewer.phrases import agree, counted, listed, one_of, rounded
+from viewer.phrases import Remedy, agree, counted, listed, one_of, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure

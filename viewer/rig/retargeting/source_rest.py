@@ -13,9 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.diagnostics.remedy import Remedy
 from viewer.errors import RigError
-from viewer.phrases import listed
+from viewer.phrases import Remedy, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
