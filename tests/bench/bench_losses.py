@@ -40,7 +40,7 @@ def main(rounds: int = 7) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for key, name, lost in (
             ("gltf", "a.glb", "gltf_losses"),
-            ("bvh", "a.bvh", "reading.FileLosses.look"),
+            ("bvh", "a.bvh", "losses.FileLosses.look"),
         ):
             path = Path(folder) / name
 

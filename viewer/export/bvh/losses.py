@@ -1,4 +1,4 @@
-"""Poses of the original figure, read back from a written ``.bvh`` file.
+"""Errors of a written ``.bvh`` file: it is read back as poses of the original figure.
 
 D is the product of a file's rotations down to a joint, p its position in the file, s the scale, and
 x and e are as in ``body``. A joint with the rest matrix P then has::
