@@ -28,7 +28,6 @@ from viewer.formats import SUFFIXES, Source
 from viewer.formats._archive.zip import DAMAGE, MAX_RATIO, SMALL, StoredFile
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import counted, listed, printable
-from viewer.phrases import listed as listed_text
 
 _DEEPEST = 3  # maximum number of levels of nested archives
 _COMPANIONS = {  # suffixes of files that models refer to
@@ -339,14 +338,14 @@ def _readable_folder(names: Sequence[str], path: Path) -> str:
                     "F002.submission-folders: expected one folder with files to compare, found "
                     "{names}; --expect names the files to use",
                     path,
-                    values={"names": listed_text(folders)},
+                    values={"names": listed(folders)},
                 )
             )
     raise FormatError(
         Diagnostic(
             "F002.submission-empty: expected files to compare, found {names}",
             path,
-            values={"names": listed_text(sorted(names))},
+            values={"names": listed(sorted(names))},
         )
     )
 

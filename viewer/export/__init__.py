@@ -17,8 +17,7 @@ from viewer.export._left_out import motion_notes
 from viewer.export._motion_paths import files_at, is_together, part_files, part_paths
 from viewer.export._options import ExportOptions, VrmMeta
 from viewer.formats import all_or_none
-from viewer.phrases import all_of, printable
-from viewer.phrases import counted as counted_text
+from viewer.phrases import all_of, counted, printable
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.sampled_points import sample_upright_points
@@ -472,7 +471,7 @@ def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
         [
             Diagnostic(
                 "X005.hidden-parts: {n} also written",
-                values={"n": counted_text(count, "hidden part", "is", "are")},
+                values={"n": counted(count, "hidden part", "is", "are")},
             )
         ]
         if count

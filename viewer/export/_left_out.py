@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, wording
-from viewer.phrases import all_of, counted, rounded
-from viewer.phrases import listed as listed_text
+from viewer.phrases import all_of, counted, listed, rounded
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.animation_choice import animation_labels
@@ -74,10 +73,9 @@ def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnosti
 
     A clip with edited keys is another object than the one read, with the same name.
     """
-    listed = figure.animations
-    played = [each.plays(motion) for each in listed]
+    played = [each.plays(motion) for each in figure.animations]
     if not any(played):
-        played = [each.name == motion.name != "" for each in listed]
+        played = [each.name == motion.name != "" for each in figure.animations]
     labels = zip(animation_labels(figure), played, strict=True)
     names = [label for label, is_played in labels if not is_played]
     if not names:
@@ -86,7 +84,7 @@ def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnosti
         Diagnostic(
             "X003.other-animations: {n} not written: {names}",
             values={
-                "names": listed_text(names, 8),
+                "names": listed(names, 8),
                 "n": counted(len(names), "other animation", "is", "are"),
             },
         )

@@ -23,8 +23,7 @@ from viewer.export.bvh.body import BLOCK, Conversion, Space, rest_matrices, shap
 from viewer.export.bvh.losses import FileLosses
 from viewer.export.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.formats import all_or_none, save_parts
-from viewer.phrases import Remedy, agree, brief, counted, optional
-from viewer.phrases import listed as listed_text
+from viewer.phrases import Remedy, agree, brief, counted, listed, optional
 from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -363,7 +362,7 @@ def _remarks(writer: _Writer) -> list[Diagnostic]:
     if moving:
         values = {
             "n": counted(len(moving), "joint"),
-            "names": listed_text(moving, 8),
+            "names": listed(moving, 8),
             "translate": agree(len(moving), "translates and has", "translate and have"),
         }
         notes.append(
@@ -413,7 +412,7 @@ def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnosti
         notes.append(
             Diagnostic(
                 "X005.joints-renamed: {n} changed: {pairs}",
-                values={"n": counted(len(pairs), "joint name"), "pairs": listed_text(pairs, 8)},
+                values={"n": counted(len(pairs), "joint name"), "pairs": listed(pairs, 8)},
             )
         )
     odd = [_visible(name) for name in odd_names(written)]
@@ -424,7 +423,7 @@ def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnosti
                 "{have} spaces or characters outside ASCII: {names}; {remedy} changes {them}",
                 values={
                     "n": counted(len(odd), "joint name"),
-                    "names": listed_text(odd, 8),
+                    "names": listed(odd, 8),
                     "are": agree(len(odd), "is", "are"),
                     "have": agree(len(odd), "has", "have"),
                     "remedy": Remedy("Safe names in the Export motion dialog", "--safe-names"),

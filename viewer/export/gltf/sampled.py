@@ -22,8 +22,7 @@ from viewer.export.gltf.materials import Color
 from viewer.export.gltf.nodes import locals_of
 from viewer.export.gltf.reading import GltfFile, frame_keys
 from viewer.export.gltf.skin import shape_of
-from viewer.phrases import agree, counted
-from viewer.phrases import listed as listed_text
+from viewer.phrases import agree, counted, listed
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import figure_pose
@@ -178,7 +177,7 @@ def motion_remarks(sampled: Sampled, options: ExportOptions) -> list[Diagnostic]
         names = [joint_label(skeleton, int(joint)) for joint in moves]
         values = {
             "n": counted(len(names), "joint"),
-            "names": listed_text(names, 8),
+            "names": listed(names, 8),
             "translate": agree(len(names), "translates", "translate"),
         }
         notes.append(

@@ -31,10 +31,9 @@ from viewer.export.vrm.standing import in_t_pose, standing
 from viewer.export.vrm.upgraded import upgraded
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
-from viewer.formats._vrm.parts import listed, part, value_of
+from viewer.formats._vrm.parts import list_in, part, value_of
 from viewer.formats._vrm.springs import EXTENDED
-from viewer.phrases import agree, all_of, counted, rounded
-from viewer.phrases import listed as listed_text
+from viewer.phrases import agree, all_of, counted, listed, rounded
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
@@ -72,7 +71,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
                     "X005.vrm-repaired: corrected, because the VRM file violated the "
                     "specification: "
                     "{names}",
-                    values={"names": listed_text(names), "n": len(names)},
+                    values={"names": listed(names), "n": len(names)},
                 )
             )
         if record.version == 1 or not given.upgrades:
@@ -87,7 +86,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
                     "X003.vrm-upgrade: {n} of the VRM 0.x file {have} no counterpart in VRM 1.0: "
                     "{names}",
                     values={
-                        "names": listed_text(lost, 8),
+                        "names": listed(lost, 8),
                         "n": counted(len(lost), "member"),
                         "have": agree(len(lost), "has", "have"),
                     },
@@ -242,7 +241,7 @@ def _add_kept(
     if record.version == 1 and not data["meta"].get("name"):
         data["meta"]["name"] = text_of(body.figure.name)
     _add(document, body, built, extensions)
-    colliders = listed(extensions.get("VRMC_springBone"), "colliders")
+    colliders = list_in(extensions.get("VRMC_springBone"), "colliders")
     if any(part(each, "extensions", EXTENDED) is not None for each in colliders):
         _declare(document, EXTENDED)
     return [_written(data, extensions, record.version), *_lost(maps.lost)]

@@ -11,7 +11,7 @@ from typing import Any
 
 from viewer.export.gltf.body import Built
 from viewer.export.gltf.document import Document
-from viewer.formats._vrm.parts import is_index, listed, part
+from viewer.formats._vrm.parts import is_index, list_in, part
 from viewer.rig.file_record import VrmRecord
 
 _SPRINGS = "VRMC_springBone"
@@ -100,7 +100,7 @@ def _expression(data: Any, maps: Maps) -> Any:
 def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
     """Return the spring bones; chains with a lost joint are omitted as a whole."""
     result, places, colliders = dict(data), dict[int, int](), list[Any]()
-    for index, each in enumerate(listed(data, "colliders")):
+    for index, each in enumerate(list_in(data, "colliders")):
         node = maps.joint(part(each, "node"), "colliders")
         if node is not None:
             places[index] = len(colliders)
@@ -111,10 +111,10 @@ def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
             {
                 **each,
                 "colliders": [
-                    places[i] for i in listed(each, "colliders") if type(i) is int and i in places
+                    places[i] for i in list_in(each, "colliders") if type(i) is int and i in places
                 ],
             }
-            for each in listed(data, "colliderGroups")
+            for each in list_in(data, "colliderGroups")
             if isinstance(each, dict)
         ]
     else:
@@ -122,7 +122,7 @@ def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
         result.pop("colliderGroups", None)
     springs = [
         spring
-        for each in listed(data, "springs")
+        for each in list_in(data, "springs")
         if isinstance(each, dict) and (spring := _spring(each, maps, bool(colliders)))
     ]
     return {**result, "springs": springs}
@@ -167,7 +167,7 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
     """
     data = maps.record.extensions["VRM"]
     result = dict(data)
-    bones = listed(data, "humanoid", "humanBones")
+    bones = list_in(data, "humanoid", "humanBones")
     result["humanoid"] = {
         **(data["humanoid"] if isinstance(data.get("humanoid"), dict) else {}),
         "humanBones": _nodes(bones, maps, "bones"),
@@ -179,7 +179,7 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
     result["meta"] = meta
     if isinstance(data.get("firstPerson"), dict):
         result["firstPerson"] = _first_person(data["firstPerson"], maps)
-    groups = listed(data, "blendShapeMaster", "blendShapeGroups")
+    groups = list_in(data, "blendShapeMaster", "blendShapeGroups")
     if groups:
         result["blendShapeMaster"] = {
             **data["blendShapeMaster"],
@@ -191,7 +191,7 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
         }
     if isinstance(data.get("secondaryAnimation"), dict):
         result["secondaryAnimation"] = _old_springs(data["secondaryAnimation"], maps)
-    result["materialProperties"] = _materials(listed(data, "materialProperties"), maps, names)
+    result["materialProperties"] = _materials(list_in(data, "materialProperties"), maps, names)
     return {"VRM": result}
 
 
@@ -226,17 +226,17 @@ def _first_person(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
 def _old_springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
     """Return the springs; groups of colliders keep their indices, because springs refer to them."""
     groups = []
-    for each in listed(data, "boneGroups"):
+    for each in list_in(data, "boneGroups"):
         if not isinstance(each, dict):
             continue
-        bones = [maps.joint(bone, "spring-joints") for bone in listed(each, "bones")]
+        bones = [maps.joint(bone, "spring-joints") for bone in list_in(each, "bones")]
         group = {**each, "bones": [bone for bone in bones if bone is not None]}
         if part(each, "center") not in (None, -1):
             center = maps.joint(each["center"], "centers")
             group["center"] = -1 if center is None else center
         groups.append(group)
     colliders = []
-    for each in listed(data, "colliderGroups"):
+    for each in list_in(data, "colliderGroups"):
         node = maps.joint(part(each, "node"), "colliders")
         # A group without a joint would be invalid: it moves to the first joint, without colliders.
         empty = {"node": maps.first_joint, "colliders": []}

@@ -17,7 +17,7 @@ from viewer.export.vrm.meta import LICENCE
 from viewer.export.vrm.standing import facing_front
 from viewer.formats._vrm.bones import modern_bone
 from viewer.formats._vrm.materials import modern_toon, old_binds
-from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
+from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.expressions import OLD_PRESETS, TRANSFORM
 from viewer.rig.figure import Figure
@@ -88,14 +88,14 @@ def upgraded(
     extensions: dict[str, Any] = {"VRMC_vrm": character}
     springs = _upgraded_springs(part(data, "secondaryAnimation"), front, record, lost)
     extensions |= {"VRMC_springBone": springs} if springs else {}
-    toon = _upgraded_toon(listed(data, "materialProperties"), record.toon, lost)
+    toon = _upgraded_toon(list_in(data, "materialProperties"), record.toon, lost)
     return front, replace(record, version=1, extensions=extensions, toon=toon), lost
 
 
 def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
     """Return the human bones; Unity's muscle settings have no counterpart."""
     bones: dict[str, Any] = {}
-    for each in listed(data, "humanoid", "humanBones"):
+    for each in list_in(data, "humanoid", "humanBones"):
         bone = part(each, "bone")
         if isinstance(bone, str):
             bones.setdefault(modern_bone(bone), {"node": part(each, "node")})
@@ -112,7 +112,7 @@ def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
 def _views(data: Any, record: VrmRecord) -> list[Any]:
     """Return annotations of nodes, converted from annotations of meshes."""
     found = []
-    for each in listed(data, "firstPerson", "meshAnnotations"):
+    for each in list_in(data, "firstPerson", "meshAnnotations"):
         view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
         nodes = [node for node, mesh in record.meshes.items() if mesh == part(each, "mesh")]
         found += [{"node": node, "type": view} for node in nodes]
@@ -140,7 +140,7 @@ def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
         gaze[f"rangeMap{name}"] = _range(given, f"firstPerson.lookAt{name}", lost)
         if given.get("curve") not in (None, _STRAIGHT):
             lost.append(f"firstPerson.lookAt{name}.curve")
-    bones = listed(data, "humanoid", "humanBones")
+    bones = list_in(data, "humanoid", "humanBones")
     heads = [part(each, "node") for each in bones if part(each, "bone") == "head"]
     if first.get("firstPersonBone", -1) not in (-1, *heads):
         lost.append("firstPerson.firstPersonBone")
@@ -230,8 +230,8 @@ def _upgraded_expressions(told: Any, record: VrmRecord, lost: list[str]) -> dict
     ``lost``: extended by the material values without a counterpart.
     """
     found: dict[str, dict[str, Any]] = {"preset": {}, "custom": {}}
-    materials = listed(told, "materialProperties")
-    for each in listed(told, "blendShapeMaster", "blendShapeGroups"):
+    materials = list_in(told, "materialProperties")
+    for each in list_in(told, "blendShapeMaster", "blendShapeGroups"):
         if not isinstance(each, dict):
             continue
         expression: dict[str, Any] = {"isBinary": each.get("isBinary") is True}
@@ -259,7 +259,7 @@ def _binds(told: dict[str, Any], record: VrmRecord) -> list[Any]:
     """Return the binds of nodes from those of meshes."""
     return [
         {"node": node, "index": part(each, "index"), "weight": weight / _PERCENT}
-        for each in listed(told, "binds")
+        for each in list_in(told, "binds")
         if (weight := value_of(part(each, "weight"), 0.0)) is not None
         for node, mesh in record.meshes.items()
         if mesh == part(each, "mesh")
@@ -300,11 +300,11 @@ def _with_ends(
     """
     skeleton = figure.require_skeleton()
     children = _children(record.joints, skeleton.parents)
-    groups = listed(part(record.extensions, "VRM", "secondaryAnimation"), "boneGroups")
+    groups = list_in(part(record.extensions, "VRM", "secondaryAnimation"), "boneGroups")
     starts = [
         record.joints[bone]
         for group in groups
-        for bone in listed(group, "bones")
+        for bone in list_in(group, "bones")
         if isinstance(bone, int) and bone in record.joints
     ]
     last = {path[-1] for start in starts for path in _paths(start, children)}
@@ -371,13 +371,13 @@ def _upgraded_springs(
     nodes = {joint: node for node, joint in record.joints.items()}
     colliders, groups, places = _colliders(data, lost)
     springs = []
-    for index, group in enumerate(listed(data, "boneGroups")):
+    for index, group in enumerate(list_in(data, "boneGroups")):
         swing = _swing(group)
         if swing is None:
             lost.append(f"secondaryAnimation.boneGroups[{index}]")
             continue
-        shared = _shared(group, places, len(listed(data, "colliderGroups")))
-        for bone in listed(group, "bones"):
+        shared = _shared(group, places, len(list_in(data, "colliderGroups")))
+        for bone in list_in(group, "bones"):
             if not isinstance(bone, int) or bone not in record.joints:
                 lost.append(f"secondaryAnimation.boneGroups.bones {bone}")
                 continue
@@ -397,7 +397,7 @@ def _shared(group: Any, places: Mapping[int, int], count: int) -> dict[str, Any]
     comment, center = part(group, "comment"), part(group, "center")
     found: dict[str, Any] = {"name": comment} if isinstance(comment, str) and comment else {}
     found |= {"center": center} if isinstance(center, int) and center >= 0 else {}
-    used = [n for n in listed(group, "colliderGroups") if is_index(n, count) and n in places]
+    used = [n for n in list_in(group, "colliderGroups") if is_index(n, count) and n in places]
     return {**found, "colliderGroups": [places[n] for n in used]} if used else found
 
 
@@ -422,9 +422,9 @@ def _vector(told: Any) -> list[float] | None:
 def _colliders(data: Any, lost: list[str]) -> tuple[list[Any], list[Any], dict[int, int]]:
     """Return the colliders, their groups, and the new place of each group that is not empty."""
     colliders, groups, places = list[Any](), list[Any](), dict[int, int]()
-    for index, each in enumerate(listed(data, "colliderGroups")):
+    for index, each in enumerate(list_in(data, "colliderGroups")):
         own = []
-        for number, sphere in enumerate(listed(each, "colliders")):
+        for number, sphere in enumerate(list_in(each, "colliders")):
             offset = _vector(part(sphere, "offset"))
             radius = value_of(part(sphere, "radius"), 0.0)
             if offset is None or radius is None:

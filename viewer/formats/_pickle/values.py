@@ -21,7 +21,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import array_dtype, item_count, shaped
 from viewer.formats._archive.zip import Data
 from viewer.formats._source import InvalidValueError
-from viewer.phrases import axes as axes_text
+from viewer.phrases import axes
 from viewer.rig.arrays import Deferred
 
 _MOST_AXES = 32
@@ -158,7 +158,7 @@ class Array:
             raise InvalidValueError(
                 Phrase(
                     "expected {shape} {dtype}, found {found} bytes",
-                    shape=axes_text(shape),
+                    shape=axes(shape),
                     dtype=found.name,
                     found=size,
                 )

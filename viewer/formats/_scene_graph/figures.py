@@ -25,8 +25,7 @@ from viewer.formats._scene_graph.surfaces import (
     used_materials,
 )
 from viewer.formats._scene_graph.views import Carrier, moved_cameras, views_of
-from viewer.phrases import Remedy, agree, counted, quoted, rounded
-from viewer.phrases import listed as listed_text
+from viewer.phrases import Remedy, agree, counted, listed, quoted, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.file_record import FileRecord, VrmRecord
@@ -69,7 +68,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
             raise source.fault(
                 "F008.contents: expected triangles, a skin or a hierarchy of nodes, found only "
                 "{contents}",
-                contents=listed_text(contents),
+                contents=listed(contents),
             )
         raise source.fault(
             "F002.no-figure: expected meshes, skins or a hierarchy of nodes, found nothing to show"
@@ -100,7 +99,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     if left_out:
         source.warn(
             "F007.orthographic: orthographic cameras are not supported: {names}",
-            names=listed_text(left_out),
+            names=listed(left_out),
         )
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
 
@@ -315,8 +314,8 @@ def _joint(node: int, skins: Mapping[int, Ints]) -> str:
     """Return the pointer to a joint's entry in a skin, or to its node; empty if auxiliary."""
     if node < 0:
         return ""
-    for index, listed in skins.items():
-        places = np.flatnonzero(listed == node)
+    for index, joints in skins.items():
+        places = np.flatnonzero(joints == node)
         if len(places):
             return f"/skins/{index}/joints/{places[0]}"
     return f"/nodes/{node}"
@@ -382,7 +381,7 @@ def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
             "F007.animated-others: animations of {n} that {belong} to no figure are omitted: "
             "{names}",
             n=counted(len(names), "node"),
-            names=listed_text(names),
+            names=listed(names),
             belong=agree(len(names), "belongs", "belong"),
         )
 
@@ -398,7 +397,7 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
         source.warn(
             "F007.skinning-method: {skins} {names} {ask} for the method {method}: used unless "
             "{remedy} selects another one",
-            names=listed_text(names),
+            names=listed(names),
             n=len(names),
             method=method,
             skins=agree(len(names), "skin", "skins"),

@@ -11,9 +11,8 @@ from typing import Any
 from viewer.diagnostics import wording
 from viewer.formats._source import Source
 from viewer.formats._vrm.bones import given_bones
-from viewer.formats._vrm.parts import listed, part
-from viewer.phrases import counted, quoted
-from viewer.phrases import listed as listed_text
+from viewer.formats._vrm.parts import list_in, part
+from viewer.phrases import counted, listed, quoted
 from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 
 _MODERN = "1.0"
@@ -51,7 +50,7 @@ def check_character(source: Source, extensions: Mapping[str, Any], version: int)
         source.warn(
             "G008.meta: expected {names} in the meta data, found none",
             f"{at}/meta",
-            names=listed_text(missing),
+            names=listed(missing),
         )
     _check_bones(source, told, version, f"{at}/humanoid/humanBones")
     for bind, place, name in weighted_binds(told, version):
@@ -74,7 +73,7 @@ def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str)
             "G008.bones: {n} missing: {names}",
             at,
             n=counted(len(missing), "required human bone"),
-            names=listed_text(missing),
+            names=listed(missing),
         )
     owners: dict[Any, str] = {}
     seen: set[str] = set()
@@ -112,8 +111,8 @@ def weighted_binds(
 ) -> Iterator[tuple[dict[str, Any], str, str]]:
     """Yield the binds of morph targets, the place of each weight, and its expression's name."""
     if version == 0:
-        for index, each in enumerate(listed(told, "blendShapeMaster", "blendShapeGroups")):
-            for row, bind in enumerate(listed(each, "binds")):
+        for index, each in enumerate(list_in(told, "blendShapeMaster", "blendShapeGroups")):
+            for row, bind in enumerate(list_in(each, "binds")):
                 if part(bind, "weight") is not None:
                     place = f"blendShapeMaster/blendShapeGroups/{index}/binds/{row}/weight"
                     yield bind, place, str(part(each, "name"))
@@ -121,7 +120,7 @@ def weighted_binds(
     for kind in ("preset", "custom"):
         named = part(told, "expressions", kind)
         for name, each in named.items() if isinstance(named, dict) else ():
-            for row, bind in enumerate(listed(each, "morphTargetBinds")):
+            for row, bind in enumerate(list_in(each, "morphTargetBinds")):
                 if part(bind, "weight") is not None:
                     text = str(name).replace("~", "~0").replace("/", "~1")
                     place = f"expressions/{kind}/{text}/morphTargetBinds/{row}/weight"

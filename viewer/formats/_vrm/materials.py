@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
+from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
 from viewer.rig.arrays import Floats
 from viewer.rig.expressions import COLOR_KINDS, TRANSFORM
 from viewer.rig.srgb import decode_srgb
@@ -97,7 +97,7 @@ def old_binds(told: Any, materials: list[Any]) -> tuple[list[_Bind], list[str]]:
     found: list[_Bind] = []
     moves: dict[int, Floats] = {}
     lost: list[str] = []
-    for each in listed(told, "materialValues"):
+    for each in list_in(told, "materialValues"):
         name, value = part(each, "propertyName"), rows_of(part(each, "targetValue"), (0.0,) * 4)
         named = part(each, "materialName")
         owners = [n for n, material in enumerate(materials) if part(material, "name") == named]
@@ -137,14 +137,14 @@ def modern_binds(told: Any, n_materials: int) -> tuple[list[_Bind], list[str]]:
     """
     found: list[_Bind] = []
     lost: list[str] = []
-    for each in listed(told, "materialColorBinds"):
+    for each in list_in(told, "materialColorBinds"):
         index, kind = part(each, "material"), part(each, "type")
         value = _color(part(each, "targetValue"))
         if is_index(index, n_materials) and kind in COLOR_KINDS and value is not None:
             found.append((index, kind, value))
         else:
             lost.append(f"{kind} of material {index}")
-    for each in listed(told, "textureTransformBinds"):
+    for each in list_in(told, "textureTransformBinds"):
         index = part(each, "material")
         scale = rows_of(part(each, "scale"), (1.0, 1.0))
         offset = rows_of(part(each, "offset"), (0.0, 0.0))

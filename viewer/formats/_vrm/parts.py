@@ -21,7 +21,7 @@ def part(told: Any, *names: str) -> Any:
     return value
 
 
-def listed(told: Any, *names: str) -> list[Any]:
+def list_in(told: Any, *names: str) -> list[Any]:
     """Return a nested list; an empty one if it is missing or not a list."""
     found = part(told, *names)
     return found if isinstance(found, list) else []

@@ -18,10 +18,9 @@ from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.checks import check_character
 from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.materials import modern_binds, old_binds
-from viewer.formats._vrm.parts import is_index, listed, part, value_of
+from viewer.formats._vrm.parts import is_index, list_in, part, value_of
 from viewer.formats._vrm.springs import read_springs
-from viewer.phrases import listed as listed_text
-from viewer.phrases import quoted
+from viewer.phrases import listed, quoted
 from viewer.rig.expressions import OLD_PRESETS, OVERRIDES, PROCEDURAL
 from viewer.rig.mesh import PartView
 from viewer.rig.springs.springs import Springs
@@ -121,7 +120,7 @@ def _expressions(
 ) -> tuple[NodeExpression, ...]:
     """Return the expressions that change shapes or materials; report changes without effect."""
     if version == 0:
-        groups = listed(told, "blendShapeMaster", "blendShapeGroups")
+        groups = list_in(told, "blendShapeMaster", "blendShapeGroups")
         named = [(_old_name(each), each) for each in groups if isinstance(each, dict)]
         at = f"{pointer}/blendShapeMaster/blendShapeGroups"
     else:
@@ -129,7 +128,7 @@ def _expressions(
         named = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
         at = f"{pointer}/expressions"
     found, undrawn = [], list[str]()
-    materials = listed(told, "materialProperties")
+    materials = list_in(told, "materialProperties")
     for name, each in named:
         if not isinstance(each, dict):
             continue
@@ -145,7 +144,7 @@ def _expressions(
         source.warn(
             "F007.vrm-materials: material changes by expressions have no effect: {names}",
             at,
-            names=listed_text(undrawn, 12),
+            names=listed(undrawn, 12),
         )
     return tuple(found)
 
@@ -160,7 +159,7 @@ def _binds(
 ) -> tuple[tuple[int, int, float], ...]:
     """Return node, morph target and weight of each bind of an expression."""
     binds: list[tuple[int, int, float]] = []
-    for each in listed(told, "binds" if version == 0 else "morphTargetBinds"):
+    for each in list_in(told, "binds" if version == 0 else "morphTargetBinds"):
         index, told_weight = part(each, "index"), part(each, "weight")
         weight = None if told_weight is None else value_of(told_weight, 0.0)
         if version == 0:
@@ -214,7 +213,7 @@ def _read_part_views(
     Version 0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), version 1 nodes
     (``type: "firstPersonOnly"``). Invalid annotations are ignored with a message.
     """
-    annotations = listed(told, "firstPerson", "meshAnnotations")
+    annotations = list_in(told, "firstPerson", "meshAnnotations")
     found: dict[int, PartView] = {}
     for index, each in enumerate(annotations):
         view = part(each, "firstPersonFlag" if version == 0 else "type")

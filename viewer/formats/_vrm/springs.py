@@ -29,7 +29,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
 from viewer.formats._scene_graph.content import NodeFile, NodeTree
 from viewer.formats._source import Source
-from viewer.formats._vrm.parts import is_index, listed, part, rows_of, value_of
+from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.springs.springs import INSIDE, OUTSIDE, PLANE, Colliders, Springs
@@ -115,7 +115,7 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _G
     """Return the colliders of version 1.0, and the colliders of each group."""
     places: dict[int, int] = {}
     shapes: list[_Shape] = []
-    for index, each in enumerate(listed(told, "colliders")):
+    for index, each in enumerate(list_in(told, "colliders")):
         extended = part(each, "extensions", EXTENDED, "shape")
         told_shape = part(each, "shape") if extended is None else extended
         shape = _shape(part(each, "node"), told_shape, file.tree.n_nodes)
@@ -129,7 +129,7 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _G
         else:
             places[index] = len(shapes)
             shapes.append(shape)
-    groups = [listed(each, "colliders") for each in listed(told, "colliderGroups")]
+    groups = [list_in(each, "colliders") for each in list_in(told, "colliderGroups")]
     return shapes, [
         tuple(places[index] for index in group if isinstance(index, int) and index in places)
         for group in groups
@@ -159,8 +159,8 @@ def _chains(
     file: NodeFile, told: Any, groups: _Groups, source: Source
 ) -> Iterator[list[_SpringJoint]]:
     """Yield the chains of version 1.0."""
-    for index, spring in enumerate(listed(told, "springs")):
-        chain = _chain(file.tree, spring, listed(spring, "joints"), groups)
+    for index, spring in enumerate(list_in(told, "springs")):
+        chain = _chain(file.tree, spring, list_in(spring, "joints"), groups)
         if chain is None:
             source.warn(wording.SPRING, f"/extensions/{_EXTENSION}/springs/{index}")
         elif chain:
@@ -204,7 +204,7 @@ def _obstacles_of(spring: Any, groups: _Groups) -> tuple[int, ...]:
     Each push is followed by restoring the length, which may move the point back into the collider,
     so a second push by the same collider moves it further.
     """
-    chosen = [g for g in listed(spring, "colliderGroups") if is_index(g, len(groups))]
+    chosen = [g for g in list_in(spring, "colliderGroups") if is_index(g, len(groups))]
     return tuple(index for group in chosen for index in groups[group])
 
 
@@ -224,9 +224,9 @@ def _old_shapes(file: NodeFile, told: Any) -> tuple[list[_Shape], _Groups]:
     """Return the colliders of version 0.x, and the colliders of each group."""
     shapes: list[_Shape] = []
     groups: _Groups = []
-    for each in listed(told, "colliderGroups"):
+    for each in list_in(told, "colliderGroups"):
         first, node = len(shapes), part(each, "node")
-        for given in listed(each, "colliders") if is_index(node, file.tree.n_nodes) else ():
+        for given in list_in(each, "colliders") if is_index(node, file.tree.n_nodes) else ():
             offset = _vector(part(given, "offset"), (0.0, 0.0, 0.0))
             radius = value_of(part(given, "radius"), 0.0)
             if offset is not None and radius is not None:
@@ -243,11 +243,11 @@ def _old_chains(
     children: dict[int, list[int]] = {}
     for node, parent in enumerate(tree.parents.tolist()):
         children.setdefault(parent, []).append(node)
-    for index, group in enumerate(listed(told, "boneGroups")):
+    for index, group in enumerate(list_in(told, "boneGroups")):
         down = _vector(part(group, "gravityDir"), _DOWN)
         names = ("stiffiness", "dragForce", "gravityPower", "hitRadius")
         values = [value_of(part(group, name), 0.0) for name in names]
-        bones = listed(group, "bones")
+        bones = list_in(group, "bones")
         is_valid = all(is_index(bone, tree.n_nodes) for bone in bones)
         if down is None or None in values or not is_valid:
             at = f"/extensions/VRM/secondaryAnimation/boneGroups/{index}"

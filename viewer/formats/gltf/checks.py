@@ -15,12 +15,10 @@ import numpy as np
 from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree, descendants, roots_of
-from viewer.formats._vrm.parts import listed, part
+from viewer.formats._vrm.parts import list_in, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
-from viewer.phrases import agree, counted
-from viewer.phrases import listed as listed_text
-from viewer.phrases import rounded as rounded_text
+from viewer.phrases import agree, counted, listed, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.inspection.faults import UNIT_ROTATION
 
@@ -115,8 +113,8 @@ def _compare_bounds(accessor: Element, components: Floats | None) -> None:
         if (apart > _ROUNDING * max(1e-30, float(np.abs(components).max()))).any():
             worst = int(apart.argmax())
             values = {
-                "expected": rounded_text(float(found[worst]), 9),
-                "found": rounded_text(float(declared[worst]), 9),
+                "expected": rounded(float(found[worst]), 9),
+                "found": rounded(float(declared[worst]), 9),
             }
             accessor.warn(
                 "G002.bounds: component {component}: expected {expected} as in the data, found "
@@ -184,7 +182,7 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: Ints, roots: Ints) 
             "G004.no-common-root: expected joints with a common root, found joints below nodes "
             "{nodes}",
             "joints",
-            nodes=listed_text(found, 12),
+            nodes=listed(found, 12),
         )
     declared = skin.values.get("skeleton")
     if type(declared) is int and 0 <= declared < len(parents):
@@ -276,7 +274,7 @@ def _check_times(document: Document, sampler: Element, accessor: int) -> None:
             "G005.negative: {n} at negative times (earliest: {found} s)",
             "input",
             n=counted(int((times < 0.0).sum()), "key"),
-            found=rounded_text(float(times.min()), 6),
+            found=rounded(float(times.min()), 6),
         )
 
 
@@ -293,7 +291,7 @@ def _check_rotations(document: Document, sampler: Element) -> None:
     odd = np.abs(lengths - 1.0) > (UNIT_ROTATION if one == 1.0 else 0.02)
     if odd.any():
         key = int(odd.argmax())
-        found = {"index": key, "found": rounded_text(float(lengths[key]), 6)}
+        found = {"index": key, "found": rounded(float(lengths[key]), 6)}
         sampler.warn(
             "G005.unit: {n} not of unit length (first: {found}, key {index}): normalised",
             "output",
@@ -562,7 +560,7 @@ def _check_structure(
     _check_skinned(root, tree, skins, report)
     for index, scene in _items_of(root, "scenes"):
         seen: set[int] = set()
-        for place, root_node in enumerate(listed(scene, "nodes")):
+        for place, root_node in enumerate(list_in(scene, "nodes")):
             if isinstance(root_node, int) and root_node in seen:
                 at = ("scenes", index, "nodes", place)
                 report(wording.G003_STRUCTURE, "each node once", f"node {root_node} again", at)
@@ -603,7 +601,7 @@ def _check_skinned(
     """Check that skinned meshes are roots, in a scene with their joints."""
     parents, tops = tree.parents.tolist(), roots_of(tree.parents)
     scenes = [
-        {node for node in listed(scene, "nodes") if isinstance(node, int)}
+        {node for node in list_in(scene, "nodes") if isinstance(node, int)}
         for _, scene in _items_of(root, "scenes")
     ]
     for node in np.flatnonzero(tree.skins >= 0).tolist():
@@ -656,8 +654,8 @@ def _check_channels(
 
 def _check_extensions(root: dict[str, Any], report: _Report) -> None:
     """Check that all extensions are declared."""
-    used = [name for name in listed(root, "extensionsUsed") if isinstance(name, str)]
-    for place, name in enumerate(listed(root, "extensionsRequired")):
+    used = [name for name in list_in(root, "extensionsUsed") if isinstance(name, str)]
+    for place, name in enumerate(list_in(root, "extensionsRequired")):
         if isinstance(name, str) and name not in used:
             at = ("extensionsRequired", place)
             report(wording.STRUCTURE, "a name that extensionsUsed contains", name, at)

@@ -13,8 +13,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._scene_graph.content import NodeTree, descendants
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
-from viewer.phrases import agree, counted
-from viewer.phrases import listed as listed_text
+from viewer.phrases import agree, counted, listed
 
 # Extensions of geometry and animation, and of characters; materials and textures list their own.
 _GEOMETRY = (
@@ -70,14 +69,14 @@ def check_extensions(document: Document) -> None:
             "F002.gltf-extensions: expected supported extensions, found {names}, without which "
             "the file may have another shape or motion",
             pointer,
-            names=listed_text(unknown, 12),
+            names=listed(unknown, 12),
         )
     looks = [name for name in required if name not in unknown]
     if looks:
         document.source.warn(
             "F007.gltf-look: {names} not shown: surfaces and motions do not depend on {them}",
             pointer,
-            names=listed_text(looks, 12),
+            names=listed(looks, 12),
             n=len(looks),
             them=agree(len(looks), "it", "them"),
         )
@@ -87,7 +86,7 @@ def check_extensions(document: Document) -> None:
         document.root.warn(
             "F007.gltf-extensions: ignored unsupported {names}",
             "extensionsUsed",
-            names=listed_text(optional, 12),
+            names=listed(optional, 12),
         )
     lights = document.root.extension("KHR_lights_punctual")
     if lights is not None and len(lights.table("lights")):
@@ -131,7 +130,7 @@ def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
             "F007.gltf-hidden: {n} hidden by KHR_node_visibility: {names}",
             "/nodes",
             n=counted(len(drawn), "node", "is", "are"),
-            names=listed_text(names, 12),
+            names=listed(names, 12),
         )
     return drawn
 
@@ -146,14 +145,14 @@ def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
     ('images.extras', 'attributes._SPEED')
     """
     found: dict[str, None] = {}
-    for kind, listed in root.items():
+    for kind, told in root.items():
         if kind == "extensions":
-            found |= dict.fromkeys(_extensions(kind, listed))
+            found |= dict.fromkeys(_extensions(kind, told))
         if kind == "asset":
-            found |= dict.fromkeys(_members(kind, [listed], False))
-        elif isinstance(listed, list):
-            found |= dict.fromkeys(_names_not_kept(kind, listed, root))
-            found |= dict.fromkeys(_members(kind, listed, kind in _KEPT))
+            found |= dict.fromkeys(_members(kind, [told], False))
+        elif isinstance(told, list):
+            found |= dict.fromkeys(_names_not_kept(kind, told, root))
+            found |= dict.fromkeys(_members(kind, told, kind in _KEPT))
     return tuple(found)
 
 

@@ -57,8 +57,7 @@ from viewer.formats.obj.lines import (
     without_comments,
 )
 from viewer.formats.obj.mtl import read_libraries
-from viewer.phrases import counted, optional, quoted
-from viewer.phrases import listed as listed_text
+from viewer.phrases import counted, listed, optional, quoted
 from viewer.rig.arrays import Bools, Floats, Ints, freeze
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
@@ -456,7 +455,7 @@ def _parts_of(source: Source, parts: _ObjParts) -> tuple[tuple[str, ...], Ints]:
         source.warn(
             "F007.obj-groups: {n} within objects ignored, as a face has one part: {names}",
             n=counted(len(within), "group"),
-            names=listed_text(within, 8),
+            names=listed(within, 8),
         )
     for word in (b"o", b"g"):
         names, of_face = _named(parts.runs[word], len(parts.counts))

@@ -50,8 +50,7 @@ from viewer.formats.video_mocap.parameter_layout import (
     with_facts,
 )
 from viewer.formats.video_mocap.results import Results, Track
-from viewer.phrases import Remedy, agree, counted, optional, printable
-from viewer.phrases import listed as listed_text
+from viewer.phrases import Remedy, agree, counted, listed, optional, printable
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.bodies.smpl_family import FAMILY, gender_of
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
@@ -133,7 +132,7 @@ def read(source: Source, archive: Archive) -> Results:
     source.warn(
         "F007.video-parameters: SMPL parameters of {n} {people}: {recognised}{ignored}",
         n=len(people),
-        recognised=listed_text(recognised, 12),
+        recognised=listed(recognised, 12),
         ignored=optional("; ignored: {}", rest),
         people=agree(len(people), "person", "people"),
     )
@@ -174,7 +173,7 @@ def _rate(source: Source, found: list[ParameterDict]) -> float | None:
         elif rate not in rates:
             rates.append(rate)
     if len(rates) > 1:
-        source.warn(wording.MOTION_RATES, rates=listed_text([f"{rate:g}" for rate in rates]))
+        source.warn(wording.MOTION_RATES, rates=listed([f"{rate:g}" for rate in rates]))
     return rates[0] if rates else None
 
 
@@ -333,7 +332,7 @@ def _on_timeline(
         source.warn(
             "F007.frames-empty: {n} without people: {frames}",
             n=counted(len(missing), "frame"),
-            frames=listed_text(spans),
+            frames=listed(spans),
         )
     return frames, persons, span
 
@@ -518,7 +517,7 @@ def _numbers_of(source: Source, persons: Sequence[_Person]) -> dict[_Person, int
         f"{number}: {printable(one, 40)}" for one, number in numbers.items() if isinstance(one, str)
     ]
     if names:
-        source.warn(wording.PERSON_NAMES, names=listed_text(names))
+        source.warn(wording.PERSON_NAMES, names=listed(names))
     return numbers
 
 
