@@ -44,8 +44,8 @@ from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_i
 from viewer.formats._source import Source
 from viewer.formats._text.json_places import (
     constant_place,
-    nesting_place,
-    repeated_key,
+    decoded,
+    unique,
     value_place,
 )
 from viewer.formats._text.numbers import LARGEST
@@ -103,7 +103,6 @@ _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _UPS = ("y", "z")  # axes that may be up
 _SHORTEST = 1e-6  # minimum length of a quaternion; a shorter one defines no reliable rotation
 _LONGEST_WORD = 200  # maximum number of characters of a text
-_DEEPEST = 500  # nesting level that is reported for a text nested too deeply for Python
 _MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
 
 
@@ -536,25 +535,21 @@ def _is_of(one: Any, kinds: str) -> bool:
 def _parse_json(source: Source) -> _NamedValues:
     """Return the object in a JSON file."""
     text = source.data.decode("utf-8", "surrogateescape")
-    odd: set[str] = set()  # Python accepts these words, but JSON does not
+    constants: list[str] = []  # Python accepts these words, but JSON does not
 
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        values = dict(pairs)
-        odd.update(["a key twice"] if len(values) != len(pairs) else ())
-        return values
+    def fault(key: str, offset: int | None, **values: Any) -> FormatError:
+        return source.fault(key, None if offset is None else _byte_offset(text, offset), **values)
 
-    try:
-        values = json.loads(
-            text, object_pairs_hook=unique, parse_int=_whole, parse_constant=odd.add
+    decoder = json.JSONDecoder(
+        object_pairs_hook=unique, parse_int=_whole, parse_constant=constants.append
+    )
+    values = decoded(text, fault, decoder.decode)
+    if constants:
+        raise fault(
+            "F002.json-constant: expected a finite number, found {found}",
+            constant_place(text, constants[0]),
+            found=constants[0],
         )
-    except json.JSONDecodeError as problem:
-        place = _byte_offset(text, problem.pos)
-        raise source.fault(wording.JSON, place, reason=printable(problem.msg, 100)) from None
-    except RecursionError:
-        place = _byte_offset(text, nesting_place(text, _DEEPEST))
-        raise source.fault(wording.JSON_NESTING, place) from None
-    if odd:
-        raise _odd_json(source, text)
     named = _NamedValues(source, values if isinstance(values, dict) else {}, text)
     if not isinstance(values, dict):
         is_word = values is None or isinstance(values, bool)
@@ -570,20 +565,6 @@ def _whole(digits: str) -> int | float:
     # Python refuses to convert very long integers. Converted to infinite floats, they are reported
     # with a line.
     return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
-
-
-def _odd_json(source: Source, text: str) -> FormatError:
-    """Return the error about NaN, an infinity, or a repeated key."""
-    constant, repeated = constant_place(text), repeated_key(text)
-    if constant is not None:
-        return source.fault(
-            "F002.json-constant: expected a finite number, found {found}",
-            _byte_offset(text, constant[1]),
-            found=constant[0],
-        )
-    assert repeated is not None  # a repeated key is the only remaining reason
-    found = printable(repeated[0], 40)
-    return source.fault(wording.JSON_TWICE, _byte_offset(text, repeated[1]), found=found)
 
 
 def _byte_offset(text: str, place: int) -> int:

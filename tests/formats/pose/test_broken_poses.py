@@ -105,7 +105,7 @@ def text_refusal(text, name="a.json"):
         ('{\n"dof": {"a.x": 1}}', ("F002.pose-keys", 2, {"keys": ["dof"],
          "near": "did you mean dofs?"})),
         ("\n\n[1, 2]", ("F002.pose-object", 3, {"found": "a list of length 2"})),
-        ('{"a":\n' * 499 + "[\n[\n" * 40_000, ("F002.json-nesting", 501, {})),
+        ('{"a":\n' * 499 + "[\n[\n" * 40_000, ("F002.json-nesting", 80499, {})),
     ],
 )  # fmt: skip
 def test_broken_json_is_refused(text, message):

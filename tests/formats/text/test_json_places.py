@@ -6,8 +6,10 @@ import pytest
 
 from viewer.formats._text.json_places import (
     constant_place,
-    nesting_place,
+    decoded,
+    deepest_place,
     repeated_key,
+    unique,
     value_place,
 )
 
@@ -52,11 +54,35 @@ def test_last_duplicate_key_is_used_and_the_second_is_reported():
 
 
 def test_nan_and_infinity_are_found_outside_strings():
-    assert constant_place('{"NaN": "a NaN", "b": [1, -Infinity, NaN]}') == ("-Infinity", 26)
-    assert constant_place('{"NaN": "Infinity"}') is None
+    text = '{"NaN": "a NaN", "b": [1, -Infinity, NaN]}'
+    assert constant_place(text, "-Infinity") == 26
+    assert constant_place(text, "NaN") == 37
+    assert constant_place('{"NaN": "Infinity"}', "NaN") is None
 
 
-def test_excessive_nesting_is_found():
-    assert nesting_place('["[[", [[1]]]', 2) == 8
-    assert nesting_place("[{}, {}, []]", 2) == 12
-    assert nesting_place("[[[", 0) == 0
+def test_deepest_bracket_is_found():
+    assert deepest_place('["[[", [[1]]]') == 8
+    assert deepest_place("[{}, {}, [[") == 10
+
+
+class RefusedError(Exception):
+    def __init__(self, key, offset, **values):
+        super().__init__(key, offset, values)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "offset"),
+    [
+        ('{"a": é}', "F002.json", 6),
+        ("[" * 100_000, "F002.json-nesting", 99_999),
+        ('{"b": {"a": 1, "a": 2}}', "F002.json-twice", 15),
+        ("[1, " + "9" * 5000 + "]", "F002.capture-digits", 4),
+    ],
+)
+def test_texts_that_cannot_be_decoded_are_refused_at_an_offset(text, key, offset):
+    decoder = json.JSONDecoder(object_pairs_hook=unique)
+    with pytest.raises(RefusedError) as caught:
+        decoded(text, RefusedError, decoder.decode)
+    message, found, _ = caught.value.args
+    assert (message.partition(":")[0], found) == (key, offset)
+    assert decoded('{"a": 1, "a": [2]}', RefusedError) == {"a": [2]}

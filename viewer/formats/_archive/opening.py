@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bz2
-import json
 import lzma
 import re
 import zlib
@@ -11,11 +10,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from viewer.diagnostics import wording
+from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Value
 from viewer.formats._archive.zip import MAX_RATIO, SMALL, Data, FileWindow
 from viewer.formats._source import Source
-from viewer.formats._text.json_places import MOST_DIGITS, deepest_place, long_number_place
+from viewer.formats._text.json_places import decoded
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
@@ -125,16 +124,12 @@ def _open_json(source: Source) -> Archive:
     from viewer.formats._pickle.reading import named_archive
 
     text = source.data.decode("utf-8", "replace")
-    try:
-        whole = json.loads(text)
-    except json.JSONDecodeError as problem:
-        offset = len(text[: problem.pos].encode())
-        raise source.fault(wording.JSON, offset, reason=printable(problem.msg, 100)) from None
-    except RecursionError:
-        raise source.fault(wording.JSON_NESTING, deepest_place(text)) from None
-    except ValueError:  # decoding can raise no other error
-        place = long_number_place(text)
-        raise source.fault(wording.CAPTURE_DIGITS, place, most=MOST_DIGITS) from None
+
+    def fault(key: str, offset: int | None, **values: Any) -> FormatError:
+        place = None if offset is None else len(text[:offset].encode())
+        return source.fault(key, place, **values)
+
+    whole = decoded(text, fault)
     return named_archive(source, "json", len(source.data), whole)
 
 

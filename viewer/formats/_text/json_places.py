@@ -1,4 +1,4 @@
-"""Offsets of values in a JSON text, searched for only when an error needs one.
+"""JSON texts: decoding, and offsets of values, searched for only when an error needs one.
 
 Python's parser is fast, but it does not record offsets. If there is an error, the text is scanned a
 second time, token by token. By then, it is known to be valid JSON, except that it may be nested too
@@ -9,7 +9,11 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from viewer.diagnostics import wording
+from viewer.phrases import printable
 
 MOST_DIGITS = 4300
 """Largest number of digits of an integer that Python converts."""
@@ -18,8 +22,36 @@ Keys = tuple[str | int, ...]
 """Keys and indices that lead from the outermost value to a nested value."""
 
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+')
-_CONSTANTS = ("NaN", "Infinity", "-Infinity")
 _LONG_NUMBER = re.compile(rf"[0-9]{{{MOST_DIGITS + 1}}}")
+
+
+class _RepeatedKeyError(ValueError):
+    """A key that occurs twice in an object."""
+
+
+def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a text, as the hook of a decoder that refuses repeated keys."""
+    values = dict(pairs)
+    if len(values) != len(pairs):
+        raise _RepeatedKeyError
+    return values
+
+
+def decoded(
+    text: str, fault: Callable[..., Exception], decode: Callable[[str], Any] = json.loads
+) -> Any:
+    """Return the value of a text, or raise ``fault(key, offset, ...)``; offsets in characters."""
+    try:
+        return decode(text)
+    except json.JSONDecodeError as problem:
+        raise fault(wording.JSON, problem.pos, reason=printable(problem.msg, 100)) from None
+    except RecursionError:
+        raise fault(wording.JSON_NESTING, deepest_place(text)) from None
+    except _RepeatedKeyError:
+        key, offset = repeated_key(text) or ("", 0)
+        raise fault(wording.JSON_TWICE, offset, found=printable(key, 40)) from None
+    except ValueError:  # decoding can raise no other error
+        raise fault(wording.CAPTURE_DIGITS, long_number_place(text), most=MOST_DIGITS) from None
 
 
 def line_at(text: str, offset: int) -> int:
@@ -73,26 +105,10 @@ def repeated_key(text: str) -> tuple[str, int] | None:
     return None
 
 
-def constant_place(text: str) -> tuple[str, int] | None:
-    """Return the first NaN or infinity that is written as a word, and its offset."""
-    words = ((token.group(), token.start()) for token in _TOKEN.finditer(text))
-    return next(((word, offset) for word, offset in words if word in _CONSTANTS), None)
-
-
-def nesting_place(text: str, depth: int) -> int:
-    """Return the offset of the first bracket at a given depth, or the end of the text.
-
-    The text need not be valid JSON.
-    """
-    open_brackets = 0
-    for token in _TOKEN.finditer(text):
-        if token.group() in ("[", "{"):
-            open_brackets += 1
-            if open_brackets > depth:
-                return token.start()
-        elif token.group() in ("]", "}"):
-            open_brackets -= 1
-    return len(text)
+def constant_place(text: str, constant: str) -> int | None:
+    """Return the offset of the first NaN or infinity, which is written as this word."""
+    tokens = (token for token in _TOKEN.finditer(text) if token.group() == constant)
+    return next((token.start() for token in tokens), None)
 
 
 def deepest_place(text: str) -> int:

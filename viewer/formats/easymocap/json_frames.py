@@ -6,7 +6,6 @@ import json
 import os
 import re
 from array import array
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +15,15 @@ from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import InvalidValueError
 from viewer.formats._text.json_places import (
-    MOST_DIGITS,
     Keys,
-    deepest_place,
+    decoded,
     line_at,
-    long_number_place,
     nearest_place,
-    repeated_key,
+    unique,
 )
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST, within_text
-from viewer.phrases import Remedy, counted, printable
+from viewer.phrases import Remedy, counted
 
 Record = dict[str, Any]
 _TRANSLATION = "Th"
@@ -46,21 +43,8 @@ class RecordError(InvalidValueError):
         super().__init__(problem)
 
 
-class _RepeatedKeyError(ValueError):
-    """Error about an object with a repeated key, which is the error's text."""
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> Record:
-    values = dict(pairs)
-    if len(values) != len(pairs):
-        counts = Counter(key for key, _ in pairs)
-        twice = next(key for key, count in counts.items() if count > 1)
-        raise _RepeatedKeyError(printable(twice, 40))
-    return values
-
-
 # Created only once, because creating a decoder is slow.
-_decode = json.JSONDecoder(object_pairs_hook=_unique).decode
+_decode = json.JSONDecoder(object_pairs_hook=unique).decode
 
 
 def load_people(path: str, max_size: int) -> list[Any]:
@@ -70,20 +54,11 @@ def load_people(path: str, max_size: int) -> list[Any]:
     if the file cannot be read, or is not JSON with a list of people.
     """
     text = _text(path, max_size)
-    try:
-        content = _decode(text)
-    except json.JSONDecodeError as problem:
-        reason = printable(problem.msg, 100)
-        raise _fault(wording.JSON, path, problem.lineno, reason=reason) from None
-    except RecursionError:
-        raise _fault(wording.JSON_NESTING, path, line_at(text, deepest_place(text))) from None
-    except _RepeatedKeyError as problem:
-        found = repeated_key(text)
-        line = _line(text, found[1] if found else None)
-        raise _fault(wording.JSON_TWICE, path, line, found=str(problem)) from None
-    except ValueError:  # decoding can raise no other error
-        line = _line(text, long_number_place(text))
-        raise _fault(wording.CAPTURE_DIGITS, path, line, most=MOST_DIGITS) from None
+
+    def fault(key: str, place: int | None, **values: Any) -> FormatError:
+        return _fault(key, path, _line(text, place), **values)
+
+    content = decoded(text, fault, _decode)
     if isinstance(content, dict) and _WRAPPER in content:
         content = content[_WRAPPER]
     elif isinstance(content, dict) and not _OF_PERSON.isdisjoint(content):
