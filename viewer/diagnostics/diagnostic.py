@@ -1,8 +1,9 @@
 """Errors, warnings and notes as data.
 
-A ``Diagnostic`` is the key of a message, a location and the values of the message; a value that is
-text with values of its own is a ``Phrase``. A ``Collector`` keeps what a reader finds, ``merged``
-counts what differs only in its location, and ``described`` returns everything as JSON data.
+A ``Diagnostic`` is the key and sentence of a message, a location and the values of the message; a
+value that is text with values of its own is a ``Phrase``. A ``Collector`` keeps what a reader
+finds, ``merged`` counts what differs only in its location, and ``described`` returns everything as
+JSON data.
 """
 
 from __future__ import annotations

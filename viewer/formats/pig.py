@@ -48,7 +48,7 @@ from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, has_influence, skin_from_entries, weight_sums
 
 _Indices = NDArray[np.int64]
-_JOINT, _VERTEX = "joint", "vertex"  # keys of phrases
+_JOINT, _VERTEX = "joint", "vertex"
 
 _CORE = {
     "vertices": 3,
@@ -479,7 +479,7 @@ def _column(parts: dict[str, _Part], name: str, rows: int, end: int, noun: str) 
 def _indices(part: _Part, column: int, end: int, noun: str, rows_of: _Part | None = None) -> Ints:
     """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part.
 
-    ``noun`` is the key of the phrase for the indexed elements, ``"noun-vertex"``.
+    ``noun`` names the indexed elements: ``"vertex"``.
     """
     return _columns(part, slice(column, column + 1), end, noun, rows_of)[:, 0]
 
