@@ -30,10 +30,9 @@ def terminal(monkeypatch) -> Terminal:
 
 def test_progress_shows_title_and_count_and_is_erased(terminal, monkeypatch):
     monkeypatch.setattr("sys.stderr", terminal)
-    with Progress("reading [b]walk[/b]", 1200) as progress:
-        progress.show(300)
-        progress.title = "comparing"
-        progress.show(1200)
+    with Progress("reading [b]walk[/b]") as progress:
+        progress.receive(300, 1200, "", "")
+        progress.receive(1200, 1200, "", "comparing")
     text = terminal.getvalue()
     assert "reading [b]walk[/b]" in text and " 300/1200" in text
     assert "comparing" in text and "1200/1200" in text
@@ -54,13 +53,13 @@ def test_reported_work_is_shown_with_its_unit_and_without_a_known_total(terminal
 
 def test_progress_is_silent_in_pipes_and_for_short_jobs(terminal, monkeypatch):
     monkeypatch.setattr("sys.stderr", pipe := io.StringIO())
-    with Progress("reading", 2) as progress:
-        progress.show(1)
+    with Progress("reading") as progress:
+        progress.receive(1, 2, "", "")
     assert pipe.getvalue() == ""
     monkeypatch.setattr("sys.stderr", terminal)
     monkeypatch.setattr(_progress, "_FIRST", 60.0)
-    with Progress("reading", 2) as progress:
-        progress.show(1)
+    with Progress("reading") as progress:
+        progress.receive(1, 2, "", "")
     assert terminal.getvalue() == ""
 
 

@@ -18,54 +18,43 @@ _FIRST, _EVERY = 0.7, 0.2  # seconds before the bar appears, and between updates
 
 
 class Progress:
-    """Progress bar; silent without a terminal and for quick work.
+    """Progress bar of the work that it receives; silent without a terminal and for quick work."""
 
-    ``title``: name of the work.
-    ``total``: number of steps.
-    ``unit``: text after the number of steps, such as their unit or rate.
-    """
-
-    def __init__(self, title: str, total: int) -> None:
-        self.title, self.total = title, total
-        self.unit = ""
+    def __init__(self, title: str) -> None:
+        self._title = title
         self._due = time.monotonic() + _FIRST
         self._bar: Bar | None = None
 
-    def begin(self) -> None:
+    def begin(self, total: int) -> None:
         """Show the bar at once: the first step may take long."""
         if sys.stderr.isatty():
-            self._draw(0)
+            self._draw(0, total, "")
 
-    def show(self, done: int) -> None:
-        """Update the bar to a number of completed steps."""
+    def receive(self, done: int, total: int, unit: str, what: str) -> None:
+        """Update the bar to reported progress; see ``viewer.progress``."""
+        self._title = what or self._title
         if time.monotonic() >= self._due and sys.stderr.isatty() and done > 0:
-            self._draw(done)
+            self._draw(done, total, unit)
 
-    def _draw(self, done: int) -> None:
+    def _draw(self, done: int, total: int, unit: str) -> None:
         self._due = time.monotonic() + _EVERY
-        title = printable(self.title, 60)
+        title = printable(self._title, 60)
         if self._bar is None:
             self._bar = _bar()
             self._bar.start()
         # The total of a bar cannot become unknown again, so new work gets a new bar.
         for task in self._bar.tasks:
-            if (task.description, task.total) != (title, self.total or None):
+            if (task.description, task.total) != (title, total or None):
                 self._bar.remove_task(task.id)
         if not self._bar.tasks:
-            self._bar.add_task(title, total=self.total or None, completed=done, unit=self.unit)
-        self._bar.update(self._bar.task_ids[0], completed=done, unit=self.unit, refresh=True)
+            self._bar.add_task(title, total=total or None, completed=done, unit=unit)
+        self._bar.update(self._bar.task_ids[0], completed=done, unit=unit, refresh=True)
 
     def hide(self) -> None:
         """Remove the bar, so that a message can be printed; the next update shows it again."""
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
-
-    def receive(self, done: int, total: int, unit: str, what: str) -> None:
-        """Update the bar to reported progress; see ``viewer.progress``."""
-        self.title = what or self.title
-        self.total, self.unit = total, unit
-        self.show(done)
 
     def __enter__(self) -> Progress:
         return self
@@ -84,12 +73,12 @@ def shown_progress(title: str) -> Iterator[None]:
         if outer is not None:
             outer(done, total, unit, what)
 
-    with Progress(title, 0) as progress, receiving(receive):
+    with Progress(title) as progress, receiving(receive):
         yield
 
 
 def _bar() -> Bar:
-    """Return a bar that only ``show`` redraws, without a thread or redirected streams."""
+    """Return a bar that only ``Progress`` redraws, without a thread or redirected streams."""
     from rich import progress
     from rich.console import Console
 

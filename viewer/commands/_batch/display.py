@@ -33,7 +33,7 @@ class Display:
     ) -> None:
         self._is_json = is_json
         self.total = len(items)
-        self._progress = Progress(title, self.total)
+        self._progress = Progress(title)
         self._rate, self._said = _Rate(), time.monotonic()
         self._n_done = self._n_failed = self._n_unchanged = 0
         self._texts: dict[int, str] = {}  # text that waits for earlier items, by index
@@ -48,8 +48,7 @@ class Display:
         failed = f", {self._n_failed} failed" if self._n_failed else ""
         if self._has_bar():
             # A new title would start a new bar, which could not estimate the time left.
-            self._progress.unit = f"{rate:.3g}/s{failed}"
-            self._progress.show(self._n_done)
+            self._progress.receive(self._n_done, self.total, f"{rate:.3g}/s{failed}", "")
         now = time.monotonic()
         if not sys.stderr.isatty() and now > self._said + _MINUTE:
             self._said = now
@@ -82,7 +81,7 @@ class Display:
 
     def __enter__(self) -> Display:
         if self.total > 1 and self._has_bar():
-            self._progress.begin()
+            self._progress.begin(self.total)
         return self
 
     def __exit__(self, *_: object) -> None:
