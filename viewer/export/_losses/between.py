@@ -64,12 +64,7 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
     written = SampledClip(
         motion.name,
         Timing(rate, np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)),
-        frames.rotations,
-        frames.translations,
-        frames.figure_translations,
-        frames.figure_scales,
-        frames.shape_weights,
-        frames.scales,
+        *frames.arrays,
     )
     first = frames.times[0]
 

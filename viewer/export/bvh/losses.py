@@ -34,6 +34,7 @@ from viewer.formats.bvh.motion import table_of
 from viewer.formats.bvh.streaming import Irregular, clip_of, parsed_rows
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
@@ -116,10 +117,10 @@ class FileLosses:
                 places = joint_positions(read, again)[:, order] @ space.world / space.factor
                 return bare_poses(places, frames_between(frames, rows))
             found = world_frames(read, again)[:, order]
-            world = np.zeros(found.shape)
-            world[..., 3, 3] = 1.0
-            world[..., :3, 3] = found[..., :3, 3] @ space.world / space.factor
-            world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
+            world = affine_matrices(
+                space.world.T @ found[..., :3, :3] @ own,
+                found[..., :3, 3] @ space.world / space.factor,
+            )
             places = world[..., :3, 3].copy()
             shifts = frames_between(frames, rows).figure_translations
             world[..., :3, 3] -= shifts[:, None]

@@ -65,6 +65,12 @@ class Frames:
         """Number of frames, F."""
         return len(self.times)
 
+    @property
+    def arrays(self) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+        """All arrays of the poses, in the order of ``SampledClip``."""
+        places = self.figure_translations, self.figure_scales
+        return self.rotations, self.translations, *places, self.shape_weights, self.scales
+
 
 def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
     """Return the seconds from the earliest start to the latest end of all clips."""
@@ -328,12 +334,7 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
     found = joint_samples(
         skeleton,
         part.present,
-        part.rotations,
-        part.translations,
-        part.figure_translations,
-        part.figure_scales,
-        part.shape_weights,
-        part.scales,
+        *part.arrays,
     )
     set_poses(found, np.zeros(1, dtype=np.intp), skeleton, [pose])
     return pose

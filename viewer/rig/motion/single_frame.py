@@ -37,12 +37,7 @@ def single_frame(
         motion = SampledClip(
             actor.name,
             Timing(rate, np.zeros(1, dtype=np.int32), first_frame=number, start=time),
-            frames.rotations,
-            frames.translations,
-            frames.figure_translations,
-            frames.figure_scales,
-            frames.shape_weights,
-            frames.scales,
+            *frames.arrays,
         )
     gender = actor.shape_space.gender or figure.shape_space.gender
     return SampledAnimation(actor.name, figure, rate, number, frames, motion, gender=gender)
