@@ -111,7 +111,9 @@ def test_edited_keys_stay_when_another_animation_plays(hand):
 
 def test_invalid_keys_are_reported_without_changes(drive, tmp_path):
     def refuse():
-        raise FormatError(Diagnostic("F002.misfit", tmp_path, values={"message": "bad keys"}))
+        raise FormatError(
+            Diagnostic("F002.misfit: {message}", tmp_path, values={"message": "bad keys"})
+        )
 
     figure = leg(animations=(animation(wave()), Animation("bad", 0.0, 1.0, refuse)))
     hand = drive(scene=scene_of(figure), size=SIZE)

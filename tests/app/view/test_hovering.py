@@ -27,7 +27,7 @@ def pair(drive, rig):
 
 
 def keys(hand):
-    return [part.sentence() for part in outlined_parts(hand.state)]
+    return [part.key() for part in outlined_parts(hand.state)]
 
 
 def beside(hand, joint, across=11.0):
