@@ -42,13 +42,16 @@ class Progress:
         if self._bar is None:
             self._bar = _bar()
             self._bar.start()
-        # The total of a bar cannot become unknown again, so new work gets a new bar.
+        # The total of a bar cannot become unknown again, so new work gets a new bar; steps of the
+        # same work share one, which estimates the time left for all of them.
         for task in self._bar.tasks:
-            if (task.description, task.total) != (title, total or None):
+            if task.total != (total or None) or task.completed > done:
                 self._bar.remove_task(task.id)
         if not self._bar.tasks:
             self._bar.add_task(title, total=total or None, completed=done, unit=unit)
-        self._bar.update(self._bar.task_ids[0], completed=done, unit=unit, refresh=True)
+        self._bar.update(
+            self._bar.task_ids[0], description=title, completed=done, unit=unit, refresh=True
+        )
 
     def hide(self) -> None:
         """Remove the bar, so that a message can be printed; the next update shows it again."""
