@@ -33,6 +33,7 @@ from viewer.rig.scene import Scene
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
+    from viewer.diagnostics.codes import Severity
     from viewer.loading.capturing import Builder
     from viewer.rig.retargeting.joint_map import JointMap
 
@@ -306,7 +307,7 @@ def _with_models(problem: FormatError, files: Sequence[str | Path]) -> ViewerErr
     return FormatError(Diagnostic(key, problem.path, values=values))
 
 
-def print_warnings(warnings: Iterable[str | Diagnostic], plain: str = "warning") -> None:
+def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warning") -> None:
     """Print one line per warning or note to the error stream, unless the run is recorded.
 
     Plain strings have the severity ``plain``; errors in a file that was opened nevertheless are

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from viewer.data_classes import dataclass
 from viewer.phrases import Remedy
 
-SEVERITIES = ("note", "warning", "error")
+Severity = Literal["note", "warning", "error"]
+SEVERITIES: tuple[Severity, ...] = ("note", "warning", "error")
 """Severities in ascending order."""
 
 
@@ -13,8 +16,8 @@ SEVERITIES = ("note", "warning", "error")
 class Code:
     """One kind of finding."""
 
-    severity: str
-    """One of ``SEVERITIES``; a diagnostic may override it."""
+    severity: Severity
+    """A diagnostic may override it."""
     title: str
     """Short description, for lists of codes."""
     remedy: str | Remedy

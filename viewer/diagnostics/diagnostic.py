@@ -22,6 +22,8 @@ from viewer.phrases import NO_VALUE, Remedy, Shown, as_data, listed, printable
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from viewer.diagnostics.codes import Severity
+
 Part = Literal[
     "",
     "positions",
@@ -74,7 +76,7 @@ class Diagnostic:
     count: int = 1
     """Number of errors that it represents; 0 if it only adds indices to an error reported by
     another diagnostic."""
-    level: str = ""
+    level: Severity | None = None
     """Severity, if different from that of the code."""
     is_refusal: bool = False
     """Whether ``load`` refuses the file because of it."""
@@ -103,8 +105,8 @@ class Diagnostic:
         return self.key.partition(".")[0]
 
     @property
-    def severity(self) -> str:
-        """One of ``SEVERITIES``; a refusal is an error unless ``level`` differs."""
+    def severity(self) -> Severity:
+        """A refusal is an error unless ``level`` differs."""
         from viewer.diagnostics.codes import CODES
 
         return self.level or ("error" if self.is_refusal else CODES[self.code].severity)

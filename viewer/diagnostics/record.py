@@ -6,11 +6,14 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics.diagnostic import Diagnostic, described
 from viewer.phrases import printable
+
+if TYPE_CHECKING:
+    from viewer.diagnostics.codes import Severity
 
 
 @dataclass
@@ -47,7 +50,7 @@ def is_recorded() -> bool:
     return _current is not None
 
 
-def note_found(found: Diagnostic | str, severity: str = "warning") -> bool:
+def note_found(found: Diagnostic | str, severity: Severity = "warning") -> bool:
     """Record a warning or note; return whether a run is being recorded.
 
     ``severity`` applies to plain texts.

@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass, setting
 from viewer.diagnostics import CODES, Diagnostic
+from viewer.diagnostics.codes import Severity
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.inspection.faults import NO_INDICES
@@ -99,8 +100,8 @@ class Finding:
         return self.diagnostic.code
 
     @property
-    def severity(self) -> str:
-        """Severity, one of ``SEVERITIES``."""
+    def severity(self) -> Severity:
+        """Severity of the diagnostic."""
         return self.diagnostic.severity
 
     @property
@@ -138,7 +139,7 @@ class Finding:
         self,
         file: Path | None,
         line: int | None = None,
-        severity: str = "",
+        severity: Severity | None = None,
         pointer: str | None = None,
     ) -> Finding:
         """Return the finding with a new location in the files, and a severity if one is given."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.codes import Severity
 from viewer.lint._finding import NO_TIMES, Finding, LintOptions
 from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -148,7 +149,7 @@ class Subject:
         key: str,
         *,
         part: Literal["mesh", "skeleton", "clip"] = "mesh",
-        severity: str = "",
+        severity: Severity | None = None,
         vertices: _IndicesLike = NO_INDICES,
         triangles: _IndicesLike = NO_INDICES,
         joints: _IndicesLike = NO_INDICES,

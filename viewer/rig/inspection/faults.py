@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, typical_place
 from viewer.rig.skeleton import joint_labels
 from viewer.rig.skin import Skin, has_influence, owners, weight_sums
+
+if TYPE_CHECKING:
+    from viewer.diagnostics.codes import Severity
 
 # The tolerances of all formats. Readers that normalise report what they changed themselves.
 _NOTED = 1e-3  # minimum deviation of a sum of weights from 1: files round to three digits
@@ -55,7 +58,7 @@ class Fault:
     triangles: Indices = field(default_factory=lambda: NO_INDICES)
     joints: Indices = field(default_factory=lambda: NO_INDICES)
     """(N,): indices, worst first."""
-    severity: str = ""
+    severity: Severity | None = None
     """Severity, if different from that of the code."""
 
 
@@ -104,7 +107,7 @@ def _sums(skin: Skin, moved: Bools) -> Iterator[Fault]:
             "vertex": worst,
             "error": rounded(error),
         }
-        severity = "warning" if error > _WRONG else "note"
+        severity: Severity = "warning" if error > _WRONG else "note"
         message = (
             "W001.sums: weights of {n} do not sum to 1 (worst: {sum} at vertex {vertex}, an error "
             "of {error})"
