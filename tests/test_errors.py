@@ -3,14 +3,14 @@ from pathlib import Path
 import pytest
 
 from viewer import errors
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import FormatError, OutputError, RenderError, ViewerError
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 
 
 def wrong(path, line=None):
-    values = {"n": 3, "expected": 3, "found": 2, "item": "positions"}
-    return FormatError(Diagnostic("F002.width", Path(path), line, values=values))
+    values = {"expected": counted(3, "number"), "found": 2, "item": "positions"}
+    return FormatError(Diagnostic(wording.WIDTH, Path(path), line, values=values))
 
 
 @pytest.mark.parametrize("name", [name for name in errors.__all__ if name.endswith("Error")])

@@ -66,7 +66,7 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import PERSON, motion_paths
 from viewer.formats import Source, all_or_none, check_folder_target, check_targets, detect
-from viewer.interrupts import raising
+from viewer.interrupts import hold, raising
 from viewer.loading import Contents, MotionSettings, begin
 from viewer.loading.skeleton_motions import as_asked
 from viewer.phrases import printable
@@ -148,8 +148,7 @@ def _written(
         check_targets(files, inputs, force)
     else:
         check_folder_target(files[0], inputs, force)
-    with raising():
-        return [*export(selection, output, options=options), *chosen]
+    return [*export(selection, output, options=options), *chosen]
 
 
 def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, force: bool) -> None:
@@ -244,6 +243,7 @@ def convert_streamed(
     except OutputError:
         print_warnings(request.warnings)
         raise
+    hold()  # as after the writing of a whole motion
     print_warnings(request.warnings)
     return notes
 

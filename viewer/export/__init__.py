@@ -17,6 +17,7 @@ from viewer.export._left_out import motion_notes
 from viewer.export._motion_paths import files_at, is_together, part_files, part_paths
 from viewer.export._options import ExportOptions, VrmMeta
 from viewer.formats import all_or_none
+from viewer.interrupts import raising
 from viewer.phrases import all_of, counted, printable
 from viewer.rig.bodies.smpl_family import member_of
 from viewer.rig.captures.person import is_tracked, person_label
@@ -276,7 +277,8 @@ def export(
     with all_or_none([] if plan.kind.folder else plan.files(chosen)):
         for each, file in plan.groups:
             part = each.parts[0]
-            notes += module.export(each, file, replace(chosen, world_up=part.up))
+            with raising():  # sampling and comparing may take long; saving holds signals itself
+                notes += module.export(each, file, replace(chosen, world_up=part.up))
             if part.frames is None:
                 notes += _hidden_note(each.actors)
             elif part.content == "frames" and not plan.kind.stores_many:
