@@ -74,7 +74,12 @@ def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
     for node in nodes:
         parent = joints.carrier.get(parents[node], -1)
         if node in tree.matrices:
-            _add_sheared(joints, node, tree.names[node], parent, tree.matrices[node])
+            matrix = tree.matrices[node]
+            left, scales, right = sheared(matrix[:3, :3])
+            rotation, below = matrix_to_quaternion(np.stack([left, right]))
+            own = joints.add(node, tree.names[node], parent, matrix[:3, 3], rotation, scales)
+            joints.own[node] = own
+            joints.carrier[node] = joints.add_auxiliary(own, below)
             continue
         joint = joints.add(
             node,
@@ -86,15 +91,6 @@ def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
         )
         joints.own[node] = joints.carrier[node] = joint
     return joints
-
-
-def _add_sheared(joints: Joints, node: int, name: str, parent: int, matrix: Floats) -> None:
-    """Add the two joints of a node that shears."""
-    left, scales, right = sheared(matrix[:3, :3])
-    rotation, below = matrix_to_quaternion(np.stack([left, right]))
-    own = joints.add(node, name, parent, matrix[:3, 3], rotation, scales)
-    joints.own[node] = own
-    joints.carrier[node] = joints.add_auxiliary(own, below)
 
 
 def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:

@@ -34,7 +34,10 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     Returns dict of (S,) int32.
     """
     shaped = [node for node in nodes if _mesh(file, node).target_names]
-    looks = {node: _look(file, node) for node in shaped}
+    looks = {
+        node: (_mesh(file, node).target_names, tuple(_defaults(file, node).tolist()))
+        for node in shaped
+    }
     counts = Counter(looks.values())
     known: dict[tuple[object, ...], Ints] = {}
     columns: dict[int, Ints] = {}
@@ -49,11 +52,6 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
             count += len(names)
         columns[node] = known[key]
     return columns
-
-
-def _look(file: NodeFile, node: int) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    """Return the names and the default weights of a node's morph targets."""
-    return _mesh(file, node).target_names, tuple(_defaults(file, node).tolist())
 
 
 def _keys(file: NodeFile, node: int, readers: list[Reader]) -> tuple[object, ...]:
@@ -100,7 +98,12 @@ def blend_shapes_of(
     for node, own in columns.items():
         for column in own.tolist():
             owners.setdefault(column, node)
-    targets = [_target(file, columns, column, node) for column, node in sorted(owners.items())]
+    targets: list[_Target] = []
+    for column, node in sorted(owners.items()):
+        index = int(np.flatnonzero(columns[node] == column)[0])
+        name = _mesh(file, node).target_names[index] or f"target {index}"
+        part = part_name(file, node) or f"#{node}"
+        targets.append(_Target(name, f"{part}.{name}", float(_defaults(file, node)[index])))
     counts = Counter(target.name for target in targets)
     count = sum(piece.n_vertices for piece in pieces)
     mixed, sums = _expressions(file, columns, len(targets), slots)
@@ -191,13 +194,6 @@ class _Target:
     name: str
     full_name: str
     weight: float
-
-
-def _target(file: NodeFile, columns: dict[int, Ints], column: int, node: int) -> _Target:
-    index = int(np.flatnonzero(columns[node] == column)[0])
-    name = _mesh(file, node).target_names[index] or f"target {index}"
-    part = part_name(file, node) or f"#{node}"
-    return _Target(name, f"{part}.{name}", float(_defaults(file, node)[index]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

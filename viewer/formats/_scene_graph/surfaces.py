@@ -98,8 +98,18 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
                 influences = _on_joint(len(primitive.positions), joint)
             if id(primitive) not in shadings:
                 shadings[id(primitive)] = _shading(primitive)
-            shading = shadings[id(primitive)]
-            pieces.append(_piece(node, part, primitive, baked, influences, shading))
+            sources, triangles, normals, is_flat = shadings[id(primitive)]
+            kind: _Origin = "flat" if is_flat else "smooth"
+            if primitive.normals is not None:
+                kind = "file"
+            if is_flat:
+                influences = _of_rows(influences, sources)
+            # A reflection reverses the triangles.
+            if np.linalg.det(baked[:3, :3]) < 0.0:
+                triangles = triangles[:, ::-1]
+            pieces.append(
+                Piece(node, part, primitive, baked, influences, sources, triangles, normals, kind)
+            )
     return pieces
 
 
@@ -169,26 +179,6 @@ def flat_shaded(positions: Floats, triangles: Ints) -> _Shading:
     return sources, split, vertex_normals(positions[sources], split), True
 
 
-def _piece(
-    node: int,
-    part: int,
-    primitive: Primitive,
-    baked: Floats,
-    influences: Influences,
-    shading: _Shading,
-) -> Piece:
-    """Return one piece; triangles that a reflection reverses are flipped back."""
-    sources, triangles, normals, is_flat = shading
-    kind: _Origin = "flat" if is_flat else "smooth"
-    if primitive.normals is not None:
-        kind = "file"
-    if is_flat:
-        influences = _of_rows(influences, sources)
-    if np.linalg.det(baked[:3, :3]) < 0.0:
-        triangles = triangles[:, ::-1]
-    return Piece(node, part, primitive, baked, influences, sources, triangles, normals, kind)
-
-
 def _of_rows(influences: Influences, rows: Ints) -> Influences:
     """Return the influences of the given vertices, which may repeat; the statistics stay."""
     starts = np.concatenate([[0], np.cumsum(influences.counts)])
@@ -210,7 +200,9 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     uvs = _uv_sets(pieces)
     return Mesh(
         positions=np.concatenate([_positions(piece) for piece in pieces]),
-        normals=np.concatenate([_normals(piece) for piece in pieces]),
+        normals=np.concatenate(
+            [piece.normals @ normal_matrix(piece) * normal_scales(piece) for piece in pieces]
+        ),
         triangles=triangles.astype(np.int32),
         uvs=uvs[0] if uvs else None,
         other_uvs=uvs[1:],
@@ -248,11 +240,6 @@ def _positions(piece: Piece) -> Floats:
     x, y, z = positions.T[:, :, None]
     right, up, back, shift = piece.baked[:3].T
     return np.asarray(x * right + y * up + z * back + shift, dtype=np.float64)
-
-
-def _normals(piece: Piece) -> Floats:
-    """Return the normals in binding space."""
-    return piece.normals @ normal_matrix(piece) * normal_scales(piece)
 
 
 def normal_matrix(piece: Piece) -> Floats:

@@ -18,7 +18,6 @@ from viewer.formats._scene_graph.content import (
 )
 from viewer.formats._scene_graph.grouping import Members
 from viewer.formats._scene_graph.joints import Joints, make_joints, rest_worlds, skeleton_of
-from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraMount, CameraPath, CameraView, extrinsics
 from viewer.rig.file_record import FileRecord
 from viewer.rig.motion.transform_clip import Animation
@@ -70,7 +69,7 @@ def views_of(
     carriers: Sequence[Carrier] = (),
     animations: Callable[[Joints], tuple[Animation, ...]] = lambda _: (),
 ) -> tuple[tuple[CameraView, ...], list[str]]:
-    """Return the perspective cameras of a scene.
+    """Return the perspective cameras of a scene, with square pixels; scales of nodes are ignored.
 
     Returns ``views``: cameras in the space of the scene; ``left_out``: names of the orthographic
     cameras.
@@ -87,10 +86,25 @@ def views_of(
         name = tree.names[node] or camera.name or f"camera {node}"
         if camera.vertical_angle is None:
             left_out.append(name)
-        else:
-            world = worlds[joints.carrier[node]]
-            mount = _mount(tree, node, carriers, animations)
-            views.append(_view(name, world, camera.vertical_angle, camera, mount))
+            continue
+        width, height = max(1, round(_HEIGHT * (camera.aspect or _ASPECT))), _HEIGHT
+        focal = 0.5 * height / math.tan(0.5 * camera.vertical_angle)
+        # glTF projects the axis of the camera to the centre of the picture. Pixel coordinates begin
+        # at the centre of the first pixel, so the principal point is at (W - 1) / 2, (H - 1) / 2.
+        across, down = 0.5 * (width - 1.0), 0.5 * (height - 1.0)
+        rotation, translation = extrinsics(worlds[joints.carrier[node]])
+        views.append(
+            CameraView(
+                name=name,
+                intrinsic=np.array([[focal, 0.0, across], [0.0, focal, down], [0.0, 0.0, 1.0]]),
+                rotation=rotation,
+                translation=translation,
+                size=(width, height),
+                near=camera.near,
+                far=camera.far,
+                mount=_mount(tree, node, carriers, animations),
+            )
+        )
     return tuple(views), left_out
 
 
@@ -121,28 +135,3 @@ def _mount(
     chain = make_joints(tree, below[::-1])
     path = None if mover is None else CameraPath(skeleton_of(chain), animations(chain))
     return CameraMount(owner.record, joint, rest_worlds(chain)[-1], path)
-
-
-def _view(
-    name: str, world: Floats, angle: float, camera: NodeCamera, mount: CameraMount | None
-) -> CameraView:
-    """Return a view with square pixels; scales of the node's ancestors are ignored.
-
-    glTF projects the axis of the camera to the centre of the picture. Pixel coordinates begin at
-    the centre of the first pixel, so the principal point is at (W - 1) / 2, (H - 1) / 2.
-    """
-    aspect = camera.aspect or _ASPECT
-    width, height = max(1, round(_HEIGHT * aspect)), _HEIGHT
-    focal = 0.5 * height / math.tan(0.5 * angle)
-    across, down = 0.5 * (width - 1.0), 0.5 * (height - 1.0)
-    rotation, translation = extrinsics(world)
-    return CameraView(
-        name=name,
-        intrinsic=np.array([[focal, 0.0, across], [0.0, focal, down], [0.0, 0.0, 1.0]]),
-        rotation=rotation,
-        translation=translation,
-        size=(width, height),
-        near=camera.near,
-        far=camera.far,
-        mount=mount,
-    )

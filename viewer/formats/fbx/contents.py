@@ -88,10 +88,9 @@ def node_file(source: Source) -> NodeFile:
     _say_unused(source, told)
     n_joints = len(told["names"])
     cameras, of_camera = _add_cameras(told, arrays)
-    count = len(told["names"])
     meshes: list[NodeMesh] = []
     skins: list[NodeSkin] = []
-    of_node, skin_of_node = np.full((2, count), -1, dtype=np.int32)
+    of_node, skin_of_node = np.full((2, len(told["names"])), -1, dtype=np.int32)
     first_mesh: dict[tuple[int, tuple[int, ...], bytes], int] = {}
     for at, mesh in enumerate(told["meshes"]):
         prefix = f"mesh{at}"
@@ -112,11 +111,26 @@ def node_file(source: Source) -> NodeFile:
             of_node[node] = first_mesh[key]
             if skin is not None:
                 skin_of_node[node] = min(first_skin + at_node, len(skins) - 1)
-    tree = _tree(told["names"], arrays, of_node, skin_of_node, of_camera)
+    parents, local = arrays["parents"], arrays["local"]
+    # The root has no name in the file; this is its name in the FBX SDK.
+    named = (
+        name or ("RootNode" if parent < 0 else "")
+        for name, parent in zip(told["names"], parents.tolist(), strict=True)
+    )
+    tree = NodeTree(
+        tuple(named),
+        parents,
+        translations=local[:, :3],
+        rotations=local[:, 3:7],
+        scales=local[:, 7:],
+        meshes=of_node,
+        skins=skin_of_node,
+        cameras=of_camera,
+    )
     return NodeFile(
         source.path.stem,
         tree,
-        roots=tuple(np.flatnonzero(arrays["parents"] < 0).tolist()),
+        roots=tuple(np.flatnonzero(parents < 0).tolist()),
         meshes=tuple(meshes),
         skins=tuple(skins),
         materials=materials_of(source, arrays, told),
@@ -350,25 +364,6 @@ def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera
     arrays["local"] = np.concatenate([arrays["local"], added])
     arrays["geometry"] = np.concatenate([arrays["geometry"], same])
     return tuple(made), np.array(of_node, dtype=np.int32)
-
-
-def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints, cameras: Ints) -> NodeTree:
-    local, parents = arrays["local"], arrays["parents"]
-    # The root has no name in the file; this is its name in the FBX SDK.
-    named = (
-        name or ("RootNode" if parent < 0 else "")
-        for name, parent in zip(names, parents.tolist(), strict=True)
-    )
-    return NodeTree(
-        tuple(named),
-        parents,
-        translations=local[:, :3],
-        rotations=local[:, 3:7],
-        scales=local[:, 7:],
-        meshes=meshes,
-        skins=skins,
-        cameras=cameras,
-    )
 
 
 def _unit(metres: float) -> str:

@@ -35,39 +35,54 @@ class Placed:
 def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
     """Return a mesh with one primitive per material."""
     get = _getter(arrays, placed.prefix)
-    faces, corners = get("faces"), get("corners")
+    positions, faces, corners = get("vertices"), get("faces"), get("corners")
     shown = np.flatnonzero(faces[:, 1] >= 3)
     starts, counts = faces[shown, 0], faces[shown, 1]
     listed = np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
     if not len(listed):
         return NodeMesh(placed.told["name"], ())
-    picks, owners = triangulate(get("vertices"), corners[listed].astype(np.int64), counts)
+    picks, owners = triangulate(positions, corners[listed].astype(np.int64), counts)
     wanted = listed[picks]  # corner in the file for each corner of each triangle
-    slots = _slots(arrays, placed)[shown[owners]]
-    linear = placed.placement[:3, :3]
+    slots = get("face_materials")
+    if len(slots) != len(faces):
+        slots = np.zeros(len(faces), dtype=np.int32)
+    slots = slots[shown[owners]]
+    linear, shift = placed.placement[:3, :3], placed.placement[:3, 3]
     if np.linalg.det(linear) < 0.0:
         wanted = wanted[:, ::-1]
-    weights = _influences(arrays, placed)
-    attributes = _numbered(arrays, placed)
+    influences = _influences(arrays, placed)
+    names = _attributes(arrays, placed)
+    numbered = _numbered(get, names)
+    shapes = placed.told["shapes"]
     primitives = []
     for slot in np.unique(slots).tolist():
         rows = wanted[slots == slot]
         used = np.unique(rows)
-        chosen, inverse = _distinct(corners, attributes, used)
+        chosen, inverse = _distinct(corners, numbered, used)
         renumbered = np.zeros(len(corners), dtype=np.int32)
         renumbered[used] = inverse
-        has_slot = 0 <= slot < len(placed.materials)
+        vertices = corners[chosen]
+        values = {name: get(name)[get(f"{name}.corners")[chosen]] for name in names}
+        normals = values.get("normals")
+        offsets, normal_offsets = (
+            [_spread(get, row, name, len(positions))[vertices] for row in range(len(shapes))]
+            for name in ("offsets", "normals")
+        )
         primitives.append(
-            _primitive(
-                arrays,
-                placed,
-                chosen,
-                renumbered[rows],
-                placed.materials[slot] if has_slot else -1,
-                weights,
+            Primitive(
+                positions=positions[vertices] @ linear.T + shift,
+                triangles=renumbered[rows],
+                normals=None if normals is None else _turned(normals, linear),
+                uvs=tuple(values[name] for name in values if name.startswith("uvs")),
+                colors=values.get("colors"),
+                joints=None if influences is None else influences[0][vertices],
+                weights=None if influences is None else influences[1][vertices],
+                dqs_fractions=_fractions(arrays, placed, vertices),
+                material=placed.materials[slot] if 0 <= slot < len(placed.materials) else -1,
+                targets=_targets([each @ linear.T for each in offsets]),
+                normal_targets=_normal_targets(normal_offsets, linear),
             )
         )
-    shapes = placed.told["shapes"]
     return NodeMesh(
         placed.told["name"],
         tuple(primitives),
@@ -80,13 +95,6 @@ def _getter(arrays: Arrays, prefix: str) -> Any:
     return lambda name: arrays[f"{prefix}.{name}"]
 
 
-def _slots(arrays: Arrays, placed: Placed) -> Ints:
-    """Return the material slot of every face: (F,)."""
-    given = arrays[f"{placed.prefix}.face_materials"]
-    count = len(arrays[f"{placed.prefix}.faces"])
-    return given if len(given) == count else np.zeros(count, dtype=np.int32)
-
-
 def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
     """Return the names of the attributes per corner that the mesh has."""
     sets = range(len(placed.told["uv_sets"]))
@@ -94,14 +102,13 @@ def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
     return [name for name in names if f"{placed.prefix}.{name}" in arrays]
 
 
-def _numbered(arrays: Arrays, placed: Placed) -> list[NDArray[np.intp]]:
+def _numbered(get: Any, names: list[str]) -> list[NDArray[np.intp]]:
     """Return an index of the value of each attribute at every corner of the file: (C,) each."""
     found = []
-    for name in _attributes(arrays, placed):
-        values = arrays[f"{placed.prefix}.{name}"]
+    for name in names:
         # Equal values get one index, because exporters repeat values for every corner.
-        _, number = np.unique(values + 0.0, axis=0, return_inverse=True)
-        found.append(number.reshape(-1)[arrays[f"{placed.prefix}.{name}.corners"]])
+        _, number = np.unique(get(name) + 0.0, axis=0, return_inverse=True)
+        found.append(number.reshape(-1)[get(f"{name}.corners")])
     return found
 
 
@@ -115,42 +122,6 @@ def _distinct(
     keys = [vertices[corners].astype(np.intp), *(numbers[corners] for numbers in attributes)]
     _, first, inverse = np.unique(np.stack(keys), axis=1, return_index=True, return_inverse=True)
     return corners[first], inverse.reshape(-1).astype(np.int32)
-
-
-def _primitive(
-    arrays: Arrays,
-    placed: Placed,
-    chosen: NDArray[np.intp],
-    triangles: Ints,
-    material: int,
-    influences: tuple[Ints, Floats] | None,
-) -> Primitive:
-    """Return a primitive whose vertices are the chosen corners."""
-    get = _getter(arrays, placed.prefix)
-    vertices = get("corners")[chosen]
-    linear, shift = placed.placement[:3, :3], placed.placement[:3, 3]
-    values = {
-        name: get(name)[get(f"{name}.corners")[chosen]] for name in _attributes(arrays, placed)
-    }
-    normals = values.get("normals")
-    count = len(get("vertices"))
-    targets = [
-        (_spread(get, row, "offsets", count)[vertices], _spread(get, row, "normals", count))
-        for row in range(len(placed.told["shapes"]))
-    ]
-    return Primitive(
-        positions=get("vertices")[vertices] @ linear.T + shift,
-        triangles=triangles,
-        normals=None if normals is None else _turned(normals, linear),
-        uvs=tuple(values[name] for name in values if name.startswith("uvs")),
-        colors=values.get("colors"),
-        joints=None if influences is None else influences[0][vertices],
-        weights=None if influences is None else influences[1][vertices],
-        dqs_fractions=_fractions(arrays, placed, vertices),
-        material=material,
-        targets=_targets([offsets @ linear.T for offsets, _ in targets]),
-        normal_targets=_normal_targets([rows[vertices] for _, rows in targets], linear),
-    )
 
 
 def _spread(get: Any, row: int, name: str, count: int) -> Floats:
@@ -188,7 +159,7 @@ def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
     if placed.told["skin"] is None:
         return None
     get = _getter(arrays, f"{placed.prefix}.skin")
-    kept = _with_bone(get)
+    kept = get("bones") >= 0
     numbers = np.cumsum(kept) - 1
     cluster = np.repeat(np.arange(len(kept)), get("counts"))
     vertices, weights = get("vertices"), get("weights")
@@ -227,7 +198,7 @@ def _without_weights(arrays: Arrays, prefix: str) -> Ints:
     """Return the vertices that no joint moves: (M,)."""
     get = _getter(arrays, f"{prefix}.skin")
     cluster = np.repeat(np.arange(len(get("counts"))), get("counts"))
-    is_used = _with_bone(get)[cluster] & (get("weights") != 0.0)
+    is_used = (get("bones") >= 0)[cluster] & (get("weights") != 0.0)
     count = len(arrays[f"{prefix}.vertices"])
     found: Ints = np.setdiff1d(np.arange(count, dtype=np.int32), get("vertices")[is_used])
     return found
@@ -250,17 +221,12 @@ def on_nodes(arrays: Arrays, prefix: str, skin: NodeSkin, nodes: list[int]) -> l
     ]
 
 
-def _with_bone(get: Any) -> NDArray[np.bool_]:
-    """Return a mask of the clusters that have a joint."""
-    return get("bones") >= 0
-
-
 def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -> NodeSkin | None:
     """Return the skin of a mesh, and report which parts of it are not used."""
     if told["skin"] is None:
         return None
     get = _getter(arrays, f"{prefix}.skin")
-    kept = _with_bone(get)
+    kept = get("bones") >= 0
     if not kept.all():
         source.warn(
             "F007.fbx-no-bone: mesh {mesh}: {n} without a joint ignored",
