@@ -264,30 +264,19 @@ def _split_poses(
                 item=key,
             )
         if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one eye
-            _compare_again(source, key, joints[columns], rows, names, parts)
+            earlier = np.concatenate(parts, axis=1).reshape(count, -1, 3)
+            again = [names.index(name) for name in joints[columns]]
+            if not _are_same(earlier[:, again].ravel(), rows.ravel()):
+                source.warn(
+                    "F007.motion-again: {item} omitted: an earlier array has other values for "
+                    "these joints",
+                    item=key,
+                )
             continue
         names += joints[columns]
         parts.append(rows)
     vectors = np.concatenate(parts, axis=1).reshape(count, -1, 3)
     return tuple(names), vectors, hands
-
-
-def _compare_again(
-    source: Source,
-    key: str,
-    joints: tuple[str, ...],
-    rows: Floats,
-    names: list[str],
-    parts: list[Floats],
-) -> None:
-    """Warn if a part rotates joints differently from an earlier part."""
-    vectors = np.concatenate(parts, axis=1).reshape(len(rows), -1, 3)
-    columns = [names.index(name) for name in joints]
-    if not _are_same(vectors[:, columns].ravel(), rows.ravel()):
-        source.warn(
-            "F007.motion-again: {item} omitted: an earlier array has other values for these joints",
-            item=key,
-        )
 
 
 def _flag(archive: Archive, key: str) -> bool:

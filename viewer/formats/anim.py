@@ -170,14 +170,7 @@ class _Parser:
                     "F002.anim-channel-item: {where}: expected extrapolate or keys, found {found}"
                 )
         self._expect(b"}")
-        return self._make_channel(index, rows or [], extrapolation)
-
-    def _make_channel(
-        self,
-        index: int,
-        rows: list[_Key],
-        extrapolation: tuple[Extrapolation, Extrapolation],
-    ) -> Channel:
+        rows = rows or []
         times = [row[0] for row in rows]
         if not rows:
             self.source.warn(

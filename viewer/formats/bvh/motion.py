@@ -167,15 +167,17 @@ def _held_frames(
     begins, sizes = words.rows()
     rest = 0
     if (sizes == width).sum() * 2 > len(sizes):  # the file has one frame per line
-        begins, sizes, rest = _without_rest(words, begins, sizes, width)
+        last = int(sizes[-1])
+        if last < width and not np.isnan(words.values[begins[-1] :]).any():  # it is cut short
+            begins, sizes, rest = begins[:-1], sizes[:-1], last
         begins, sizes = begins[:declared], sizes[:declared]
     else:
         end = len(words.values) if declared is None else declared * width
         if len(words.values) < end or end % width:
             return None
         begins, sizes = np.arange(0, end, width), np.full(end // width, width)
-    last = int(begins[-1] + sizes[-1]) if len(begins) else 0
-    bad = words.bad[words.bad < last]
+    end = int(begins[-1] + sizes[-1]) if len(begins) else 0
+    bad = words.bad[words.bad < end]
     fits = sizes == width
     if fits.all() and len(bad) == 0:
         return None
@@ -217,16 +219,6 @@ def _gaps(source: Source, words: Words, bad: _Places, frames: _Places, count: in
     for note in gap_notes(source, {None: np.flatnonzero(lost)}):
         source.diagnostics.add(note)
     return lost
-
-
-def _without_rest(
-    words: Words, begins: _Places, sizes: _Places, width: int
-) -> tuple[_Places, _Places, int]:
-    """Return lines without a truncated last one, and the number of its values."""
-    size = int(sizes[-1])
-    if size >= width or np.isnan(words.values[begins[-1] :]).any():
-        return begins, sizes, 0
-    return begins[:-1], sizes[:-1], size
 
 
 def _refuse_sizes(source: Source, offsets: _Places, sizes: _Places, width: int) -> None:

@@ -259,24 +259,13 @@ class Accessors:
                 most=layout.count,
                 found=count,
             )
-        indices = self._sparse_indices(layout, sparse, count)
-        items = sparse.part("values")
-        if items is None:
-            raise sparse.wrong("values", "an object")
-        view = self._sparse_view(items)
-        packed = _Layout(layout.element, layout.kind, layout.dtype, count, False)
-        result = values.copy()
-        result[indices] = _elements(view, packed, items, items.whole("byteOffset", 0))
-        return result
-
-    def _sparse_indices(self, layout: _Layout, sparse: Element, count: int) -> NDArray[Any]:
         items = sparse.part("indices")
         if items is None:
             raise sparse.wrong("indices", "an object")
         code = items.choice("componentType", _INDEX_TYPES)
-        shape = _Layout(items, "SCALAR", _COMPONENTS[code], count, False)
+        packed = _Layout(items, "SCALAR", _COMPONENTS[code], count, False)
         view = self._sparse_view(items)
-        indices = _elements(view, shape, items, items.whole("byteOffset", 0))[:, 0]
+        indices = _elements(view, packed, items, items.whole("byteOffset", 0))[:, 0]
         if count and int(indices.max()) >= layout.count:
             first = int((indices >= layout.count).argmax())
             raise items.fault(
@@ -288,7 +277,14 @@ class Accessors:
             )
         if (indices[1:] <= indices[:-1]).any():
             items.warn("G002.sparse-order: sparse indices are not in increasing order")
-        return indices
+        items = sparse.part("values")
+        if items is None:
+            raise sparse.wrong("values", "an object")
+        view = self._sparse_view(items)
+        packed = _Layout(layout.element, layout.kind, layout.dtype, count, False)
+        result = values.copy()
+        result[indices] = _elements(view, packed, items, items.whole("byteOffset", 0))
+        return result
 
     def _sparse_view(self, items: Element) -> View:
         place = items.required_index("bufferView", self._buffers.n_views, "bufferViews")

@@ -140,7 +140,20 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     found: list[NodeAnimation] = []
     for index in range(len(table)):
         try:
-            animation = _animation(document, targets, table[index], unused)
+            element = table[index]
+            channels, samplers = element.table("channels"), element.table("samplers")
+            plain = _plain_channels(channels.items, samplers.items, targets)
+            nodes, inputs = plain or _any_channels(document, targets, element, unused)
+            start, end = _range(document, element, inputs)
+            animation = NodeAnimation(
+                element.text("name"),
+                start,
+                end,
+                frozenset(nodes),
+                partial(_channels, document, targets, element, (start, end)),
+                element.pointer,
+                element.values.get("extras"),
+            )
             reads = not found or document.source.diagnostics.keeps_errors
             found.append(_checked(animation) if reads else animation)
         except FormatError as problem:
@@ -169,41 +182,6 @@ def _leave_out(document: Document, problem: FormatError, index: int) -> None:
 def _checked(animation: NodeAnimation) -> NodeAnimation:
     channels = animation.read()
     return replace(animation, read=lambda: channels)
-
-
-def _animation(
-    document: Document, targets: Targets, animation: Element, unused: _Unused
-) -> NodeAnimation:
-    """Return an animation whose keys have not been read yet."""
-    channels, samplers = animation.table("channels"), animation.table("samplers")
-    plain = _plain_channels(channels.items, samplers.items, targets)
-    nodes, inputs = plain or _any_channels(document, targets, animation, unused)
-    start, end = _range(document, animation, inputs)
-    read = partial(_channels, document, targets, animation, (start, end))
-    name, pointer = animation.text("name"), animation.pointer
-    extras = animation.values.get("extras")
-    return NodeAnimation(name, start, end, frozenset(nodes), read, pointer, extras)
-
-
-def _channels(
-    document: Document, targets: Targets, animation: Element, declared: tuple[float, float]
-) -> tuple[NodeChannel, ...]:
-    """Return the channels of an animation; warn if the declared range is wrong."""
-    channels = _read_channels(document, targets, animation)
-    start, end = declared
-    first = min((float(channel.times[0]) for channel in channels), default=start)
-    last = max((float(channel.times[-1]) for channel in channels), default=end)
-    if max(abs(first - start), abs(last - end)) > _SAME_TIME:
-        animation.warn(
-            "G005.range: expected keys from {start} to {end} s as declared by the accessors, "
-            "found {first} to {last} s",
-            "samplers",
-            start=rounded(start, 6),
-            end=rounded(end, 6),
-            first=rounded(first, 6),
-            last=rounded(last, 6),
-        )
-    return channels
 
 
 def _plain_channels(
@@ -316,10 +294,10 @@ class _Keys:
     tangents: Floats | None
 
 
-def _read_channels(
-    document: Document, targets: Targets, animation: Element
+def _channels(
+    document: Document, targets: Targets, animation: Element, declared: tuple[float, float]
 ) -> tuple[NodeChannel, ...]:
-    """Return the channels of an animation that have a visible effect."""
+    """Return the channels with a visible effect; warn if the declared range is wrong."""
     channels = animation.table("channels")
     reading = _Reading(document, targets, animation.table("samplers"))
     found: dict[tuple[int, str], NodeChannel] = {}
@@ -341,6 +319,19 @@ def _read_channels(
             "G005.equal-times: {n} the same time as the next key: ignored",
             "samplers",
             n=counted(reading.n_equal, "key", "has", "have"),
+        )
+    start, end = declared
+    first = min((float(channel.times[0]) for channel in found.values()), default=start)
+    last = max((float(channel.times[-1]) for channel in found.values()), default=end)
+    if max(abs(first - start), abs(last - end)) > _SAME_TIME:
+        animation.warn(
+            "G005.range: expected keys from {start} to {end} s as declared by the accessors, "
+            "found {first} to {last} s",
+            "samplers",
+            start=rounded(start, 6),
+            end=rounded(end, 6),
+            first=rounded(first, 6),
+            last=rounded(last, 6),
         )
     return tuple(found.values())
 

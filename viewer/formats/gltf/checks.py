@@ -429,7 +429,11 @@ def _check_primitives(document: Document, report: _Report) -> None:
             _check_names(given, (*path, "attributes"), report)
             if not quantized:
                 _check_types(accessors, given, (*path, "attributes"), report)
-            _check_indices(accessors, primitive, path, report)
+            index = primitive.get("indices")
+            kind = accessors.get(index, {}).get("componentType") if isinstance(index, int) else None
+            if isinstance(kind, int) and kind not in _INDICES and kind != _FLOAT:
+                at = (*path, "indices")
+                report(wording.STORAGE, "unsigned integers", f"component type {kind}", at)
             _check_targets(accessors, primitive, given, path, report)
             _check_tangents(document, given, (*path, "attributes"), report)
             _check_texture_sets(materials, primitive, given, path, report)
@@ -458,18 +462,6 @@ def _check_types(
             how = "normalised" if normalized else "not normalised"
             wanted = " or ".join(f"{one}{' normalised' * flag}" for one, flag in allowed)
             report(wording.STORAGE, f"component type {wanted}", f"{kind}, {how}", (*path, name))
-
-
-def _check_indices(
-    accessors: dict[int, Any],
-    primitive: dict[str, Any],
-    path: tuple[str | int, ...],
-    report: _Report,
-) -> None:
-    index = primitive.get("indices")
-    kind = accessors.get(index, {}).get("componentType") if isinstance(index, int) else None
-    if isinstance(kind, int) and kind not in _INDICES and kind != _FLOAT:
-        report(wording.STORAGE, "unsigned integers", f"component type {kind}", (*path, "indices"))
 
 
 def _check_targets(
@@ -568,7 +560,24 @@ def _check_structure(
                 seen.add(root_node)
     nodes = dict(_items_of(root, "nodes"))
     for index, animation in _items_of(root, "animations"):
-        _check_channels(nodes, animation, index, report)
+        for name in ("channels", "samplers"):
+            if animation.get(name) == []:
+                report(
+                    "G005.structure: expected {wanted}, found {found}",
+                    "at least one item",
+                    "none",
+                    ("animations", index, name),
+                )
+        for place, channel in _items_of(animation, "channels"):
+            moved, node = part(channel, "target", "path"), part(channel, "target", "node")
+            owner = nodes.get(node, {}) if isinstance(node, int) else {}
+            if "skin" in owner and moved in ("translation", "rotation", "scale"):
+                report(
+                    "G007.skinned-moved: expected {wanted}, found {found}",
+                    "a node without a skinned mesh",
+                    f"a node with a skinned mesh, whose {moved} has no effect",
+                    ("animations", index, "channels", place, "target", "path"),
+                )
     _check_extensions(root, report)
 
 
@@ -623,32 +632,6 @@ def _check_skinned(
                 wanted,
                 "joints outside it",
                 ("nodes", node),
-            )
-
-
-def _check_channels(
-    nodes: dict[int, dict[str, Any]], animation: dict[str, Any], index: int, report: _Report
-) -> None:
-    path = ("animations", index)
-    for name in ("channels", "samplers"):
-        if animation.get(name) == []:
-            report(
-                "G005.structure: expected {wanted}, found {found}",
-                "at least one item",
-                "none",
-                (*path, name),
-            )
-    for place, channel in _items_of(animation, "channels"):
-        moved, node = part(channel, "target", "path"), part(channel, "target", "node")
-        owner = nodes.get(node, {}) if isinstance(node, int) else {}
-        if "skin" in owner and moved in ("translation", "rotation", "scale"):
-            found = f"a node with a skinned mesh, whose {moved} has no effect"
-            at = (*path, "channels", place, "target", "path")
-            report(
-                "G007.skinned-moved: expected {wanted}, found {found}",
-                "a node without a skinned mesh",
-                found,
-                at,
             )
 
 

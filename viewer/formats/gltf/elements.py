@@ -209,18 +209,14 @@ class Element:
             raise self.wrong(name, "a list")
         for place, item in enumerate(items):
             if type(item) is not int or not 0 <= item < count:
-                raise self._wrong_index(name, place, item, count, what)
+                pointer = self.at(name, place)
+                if type(item) is int and 0 <= item < _BEYOND:
+                    raise self.source.fault(
+                        wording.GLTF_INDEX, pointer, what=what, count=count, found=item
+                    )
+                wanted, found = "a whole number of at least 0", describe(item)
+                raise self.source.fault(wording.GLTF_TYPE, pointer, wanted=wanted, found=found)
         return items
-
-    def _wrong_index(self, name: str, place: int, item: Any, count: int, what: str) -> FormatError:
-        """Return the exception for an item that is not a valid index."""
-        pointer = self.at(name, place)
-        if type(item) is int and 0 <= item < _BEYOND:
-            return self.source.fault(
-                wording.GLTF_INDEX, pointer, what=what, count=count, found=item
-            )
-        wanted = "a whole number of at least 0"
-        return self.source.fault(wording.GLTF_TYPE, pointer, wanted=wanted, found=describe(item))
 
     def extension(self, name: str) -> Element | None:
         """Return an extension of this object; None if there is none.

@@ -82,7 +82,15 @@ def decoded_view(compressed: Element, data: Bytes, spend: Callable[[int, str], N
     mode = compressed.choice("mode", _MODES)
     kind = compressed.choice("filter", _FILTERS, "NONE")
     count, stride = compressed.whole("count"), compressed.whole("byteStride")
-    _check(compressed, mode, kind, stride)
+    if mode != "ATTRIBUTES":
+        if stride not in (2, 4):
+            raise compressed.wrong("byteStride", "2 or 4")
+        if kind != "NONE":
+            raise compressed.wrong("filter", f"no filter in mode {mode}")
+    elif stride % 4 or not 0 < stride <= _LARGEST_STRIDE:
+        raise compressed.wrong("byteStride", f"a multiple of 4 up to {_LARGEST_STRIDE}")
+    elif kind in _STRIDES and stride not in _STRIDES[kind]:
+        raise compressed.wrong("byteStride", " or ".join(map(str, _STRIDES[kind])))
     spend(count * stride, compressed.pointer)
     if mode == "ATTRIBUTES":
         decoded = decoded_attributes(data, count, stride)
@@ -95,19 +103,6 @@ def decoded_view(compressed: Element, data: Bytes, spend: Callable[[int, str], N
     result = filtered(decoded, kind, stride)
     result.flags.writeable = False
     return result
-
-
-def _check(compressed: Element, mode: str, kind: str, stride: int) -> None:
-    """Refuse a stride or filter that does not match the mode."""
-    if mode != "ATTRIBUTES":
-        if stride not in (2, 4):
-            raise compressed.wrong("byteStride", "2 or 4")
-        if kind != "NONE":
-            raise compressed.wrong("filter", f"no filter in mode {mode}")
-    elif stride % 4 or not 0 < stride <= _LARGEST_STRIDE:
-        raise compressed.wrong("byteStride", f"a multiple of 4 up to {_LARGEST_STRIDE}")
-    elif kind in _STRIDES and stride not in _STRIDES[kind]:
-        raise compressed.wrong("byteStride", " or ".join(map(str, _STRIDES[kind])))
 
 
 @dataclass(slots=True)

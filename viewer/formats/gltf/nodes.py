@@ -444,29 +444,24 @@ def checked_bindings(
         limits[mesh] = min(limits.get(mesh, (count, skin)), (count, skin))
     result = list(meshes)
     for mesh, (count, skin) in limits.items():
-        result[mesh] = _with_joints(document, meshes[mesh], count, skin)
+        primitives = []
+        for primitive in meshes[mesh].primitives:
+            joints, weights = primitive.joints, primitive.weights
+            if joints is None or weights is None or int(joints.max(initial=0)) < count:
+                primitives.append(primitive)
+                continue
+            bad = joints >= count
+            vertex, column = (int(axis[0]) for axis in np.nonzero(bad))
+            document.source.refuse(
+                "W010.gltf-joint: vertex {vertex}: expected a joint index below {joints} (skin "
+                "{skin}), found {found}",
+                f"{primitive.pointer}/attributes/JOINTS_{column // 4}",
+                vertex=vertex,
+                found=int(joints[vertex, column]),
+                joints=count,
+                skin=skin,
+            )
+            joints, weights = np.where(bad, 0, joints), np.where(bad, 0.0, weights)
+            primitives.append(replace(primitive, joints=joints, weights=weights))
+        result[mesh] = replace(meshes[mesh], primitives=tuple(primitives))
     return tuple(result)
-
-
-def _with_joints(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -> NodeMesh:
-    """Return a mesh whose influences refer to joints of its skin."""
-    primitives = []
-    for primitive in mesh.primitives:
-        joints, weights = primitive.joints, primitive.weights
-        if joints is None or weights is None or int(joints.max(initial=0)) < n_joints:
-            primitives.append(primitive)
-            continue
-        bad = joints >= n_joints
-        vertex, column = (int(axis[0]) for axis in np.nonzero(bad))
-        document.source.refuse(
-            "W010.gltf-joint: vertex {vertex}: expected a joint index below {joints} (skin "
-            "{skin}), found {found}",
-            f"{primitive.pointer}/attributes/JOINTS_{column // 4}",
-            vertex=vertex,
-            found=int(joints[vertex, column]),
-            joints=n_joints,
-            skin=skin,
-        )
-        joints, weights = np.where(bad, 0, joints), np.where(bad, 0.0, weights)
-        primitives.append(replace(primitive, joints=joints, weights=weights))
-    return replace(mesh, primitives=tuple(primitives))

@@ -43,7 +43,7 @@ from viewer.formats.skin.tables import KEYWORDS
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
 from viewer.phrases import all_of, optional, printable
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh, without_seams
@@ -82,10 +82,12 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
         [len(run.triangles) for run in sections.triangles],
     )
     positions = neutral_positions(sections.tables["positions"], triangles)
-    uvs = sections.tables.get("texcoords")
+    normals, uvs = sections.tables.get("normals"), sections.tables.get("texcoords")
+    if normals is None and "normals" not in sections.offsets:
+        source.warn("F007.skin-normals: no `normals` section: computed from the triangles")
     return Mesh(
         positions=positions,
-        normals=_normals(source, sections, positions, triangles),
+        normals=filled_normals(source, normals, positions, triangles),
         triangles=triangles,
         # Invalid values are NaN, which a single sum detects.
         uvs=uvs if uvs is None or not np.isnan(uvs.sum()) else np.nan_to_num(uvs),
@@ -108,13 +110,6 @@ def _require_positions(source: Source, sections: Sections) -> None:
             "F002.skin-no-vertex: expected at least one vertex, found positions 0",
             sections.offsets["positions"],
         )
-
-
-def _normals(source: Source, sections: Sections, positions: Floats, triangles: Ints) -> Floats:
-    normals = sections.tables.get("normals")
-    if normals is None and "normals" not in sections.offsets:
-        source.warn("F007.skin-normals: no `normals` section: computed from the triangles")
-    return filled_normals(source, normals, positions, triangles)
 
 
 def _skin(source: Source, sections: Sections) -> Skin | None:
