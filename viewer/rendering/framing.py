@@ -160,7 +160,8 @@ def find_follow(scene: Scene, name: str) -> Follow:
     Raises ``RigError`` if nothing has this name.
     """
     for index, joint in follow_candidates(scene, name):
-        return _followed(scene, index, joint)
+        place = followed_point(scene.actors[index], joint)
+        return Follow(index, joint, np.zeros(3) if place is None else place)
     raise RigError(f'no actor, joint or point is called "{name}"; {_hint(scene, name)}')
 
 
@@ -214,11 +215,6 @@ def _hint(scene: Scene, name: str) -> str:
     if re.search("[/:]", name):
         known = [one for one in known if re.search("[/:]", one)]
     return did_you_mean(name, known) or f"actors: {', '.join(actors)}"
-
-
-def _followed(scene: Scene, actor: int, joint: int) -> Follow:
-    place = followed_point(scene.actors[actor], joint)
-    return Follow(actor, joint, np.zeros(3) if place is None else place)
 
 
 def _root(actor: Actor) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.ground_pass import ground_axes
 from viewer.rendering.sampling import Sample, n_passes, tilted
@@ -43,21 +44,19 @@ class Lighting:
         self._size = 0.0  # size of the largest figure, scene units
         self._shadow: ShadowPass | None = None
         self._occlusion: OcclusionPass | None = None
-        self._made: list[ContactPass | GroundShadowPass] = []
+        self._owner = Owner()
 
     @cached_property
     def _contact_pass(self) -> ContactPass:
         from viewer.rendering.passes.shadow_passes import ContactPass
 
-        self._made.append(made := ContactPass(self.context, self.programs))
-        return made
+        return self._owner.keep(ContactPass(self.context, self.programs))
 
     @cached_property
     def _ground_pass(self) -> GroundShadowPass:
         from viewer.rendering.passes.shadow_passes import GroundShadowPass
 
-        self._made.append(made := GroundShadowPass(self.context, self.programs))
-        return made
+        return self._owner.keep(GroundShadowPass(self.context, self.programs))
 
     def begin(self, casters: Casters, up: str, box: Floats) -> None:
         """Draw the maps shared by all passes of an image.
@@ -143,7 +142,8 @@ class Lighting:
 
     def release(self) -> None:
         """Free all passes that were created."""
-        for item in (*self._made, self._shadow, self._occlusion):
+        self._owner.release()
+        for item in (self._shadow, self._occlusion):
             if item is not None:
                 item.release()
 

@@ -312,8 +312,6 @@ class _Cameras:
         return camera
 
 
-# Waiting for the driver without holding Python's lock, so that other threads can run.
-#
 class Waiter:
     """Submission of work to the driver, and waiting without holding Python's lock.
 
@@ -330,7 +328,7 @@ class Waiter:
     def __init__(self, context: moderngl.Context) -> None:
         flush, finish = _gl_function(context, "glFlush"), _gl_function(context, "glFinish")
         self.is_free = finish is not None
-        self._flush: Callable[[], None] = flush or _nothing
+        self._flush: Callable[[], None] = flush or (lambda: None)
         self._finish: Callable[[], None] = finish or context.finish
 
     def begin(self) -> None:
@@ -347,7 +345,3 @@ def _gl_function(context: moderngl.Context, name: str) -> Callable[[], None] | N
     loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
     address = loader(name) if loader is not None else 0
     return ctypes.CFUNCTYPE(None)(address) if address else None
-
-
-def _nothing() -> None:
-    pass

@@ -49,23 +49,19 @@ def joint_annotation(
 
     ``size``: width and height of the image, pixels.
     """
-    marks = joint_marks_of(actors)
-    parts = [part for one in marks for part in _mark_segments(one, options, size, selected)]
+    marks, scale = joint_marks_of(actors), picture_scale(size)
+    parts: list[Segments] = []
+    for one in marks:  # the topmost last
+        joint = selected[1] if one.actor == selected[0] else -1
+        if options.xray:
+            parts.append(bone_segments(one, joint, scale))
+        if options.joint_axes:
+            parts.append(axis_segments(one, scale))
+        parts += joint_dots(one, joint, scale)
     if not parts:
         return None
     labels = name_labels(marks, selected) if options.joint_names else None
     return Annotation(joined(parts), SegmentStyle(on_top=options.xray), labels)
-
-
-def _mark_segments(
-    marks: JointMarks, options: DisplayOptions, size: tuple[int, int], selected: tuple[int, int]
-) -> list[Segments]:
-    """Return the lines and dots of one actor, the topmost last."""
-    scale, joint = picture_scale(size), selected[1] if marks.actor == selected[0] else -1
-    parts = [bone_segments(marks, joint, scale)] if options.xray else []
-    if options.joint_axes:
-        parts.append(axis_segments(marks, scale))
-    return parts + joint_dots(marks, joint, scale)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,37 +202,26 @@ def joint_at(
     and the position (3,) in scene space.
     """
     best: tuple[float, float, int, int, Floats] | None = None
+    scale = picture_scale(size)
     for one in marks:
-        away, joints, depths = _away(one, view, size, pixel, with_bones)
+        # Distances are 0 to 1 for dots and 1 to 2 for bones: dots are drawn over bones.
+        seen = project(view, size, one.points)
+        away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
+        away[~seen.seen | (away > 1.0)] = np.inf
+        if one.skeleton.auxiliary is not None:
+            away[one.skeleton.auxiliary] = np.inf
+        joints: Ints = np.arange(len(away), dtype=np.int32)
+        if with_bones:
+            beside, parents = _beside_bones(one, view, size, pixel)
+            beside = 1.0 + beside / (scale * _BONE_REACH)
+            away = np.concatenate([away, np.where(beside > 2.0, np.inf, beside)])
+            joints = np.concatenate([joints, parents])
         nearest = int(away.argmin())
-        found = float(away[nearest]), float(depths[nearest])
+        found = float(away[nearest]), float(seen.depths[joints[nearest]])
         if np.isfinite(found[0]) and (best is None or found < best[:2]):
             joint = int(joints[nearest])
             best = (*found, one.actor, joint, one.points[joint])
     return None if best is None else best[2:]
-
-
-def _away(
-    marks: JointMarks,
-    view: View,
-    size: tuple[int, int],
-    pixel: tuple[float, float],
-    with_bones: bool,
-) -> tuple[Floats, Ints, Floats]:
-    """Return distances from a pixel (0..1 for dots, 1..2 for bones), with joints and depths."""
-    scale, seen = picture_scale(size), project(view, size, marks.points)
-    away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
-    away[~seen.seen | (away > 1.0)] = np.inf
-    if marks.skeleton.auxiliary is not None:
-        away[marks.skeleton.auxiliary] = np.inf
-    joints: Ints = np.arange(len(away), dtype=np.int32)
-    if with_bones:
-        # Dots are drawn over bones and take precedence.
-        beside, parents = _beside_bones(marks, view, size, pixel)
-        beside = 1.0 + beside / (scale * _BONE_REACH)
-        away = np.concatenate([away, np.where(beside > 2.0, np.inf, beside)])
-        joints = np.concatenate([joints, parents])
-    return away, joints, seen.depths[joints]
 
 
 def _beside_bones(

@@ -94,7 +94,13 @@ def lay_out(
         # Vectorized rejection of most positions that overlap others.
         may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
         places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
-        places = places.take(_with_free_lines(places, taken, dots, gap))
+        # Positions with a leader line need a clear path for it.
+        rows = np.flatnonzero(places.has_line)
+        led = places.take(rows)
+        pixels, are_part = line_pixels(led, gap)
+        is_closed = (taken.at(pixels) & are_part).any(axis=1)
+        is_closed |= crowded_lines(led, pixels, are_part, dots, gap)
+        places = places.take(np.delete(np.arange(len(places.labels)), rows[is_closed]))
         places = clear_places(places, dots, gap)
         found = places.take(_settle(places, taken, gap))
         chosen.append(some[found.labels])
@@ -113,16 +119,6 @@ def _portions(order: Ints) -> Iterator[Ints]:
     while first < len(order):
         yield order[first : first + count]
         first, count = first + count, min(2 * count, _MOST_IN_BATCH)
-
-
-def _with_free_lines(places: LabelPlaces, taken: _Taken, dots: Dots, gap: float) -> Ints:
-    """Return the indices of positions without a leader line or with a clear path for it: (M,)."""
-    rows = np.flatnonzero(places.has_line)
-    led = places.take(rows)
-    pixels, are_part = line_pixels(led, gap)
-    is_crowded = crowded_lines(led, pixels, are_part, dots, gap)
-    free = ~(taken.at(pixels) & are_part).any(axis=1) & ~is_crowded
-    return np.delete(np.arange(len(places.labels)), rows[~free])
 
 
 def _settle(places: LabelPlaces, taken: _Taken, gap: float) -> Ints:

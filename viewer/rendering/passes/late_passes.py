@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.studio import Matcaps, Studio
 from viewer.rendering.gpu.target import Accumulation
@@ -31,19 +32,6 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.point_pass import PointPass
     from viewer.rendering.picking import PickPass
 
-    _Made = (
-        PointPass
-        | PickPass
-        | LegendPass
-        | AnnotationPass
-        | GhostPass
-        | BackdropPass
-        | Studio
-        | Matcaps
-        | OutlinePass
-        | CameraImagePass
-    )
-
 
 class LatePasses:
     """Passes that many scenes do not need, each created on demand."""
@@ -59,7 +47,7 @@ class LatePasses:
         self._context, self._programs, self._buffers = context, programs, buffers
         self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
         self._sum: Accumulation | None = None
-        self._made: list[_Made] = []
+        self._owner = Owner()
 
     @cached_property
     def keypoint_pass(self) -> KeypointPass:
@@ -73,9 +61,7 @@ class LatePasses:
         """Pass for captured points."""
         from viewer.rendering.passes.point_pass import PointPass
 
-        points = PointPass(self._context, self._programs)
-        self._made.append(points)
-        return points
+        return self._owner.keep(PointPass(self._context, self._programs))
 
     @cached_property
     def motion_path_pass(self) -> MotionPathPass:
@@ -89,66 +75,52 @@ class LatePasses:
         """Pass that finds the object at a pixel."""
         from viewer.rendering.picking import PickPass
 
-        picks = PickPass(self._programs, self._mesh_pass, self.point_pass, self._buffers)
-        self._made.append(picks)
-        return picks
+        return self._owner.keep(
+            PickPass(self._programs, self._mesh_pass, self.point_pass, self._buffers)
+        )
 
     @cached_property
     def legend_pass(self) -> LegendPass:
         """Pass for legends of scalar quantities."""
         from viewer.rendering.passes.legend_pass import LegendPass
 
-        legends = LegendPass(self._context, self._programs)
-        self._made.append(legends)
-        return legends
+        return self._owner.keep(LegendPass(self._context, self._programs))
 
     @cached_property
     def annotation_pass(self) -> AnnotationPass:
         """Pass for marks, joint marks and annotations."""
         from viewer.rendering.passes.annotation_pass import AnnotationPass
 
-        annotations = AnnotationPass(self._context, self._programs)
-        self._made.append(annotations)
-        return annotations
+        return self._owner.keep(AnnotationPass(self._context, self._programs))
 
     @cached_property
     def ghost_pass(self) -> GhostPass:
         """Pass for ghosts over the scene."""
         from viewer.rendering.passes.ghost_pass import GhostPass
 
-        ghosts = GhostPass(self._context, self._programs, self._mesh_pass)
-        self._made.append(ghosts)
-        return ghosts
+        return self._owner.keep(GhostPass(self._context, self._programs, self._mesh_pass))
 
     @cached_property
     def camera_image_pass(self) -> CameraImagePass:
         """Pass for the images of calibrated cameras."""
         from viewer.rendering.passes.camera_image_pass import CameraImagePass
 
-        images = CameraImagePass(self._context, self._programs)
-        self._made.append(images)
-        return images
+        return self._owner.keep(CameraImagePass(self._context, self._programs))
 
     @cached_property
     def studio(self) -> Studio:
         """Light of metallic-roughness surfaces."""
-        studio = Studio(self._context)
-        self._made.append(studio)
-        return studio
+        return self._owner.keep(Studio(self._context))
 
     @cached_property
     def matcaps(self) -> Matcaps:
         """Images of lit spheres."""
-        matcaps = Matcaps(self._context)
-        self._made.append(matcaps)
-        return matcaps
+        return self._owner.keep(Matcaps(self._context))
 
     @cached_property
     def backdrop_pass(self) -> BackdropPass:
         """Pass that draws the studio behind the scene."""
-        backdrop = BackdropPass(self._context, self._programs, self.studio)
-        self._made.append(backdrop)
-        return backdrop
+        return self._owner.keep(BackdropPass(self._context, self._programs, self.studio))
 
     def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
         """Bind the textures that shading needs in addition to the meshes' textures."""
@@ -162,9 +134,9 @@ class LatePasses:
         """Pass for outlines of selected and hovered parts."""
         from viewer.rendering.passes.outline_pass import OutlinePass
 
-        outlines = OutlinePass(self._programs, self._mesh_pass, self.point_pass, self._buffers)
-        self._made.append(outlines)
-        return outlines
+        return self._owner.keep(
+            OutlinePass(self._programs, self._mesh_pass, self.point_pass, self._buffers)
+        )
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
         """Return the accumulation buffer for images of this size."""
@@ -194,7 +166,6 @@ class LatePasses:
 
     def release(self) -> None:
         """Free all passes that were created."""
-        for item in self._made:
-            item.release()
+        self._owner.release()
         if self._sum is not None:
             self._sum.release()

@@ -29,7 +29,16 @@ class LegendPass:
         """
         wanted = legend, size, is_light
         if self._drawn is None or self._drawn[0] is not legend or self._drawn[1:] != wanted[1:]:
-            self._prepare(*wanted)
+            self._free()
+            pixels = legend_pixels(*wanted)
+            if pixels is not None:
+                # Blending expects premultiplied alpha, and a texture's first row is at the bottom.
+                multiplied = pixels.astype(np.float64)
+                multiplied[..., :3] *= multiplied[..., 3:] / 255.0
+                data = np.ascontiguousarray(np.rint(multiplied[::-1]).astype(np.uint8))
+                self._texture = self.context.texture(data.shape[1::-1], 4, data.tobytes())
+                self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._drawn = wanted
         if self._texture is None:
             return False
         margin = max(round(_MARGIN * size[1]), 2)
@@ -41,18 +50,6 @@ class LegendPass:
         with without_depth_test(self.context):
             self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
         return True
-
-    def _prepare(self, legend: Legend, size: tuple[int, int], is_light: bool) -> None:
-        self._free()
-        pixels = legend_pixels(legend, size, is_light)
-        if pixels is not None:
-            # Blending expects premultiplied alpha, and the first row of a texture is at the bottom.
-            multiplied = pixels.astype(np.float64)
-            multiplied[..., :3] *= multiplied[..., 3:] / 255.0
-            data = np.ascontiguousarray(np.rint(multiplied[::-1]).astype(np.uint8))
-            self._texture = self.context.texture(data.shape[1::-1], 4, data.tobytes())
-            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._drawn = legend, size, is_light
 
     def _free(self) -> None:
         if self._texture is not None:

@@ -87,7 +87,11 @@ class MeshPass:
             indices.sort(mesh, listed, (view.matrix @ placement)[2, :3])
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
-        backs = None if blended else self._back_faces(mesh, placement, view, options)
+        backs: tuple[Region, ...] | None = None
+        # Hidden parts may reveal back faces anywhere.
+        if not (blended or mesh.hidden_parts or options.hidden_parts or options.reduced):
+            seen_from = view.matrix @ placement, view.projection, self.context.viewport
+            backs = mesh.back_faces.regions(*seen_from)
         # Blended surfaces write no depth, so their outlines are drawn below them.
         if blended:
             self._draw_hulls(mesh, placement, view, options, blended, look_of)
@@ -140,15 +144,6 @@ class MeshPass:
             array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first)
         context.front_face, context.cull_face = "ccw", "back"
         context.disable(moderngl.CULL_FACE)
-
-    def _back_faces(
-        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
-    ) -> tuple[Region, ...] | None:
-        """Return the regions with visible back faces; None for all, as with hidden parts."""
-        if mesh.hidden_parts or options.hidden_parts or options.reduced:
-            return None
-        model_view = view.matrix @ placement
-        return mesh.back_faces.regions(model_view, view.projection, self.context.viewport)
 
     def draw_shape(
         self,

@@ -68,7 +68,19 @@ class OcclusionPass:
         self._surfaces.clear(depth=1.0)
         draw(halved, "geometry")
         context.enable_only(moderngl.NOTHING)
-        self._run(0, self._geometry, self._uniforms(halved, _RADIUS * size, phase))
+        projection, is_parallel = halved.projection, view.camera.is_parallel
+        focal = np.array([projection[0, 0], projection[1, 1]])
+        middle = -projection[:2, 3] if is_parallel else projection[:2, 2]
+        scale, shift = 2.0 / (np.array(self._half) * focal), (middle - 1.0) / focal
+        search = {
+            "u_geometry": 0,
+            "u_unproject": (*scale.tolist(), *shift.tolist()),
+            "u_orthographic": is_parallel,
+            "u_radius": _RADIUS * size,
+            "u_pixels": 0.5 * self._half[1] * float(focal[1]),
+            "u_phase": phase,
+        }
+        self._run(0, self._geometry, search)
         blur = {"u_occlusion": 0, "u_radius": 0.25 * _RADIUS * size}
         self._run(1, self._fields[0], blur)
         return Occlusion(self._fields[1], strength)
@@ -79,20 +91,6 @@ class OcclusionPass:
         matrix = np.diag([*scale, 1.0, 1.0])
         matrix[:2, 3] = scale - 1.0
         return replace(view, projection=matrix @ view.projection)
-
-    def _uniforms(self, view: View, radius: float, phase: float) -> dict[str, object]:
-        projection, is_parallel = view.projection, view.camera.is_parallel
-        focal = np.array([projection[0, 0], projection[1, 1]])
-        middle = -projection[:2, 3] if is_parallel else projection[:2, 2]
-        scale, shift = 2.0 / (np.array(self._half) * focal), (middle - 1.0) / focal
-        return {
-            "u_geometry": 0,
-            "u_unproject": (*scale.tolist(), *shift.tolist()),
-            "u_orthographic": is_parallel,
-            "u_radius": radius,
-            "u_pixels": 0.5 * self._half[1] * float(focal[1]),
-            "u_phase": phase,
-        }
 
     def _run(self, step: int, source: moderngl.Texture, values: Mapping[str, object]) -> None:
         self._targets[step].use()

@@ -166,47 +166,27 @@ class OutlinePass:
             return
         if not actor.is_drawn:
             return
+        placement = placement_of(actor, options)
         if shows_skeleton(actor, options):
-            self._cover_joints(actor, one.joint, mask, view, options)
+            skeleton = self._buffers.skeleton(actor)
+            program = joint_program(self._programs, skeleton, options, "", "mask")
+            set_uniforms(program, {"u_mask": mask})
+            draw_joints(program, skeleton, placement, view, options, only=one.joint)
         if one.joint >= 0:
             return
         if shows_mesh(actor.figure, options):
-            self._cover_mesh(actor, mask, view, options)
+            mesh = self._buffers.posed_mesh(actor)
+            mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
+
+            def prepare(program: moderngl.Program, _: MeshRun) -> None:
+                set_uniforms(program, {"u_mask": mask})
+
+            self._meshes.draw_shape(mesh, placement, view, options, "mask", prepare)
         if has_points(actor, options):
-            self._cover_points(actor, mask, view, options)
-
-    def _cover_joints(
-        self,
-        actor: Actor,
-        joint: int,
-        mask: tuple[float, ...],
-        view: View,
-        options: DisplayOptions,
-    ) -> None:
-        skeleton = self._buffers.skeleton(actor)
-        program = joint_program(self._programs, skeleton, options, "", "mask")
-        set_uniforms(program, {"u_mask": mask})
-        draw_joints(program, skeleton, placement_of(actor, options), view, options, only=joint)
-
-    def _cover_mesh(
-        self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
-    ) -> None:
-        mesh = self._buffers.posed_mesh(actor)
-        mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
-
-        def prepare(program: moderngl.Program, _: MeshRun) -> None:
-            set_uniforms(program, {"u_mask": mask})
-
-        place = placement_of(actor, options)
-        self._meshes.draw_shape(mesh, place, view, options, "mask", prepare)
-
-    def _cover_points(
-        self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
-    ) -> None:
-        points = self._buffers.points_of(actor)
-        points.update(actor, actor.placement, view, options)
-        set_uniforms(self._programs.drawing("point", fragment="mask"), {"u_mask": mask})
-        self._points.draw_shapes(points, actor.placement, view, "mask")
+            points = self._buffers.points_of(actor)
+            points.update(actor, actor.placement, view, options)
+            set_uniforms(self._programs.drawing("point", fragment="mask"), {"u_mask": mask})
+            self._points.draw_shapes(points, actor.placement, view, "mask")
 
     def _free(self) -> None:
         for item in self._distance:

@@ -19,7 +19,7 @@ from viewer.rendering.gpu.upload import buffer, float32
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import OPACITIES, Color, DisplayOptions
 from viewer.rendering.view import View, set_lights, set_model
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
@@ -115,7 +115,6 @@ class PointBuffers:
         self._rows = self._owner.keep(context.buffer(reserve=4 * _FLOATS * max(room, 1)))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
-        self._numbers: Ints = self.elements
         self._measured: tuple[object, Floats] | None = None
 
     def update(self, actor: Actor, placement: Floats, view: View, options: DisplayOptions) -> None:
@@ -129,8 +128,12 @@ class PointBuffers:
         assert points is not None  # checked by the caller
         shown = (points[:, 3] > 0.0) & (points[:, 3] >= least)
         self.center = bounding_box(points[shown, :3]).mean(axis=0) if shown.any() else np.zeros(3)
-        ends, opacity = self._capsules(points, shown)
-        opacity = opacity * translucency
+        limbs, single = self.layout.limbs, np.flatnonzero(shown)
+        kept = np.flatnonzero(shown[limbs].all(axis=1))
+        ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept]])
+        numbers = np.concatenate([single, len(self.layout.names) + kept]).astype(np.int32)
+        # A limb has the lower confidence of its two ends.
+        opacity = np.clip(points[ends, 3].min(axis=1), 0.0, 1.0) * translucency
         toward = (view.matrix @ placement)[2, :3]
         depth = (points[ends, :3].mean(axis=1) - self.center) @ toward
         # Opaque capsules first, then translucent ones from back to front.
@@ -141,18 +144,8 @@ class PointBuffers:
         key = (points.tobytes(), least, look, order.tobytes(), id(actor.clip))
         if key != self._key:
             self._write(actor, points, ends[order], opacity[order])
-            self.elements = self._numbers[order]
+            self.elements = numbers[order]
             self._key = key
-
-    def _capsules(self, points: Floats, shown: Bools) -> tuple[NDArray[np.int64], Floats]:
-        """Return the end points and the opacity of all drawn capsules: (N, 2), (N,)."""
-        limbs = self.layout.limbs
-        single = np.flatnonzero(shown)
-        kept = np.flatnonzero(shown[limbs].all(axis=1))
-        ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept]])
-        self._numbers = np.concatenate([single, len(self.layout.names) + kept]).astype(np.int32)
-        # A limb has the lower confidence of its two ends.
-        return ends, np.clip(points[ends, 3].min(axis=1), 0.0, 1.0)
 
     def _write(
         self, actor: Actor, points: Floats, ends: NDArray[np.int64], opacity: Floats
@@ -230,7 +223,13 @@ class PointPass:
         self.context.enable(moderngl.CULL_FACE)
         if overlays:
             given = options.skeleton_opacity
-            self._draw_hidden(array, count, OPACITIES["boxes"] if given is None else given)
+            hidden = OPACITIES["boxes"] if given is None else given
+            self.context.depth_func = ">"
+            set_uniforms(program, {"u_opacity": hidden})
+            with without_depth_writes(self.context):
+                array.render(moderngl.TRIANGLES, instances=count)
+            set_uniforms(program, {"u_opacity": 1.0})
+            self.context.depth_func = "<"
         array.render(moderngl.TRIANGLES, instances=count)
         self.context.disable(moderngl.CULL_FACE)
         self.context.front_face = "ccw"
@@ -244,14 +243,6 @@ class PointPass:
             set_model(program, view, placement, points.center)
             array = points.array(program, self.shape(points))
             array.render(moderngl.TRIANGLES, instances=len(points.elements))
-
-    def _draw_hidden(self, array: moderngl.VertexArray, count: int, opacity: float) -> None:
-        self.context.depth_func = ">"
-        set_uniforms(array.program, {"u_opacity": opacity})
-        with without_depth_writes(self.context):
-            array.render(moderngl.TRIANGLES, instances=count)
-        set_uniforms(array.program, {"u_opacity": 1.0})
-        self.context.depth_func = "<"
 
     def release(self) -> None:
         """Free the capsule."""
