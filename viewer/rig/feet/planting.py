@@ -342,7 +342,7 @@ def _own_plan(
 # the toes rotate instead.
 
 _NOISE = 0.04  # seconds below which changes of a standing foot's rotation are noise
-_LEVELS = 0.06  # seconds over which a correction falls to 40 % outside contacts
+_LEVELS = 0.06  # the length s of the smooth curve of a correction, seconds; see _EASE
 _FLAT = 6.0  # decimal exponent of the weight of a standing foot
 # Cosines of the tilts beyond which a sole is unchanged and below which it is fully levelled.
 _TILTED = (np.cos(np.radians(55.0)), np.cos(np.radians(35.0)))
@@ -437,7 +437,10 @@ def _rotated(clip: SampledClip, body: BodyLegs, old: Floats, new: Floats) -> Sam
 
 # Shifts of the feet and of the body.
 
-_EASE = 0.15  # seconds over which a correction falls to 40 % outside contacts
+# The length s of the smooth curve of a correction, seconds. Outside contacts the target is 0 with
+# weight 1, so the curve obeys s^4 c'''' = -c. Its solution that begins at rest and fades is
+# exp(-a) (cos a + sin a) with a = t / (sqrt(2) s): 70 % after s, 28 % after 2 s, 3 % after 3 s.
+_EASE = 0.15
 _JUMP = 0.03  # seconds below which a jump of the recording is sudden
 _JUMPS = (0.002, 0.004)  # its sizes, relative to the body, between which it becomes a jump
 _GAP = 0.0007  # maximum distance of a standing foot from the ground in a jump, relative to the body
@@ -448,7 +451,9 @@ _LIFTS, _LIFTED = 7, 0.25
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
 _SHAKE = 0.1  # duration below which changes of the feet's translations count as quick, seconds
 _FLIGHT = 0.05  # weight of the default translation relative to the weight of a planted foot
-_STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
+# Distances from hip to ankle, relative to those of the rest pose, below which a leg is bent and
+# above which it is straight.
+_STRAIGHT = (0.8, 0.95)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -475,8 +480,8 @@ def _foot_shifts(
 
     ``plan``: positions and times at which the feet must be planted, with at least one contact.
     ``points``: list of ((N, 3), (N, 3)), paths of the balls and the heels. ``heights``: (N, L),
-    heights of the soles. ``straight``: (N, L), length of each leg from hip to ankle, as a fraction
-    of its maximum length. Returns ``shifts``: list of (N, 3); ``sway``: (N, 3).
+    heights of the soles. ``straight``: (N, L), distance from hip to ankle relative to that of the
+    rest pose, see ``BodyLegs.straightness``. Returns ``shifts``: list of (N, 3); ``sway``: (N, 3).
     """
     # Feet and body depend on each other: a foot in the air moves with the body, and the body
     # follows the feet on the ground. Two rounds settle this. 1. Feet relative to a body that is

@@ -85,8 +85,8 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
 def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> Floats:
     """Return the rotations from the target's rest pose to the source's at every matched joint.
 
-    In limbs and fingers, the bone is rotated to the source's direction by the smallest rotation
-    from the body's orientation, and therefore without twist. For hands with fingers, the knuckle
+    In limbs, the bone is rotated to the source's direction by the smallest rotation from the body's
+    orientation, in fingers from the hand's, and therefore without twist. For hands with fingers, the knuckle
     line is also aligned. Trunk and feet only follow the body, unless their directions differ by
     more than 25 degrees. The last joint of a limb follows the joint before it.
 
