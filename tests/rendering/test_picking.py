@@ -122,7 +122,7 @@ def test_picking_does_not_skin_actors_again(offscreen, monkeypatch):
     scene = Scene([bent(arm(3), (1, "z", 0.5))])
     offscreen.render(scene, (80, 80), parallel(), DisplayOptions(), scene_box(scene))
     before = offscreen.renderer.posed_mesh(scene.actors[0]).n_updates
-    monkeypatch.setattr(PosedMesh, "_run", None)
+    monkeypatch.setattr(PosedMesh, "upload", None)
     assert click(offscreen, scene, 0.5, 0.0) is not None
     assert offscreen.renderer.posed_mesh(scene.actors[0]).n_updates == before
 

@@ -114,7 +114,9 @@ class Renderer:
         omitted. The target shows the average of the passes drawn so far. ``strength``: strength of
         shadows and occlusion, 0 to 1.
         """
-        self._note_samples(target)
+        note = f"{target.asked_samples} samples per pixel requested, {target.samples or 1} drawn"
+        if target.asked_samples > max(target.samples, 1) and note not in self.notes:
+            self.notes.append(note)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
         view = view_of(camera, target.size, depth_bounds(scene, camera.fixed, options, box))
@@ -138,7 +140,13 @@ class Renderer:
 
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
-            self._draw_legend(target.size, is_light(options.background))
+            assert self.legend is not None  # meshes were drawn with values, so there is a legend
+            width, height = target.size
+            note = f"an image of {width} x {height} pixels has no room for a legend"
+            light = is_light(options.background)
+            is_drawn = self.late.legend_pass.draw(self.legend, target.size, light)
+            if not is_drawn and note not in self.notes:
+                self.notes.append(note)
 
     def _draw_layers(
         self,
@@ -155,7 +163,11 @@ class Renderer:
         if options.background == "environment":
             self.late.backdrop_pass.draw(view, options.lights)
         draw_image_behind(self.late, scene, view, options, target.size)
-        self._draw_meshes(meshes, view, options)
+        self.late.use_pictures(meshes.uploaded, options)
+        draw = partial(self._draw_layer, meshes, view, options, blended=False)
+        draw_layer(self.context, options, draw)
+        for actor, mesh in meshes.opaque(options):
+            self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
         draw_image_planes(self.late, scene, view, options, box)
         skeletons = [
             (actor, selected[1] if index == selected[0] else -1)
@@ -170,7 +182,9 @@ class Renderer:
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
         self._draw_translucent(meshes, view, options)
-        self._draw_blended(meshes, view, options)
+        if any(mesh.is_blended for mesh in meshes.uploaded):
+            with without_depth_writes(self.context):
+                self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
         for actor in scene.actors:
             if not has_points(actor, options):
                 continue
@@ -183,7 +197,11 @@ class Renderer:
                 self._draw_skeleton(actor, view, options, joint, opacity, overlays=True)
         for actor in scene.actors:
             if has_markers(actor, options):
-                self._draw_markers(actor, view, options)
+                markers = self.buffers.keypoints_of(actor)
+                markers.update(actor.require_pose(), options.skinning)
+                # Marker positions already include the placement of the pose.
+                place, opacity = actor.placement, options.opacity * actor.opacity
+                self.late.keypoint_pass.draw(markers, place, view, options, opacity)
 
     def _draw_overlays(
         self,
@@ -293,22 +311,6 @@ class Renderer:
                 points.update(actor, actor.placement, view, options)
         return meshes
 
-    def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        """Draw opaque surfaces, and the lines on them."""
-        draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
-        for actor, mesh in meshes.opaque(options):
-            self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
-
-    def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        self.late.use_pictures(meshes.uploaded, options)
-        self._draw_layer(meshes, view, options, blended=False)
-
-    def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        """Draw translucent surfaces over opaque ones and the ground."""
-        if any(mesh.is_blended for mesh in meshes.uploaded):
-            with without_depth_writes(self.context):
-                self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
-
     def _draw_translucent(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         """Draw translucent actors over everything opaque, as a single layer.
 
@@ -353,12 +355,6 @@ class Renderer:
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         context.depth_func = "<"
 
-    def _draw_legend(self, size: tuple[int, int], is_light: bool) -> None:
-        assert self.legend is not None  # meshes were drawn with values, so there is a legend
-        note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
-        if not self.late.legend_pass.draw(self.legend, size, is_light) and note not in self.notes:
-            self.notes.append(note)
-
     def _draw_skeleton(
         self,
         actor: Actor,
@@ -372,21 +368,9 @@ class Renderer:
         how = selected, opacity * options.opacity * actor.opacity, actor.color, overlays
         self.joint_pass.draw(skeleton, placement, view, options, *how)
 
-    def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
-        markers = self.buffers.keypoints_of(actor)
-        markers.update(actor.require_pose(), options.skinning)
-        # Marker positions already include the placement of the pose.
-        at = actor.placement
-        self.late.keypoint_pass.draw(markers, at, view, options, options.opacity * actor.opacity)
-
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed mesh, created on first use; its figure must have a mesh."""
         return self.buffers.posed_mesh(actor)
-
-    def _note_samples(self, target: Target) -> None:
-        note = f"{target.asked_samples} samples per pixel requested, {target.samples or 1} drawn"
-        if target.asked_samples > max(target.samples, 1) and note not in self.notes:
-            self.notes.append(note)
 
     def release(self) -> None:
         """Free everything except the programs."""

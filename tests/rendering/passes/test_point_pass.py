@@ -8,6 +8,7 @@ from rendering.drawn_figures import square
 from rendering.front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.passes import point_pass
 from viewer.rendering.passes.point_pass import point_radii
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
@@ -165,8 +166,7 @@ def test_unchanged_points_are_uploaded_once(offscreen, monkeypatch):
     actor = dots((0.5, 0.0, 0.0), (0.5, 0.5, 0.0))
     scene = Scene([actor])
     front_view(offscreen, scene)
-    buffers = offscreen.renderer.buffers.points_of(actor)
-    monkeypatch.setattr(buffers, "_write", None)
+    monkeypatch.setattr(point_pass, "float32", None)
     front_view(offscreen, scene)
     actor.points[0, 0] = 0.6
     with pytest.raises(TypeError):

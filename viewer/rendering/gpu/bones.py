@@ -100,8 +100,9 @@ class _Part:
             array.render(moderngl.TRIANGLES, vertices=self.n_corners, instances=self.count)
 
     def _content(self, program: moderngl.Program) -> list[Any]:
+        # Bytes of attributes that the compiler removed are skipped, four per number.
         def kept(source: moderngl.Buffer, names: dict[str, str], suffix: str = "") -> Any:
-            layout = [f if name in program else _skipped(f) for name, f in names.items()]
+            layout = [f if name in program else f"{4 * int(f[0])}x" for name, f in names.items()]
             found = [name for name in names if name in program]
             return (source, " ".join(layout) + suffix, *found)
 
@@ -362,8 +363,3 @@ def _split(triangles: Floats) -> Floats:
     ab, bc, ca = (unit(one + other) for one, other in ((a, b), (b, c), (c, a)))
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     return np.concatenate([np.stack(part, axis=1) for part in parts])
-
-
-def _skipped(layout: str) -> str:
-    """Return moderngl's padding for an attribute that the compiler removed."""
-    return f"{4 * int(layout[0])}x"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from viewer.rendering.gpu.back_faces import BackFaces
 from viewer.rendering.gpu.index_sets import IndexSet
-from viewer.rendering.gpu.mesh_buffers import MeshBuffers, SkinBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.rest_buffers import SKINNING_SAMPLERS, RestBuffers
@@ -96,7 +96,31 @@ class PosedMesh:
         self.center, self._is_mirrored = self.mesh.center, False
         if attached and pose is not None:
             self.upload(pose, how)
-        self._run(self.mesh.skin(how), how, bool(attached))
+        skin = self.mesh.skin(how)
+        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
+        affine = attached and self._is_affine
+        program = self.programs.feedback("skin", how.method, ("v_position", "v_normal"), affine)
+        array = self._arrays.get(
+            program,
+            lambda: self._rest.attributes(program, skin, attached),
+            key=(id(skin), attached and id(self._rest.positions)),
+        )
+        values = {
+            "u_attached": attached,
+            "u_rest_shift": tuple(self.mesh.center - self.center),
+            "u_center": tuple(self.center),
+            "u_blend_factor": -1.0 if how.blend_factor is None else how.blend_factor,
+            "u_n_offsets": self._rest.n_offsets if attached else 0,
+            "u_n_sources": len(self.mesh.copies),
+            **SKINNING_SAMPLERS,
+        }
+        set_uniforms(program, values)
+        self._palette.use(SKINNING_SAMPLERS["u_palette"])
+        skin.pairs.use(SKINNING_SAMPLERS["u_pairs"])
+        if self._rigid is not None:
+            self._rigid.use(SKINNING_SAMPLERS["u_rigid"])
+        self._rest.use()
+        array.transform(self.posed, mode=moderngl.POINTS, vertices=self.mesh.n_vertices)
         shape = shaped(self.mesh.figure, pose.shape_weights) if attached and pose else None
         self.back_faces.update(shape or self.mesh.figure, pose if attached else None, how)
         self._key = key
@@ -129,32 +153,6 @@ class PosedMesh:
                 self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
             centers = bind_positions(skin) - self.mesh.center
             write_rigid(self._rigid, *split_palette(palette, centers))
-
-    def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
-        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
-        affine = attached and self._is_affine
-        program = self.programs.feedback("skin", how.method, ("v_position", "v_normal"), affine)
-        array = self._arrays.get(
-            program,
-            lambda: self._rest.attributes(program, skin, attached),
-            key=(id(skin), attached and id(self._rest.positions)),
-        )
-        values = {
-            "u_attached": attached,
-            "u_rest_shift": tuple(self.mesh.center - self.center),
-            "u_center": tuple(self.center),
-            "u_blend_factor": -1.0 if how.blend_factor is None else how.blend_factor,
-            "u_n_offsets": self._rest.n_offsets if attached else 0,
-            "u_n_sources": len(self.mesh.copies),
-            **SKINNING_SAMPLERS,
-        }
-        set_uniforms(program, values)
-        self._palette.use(SKINNING_SAMPLERS["u_palette"])
-        skin.pairs.use(SKINNING_SAMPLERS["u_pairs"])
-        if self._rigid is not None:
-            self._rigid.use(SKINNING_SAMPLERS["u_rigid"])
-        self._rest.use()
-        array.transform(self.posed, mode=moderngl.POINTS, vertices=self.mesh.n_vertices)
 
     def is_mirrored_by(self, placement: Floats) -> bool:
         """Return whether a placement, (4, 4), or most of the skinning reflects the mesh.

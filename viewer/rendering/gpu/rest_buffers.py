@@ -71,7 +71,12 @@ class RestBuffers:
         active = weights.any()
         self.n_offsets = 0
         if active and self.way == "texture":
-            self._write_list(weights)
+            rows = np.flatnonzero(weights)
+            if self._list is None:
+                empty = np.zeros(len(weights))
+                self._list = pair_texture(self.context, empty, empty)
+            write_pairs(self._list, rows, weights[rows])
+            self.n_offsets = len(rows)
         shape = b"" if figure is self.mesh.figure else pose.shape_weights.tobytes()
         key = (shape, weights.tobytes() if active and self.way == "product" else b"")
         if key != self._key:
@@ -82,13 +87,6 @@ class RestBuffers:
         if figure.correctives is None or figure.skeleton is None:
             return np.zeros(0)
         return pose_weights(figure.correctives, figure.skeleton, pose)
-
-    def _write_list(self, weights: Floats) -> None:
-        rows = np.flatnonzero(weights)
-        if self._list is None:
-            self._list = pair_texture(self.context, np.zeros(len(weights)), np.zeros(len(weights)))
-        write_pairs(self._list, rows, weights[rows])
-        self.n_offsets = len(rows)
 
     def _write(self, figure: Figure, weights: Floats | None, normals: bool) -> None:
         """Upload positions, and normals if the shape changed, of every split vertex."""

@@ -28,7 +28,6 @@ SAMPLERS = {
 }
 """Texture unit of each entry of ``TEXTURES``; skinning and effects use the other units."""
 
-_UNITS = tuple(SAMPLERS.values())
 _MOST_SETS = 3  # maximum number of texture coordinate sets that one figure's textures may use
 _COLORS = ("base_texture", "emissive_texture", "shade_texture")  # sRGB
 # Toon materials have no metalness and roughness: their other textures use the units of these.
@@ -120,6 +119,7 @@ def upload_surfaces(
     ``sets``: sets of texture coordinates that are drawn; textures of other sets are omitted.
     """
     made: dict[tuple[object, ...], moderngl.Texture] = {}
+    units = dict(zip(TEXTURES, SAMPLERS.values(), strict=True))
     surfaces = []
     for material in materials:
         found: dict[str, moderngl.Texture] = {}
@@ -131,22 +131,29 @@ def upload_surfaces(
             filters = texture.is_smooth, texture.minification
             key = id(texture.image), is_linear, texture.wrap, filters
             if key not in made:
-                made[key] = owner.keep(_upload(context, texture, is_linear, notes))
+                pixels = _mirrored(texture.image, texture.wrap)
+                new = owner.keep(picture_texture(context, pixels, notes, is_linear))
+                new.repeat_x, new.repeat_y = (side != "clamp" for side in texture.wrap)
+                usual = "linear_mipmap_linear" if texture.is_smooth else "nearest_mipmap_linear"
+                minified = getattr(moderngl, (texture.minification or usual).upper())
+                new.filter = minified, moderngl.LINEAR if texture.is_smooth else moderngl.NEAREST
+                made[key] = new
             found[name] = made[key]
-        surfaces.append(_surface(material, found, sets))
+        untextured = dict(_UNTEXTURED)
+        if material.base_texture is not None:
+            untextured["u_has_base_factor"] = False
+        surfaces.append(
+            Surface(
+                uniforms=_uniforms(material, found, sets),
+                untextured=untextured,
+                textures=tuple((units[name], texture) for name, texture in found.items()),
+                is_physical=material.is_physical,
+                is_blended=material.alpha_mode == "blend",
+                double_sided=material.double_sided,
+                outline=material.outline,
+            )
+        )
     return surfaces
-
-
-def _upload(
-    context: moderngl.Context, texture: Texture, is_linear: bool, notes: list[str]
-) -> moderngl.Texture:
-    assert texture.image is not None  # checked by the caller
-    made = picture_texture(context, _mirrored(texture.image, texture.wrap), notes, is_linear)
-    made.repeat_x, made.repeat_y = (side != "clamp" for side in texture.wrap)
-    usual = "linear_mipmap_linear" if texture.is_smooth else "nearest_mipmap_linear"
-    minified = getattr(moderngl, (texture.minification or usual).upper())
-    made.filter = minified, moderngl.LINEAR if texture.is_smooth else moderngl.NEAREST
-    return made
 
 
 def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
@@ -157,24 +164,6 @@ def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
         # v = 0 is at the last row, at which the unmirrored image begins.
         image = np.concatenate([image[::-1], image], axis=0)
     return image
-
-
-def _surface(
-    material: Material, textures: dict[str, moderngl.Texture], sets: Sequence[int]
-) -> Surface:
-    units = dict(zip(TEXTURES, _UNITS, strict=True))
-    untextured: dict[str, Any] = dict(_UNTEXTURED)
-    if material.base_texture is not None:
-        untextured["u_has_base_factor"] = False
-    return Surface(
-        uniforms=_uniforms(material, textures, sets),
-        untextured=untextured,
-        textures=tuple((units[name], texture) for name, texture in textures.items()),
-        is_physical=material.is_physical,
-        is_blended=material.alpha_mode == "blend",
-        double_sided=material.double_sided,
-        outline=material.outline,
-    )
 
 
 def _slots(material: Material) -> dict[str, Texture]:

@@ -10,7 +10,6 @@ import math
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
@@ -143,26 +142,21 @@ class PointBuffers:
         look = actor.color, translucency
         key = (points.tobytes(), least, look, order.tobytes(), id(actor.clip))
         if key != self._key:
-            self._write(actor, points, ends[order], opacity[order])
+            if self._measured is None or self._measured[0] is not actor.clip or actor.clip is None:
+                self._measured = actor.clip, _radii_of(actor, points)
+            ends, opacity = ends[order], opacity[order]
+            radii = self._measured[1][ends].min(axis=1)
+            radii[ends[:, 0] != ends[:, 1]] *= _LIMB
+            # A limb from the middle to a side has that side's colour; a limb between sides, the
+            # middle's.
+            side = np.sign(self.layout.sides[ends].sum(axis=1)) + 1
+            palette = np.array([RIGHT, actor.color or MIDDLE, LEFT])
+            places = (points[ends, :3] - self.center).reshape(-1, 6)
+            columns = [places, radii[:, None], palette[side], opacity[:, None]]
+            if len(ends):
+                self._rows.write(float32(np.concatenate(columns, axis=1)))
             self.elements = numbers[order]
             self._key = key
-
-    def _write(
-        self, actor: Actor, points: Floats, ends: NDArray[np.int64], opacity: Floats
-    ) -> None:
-        if self._measured is None or self._measured[0] is not actor.clip or actor.clip is None:
-            self._measured = actor.clip, _radii_of(actor, points)
-        radii = self._measured[1][ends].min(axis=1)
-        radii[ends[:, 0] != ends[:, 1]] *= _LIMB
-        sides = self.layout.sides[ends]
-        # A limb from the middle to a side has that side's colour; a limb between sides, the
-        # middle's.
-        side = np.sign(sides.sum(axis=1)) + 1
-        palette = np.array([RIGHT, actor.color or MIDDLE, LEFT])
-        places = (points[ends, :3] - self.center).reshape(-1, 6)
-        columns = [places, radii[:, None], palette[side], opacity[:, None]]
-        if len(ends):
-            self._rows.write(float32(np.concatenate(columns, axis=1)))
 
     def array(
         self, program: moderngl.Program, capsule: tuple[moderngl.Buffer, moderngl.Buffer]
