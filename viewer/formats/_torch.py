@@ -14,7 +14,6 @@ from functools import partial
 from typing import Literal
 
 from viewer.diagnostics import Phrase, wording
-from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
 from viewer.formats._pickle.machine import Machine
@@ -113,12 +112,9 @@ def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
                 room[done : done + len(piece)] = piece
                 done += len(piece)
     except DAMAGE as problem:
-        raise _damaged(storage, member.filename, problem) from None
+        reason = printable(problem, 100)
+        raise storage.fault(member.filename, Phrase(wording.NPY_DAMAGED, reason=reason)) from None
     return memoryview(room).toreadonly()
-
-
-def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
-    return storage.fault(key, Phrase(wording.NPY_DAMAGED, reason=printable(problem, 100)))
 
 
 # Legacy streams of torch: files before version 1.6, and storages inside other pickles.

@@ -58,7 +58,9 @@ def bind_skins(joints: Joints, worlds: Floats, skins: dict[int, NodeSkin]) -> Bi
     for index, skin in skins.items():
         slots = np.array([joints.carrier[node] for node in skin.joints.tolist()], dtype=np.int32)
         baked, reach = _baked(bindings, skin.inverse_bind, slots), _reach(skin.inverse_bind)
-        wanted = skin.inverse_bind if _is_identity(baked) else skin.inverse_bind @ _inverse(baked)
+        wanted = skin.inverse_bind
+        if not np.array_equal(baked, np.eye(4)):
+            wanted = wanted @ _inverse(baked)
         for place, joint in enumerate(slots.tolist()):
             known = bindings.matrices.get(joint)
             if known is None:
@@ -207,10 +209,6 @@ def _agree(one: Floats, other: Floats, reach: float) -> bool:
 def _reach(matrices: Floats) -> float:
     """Return the largest component of the translations of some matrices."""
     return float(np.abs(matrices[:, :3, 3]).max(initial=0.0))
-
-
-def _is_identity(matrix: Floats) -> bool:
-    return np.array_equal(matrix, np.eye(4))
 
 
 def _inverse(matrices: Floats) -> Floats:

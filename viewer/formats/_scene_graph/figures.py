@@ -144,7 +144,11 @@ def _figure(
     joints = make_joints(file.tree, members.nodes)
     worlds = _worlds(joints, source)
     bindings = bind_skins(joints, worlds, {index: file.skins[index] for index in members.skins})
-    bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
+    parts = ((node, file.meshes[int(file.tree.meshes[node])]) for node in members.meshes)
+    bind_rigid(
+        bindings,
+        [node for node, mesh in parts if not is_skinned(mesh, int(file.tree.skins[node]))],
+    )
     pieces = pieces_of(file, members.meshes, bindings)
     matrices = inverse_binds(bindings)
     _check_positions(joints, worlds, matrices, pieces, source)
@@ -183,10 +187,6 @@ def _worlds(joints: Joints, source: Source) -> Floats:
             found=rounded(found),
         )
     return worlds
-
-
-def _is_skinned(file: NodeFile, node: int) -> bool:
-    return is_skinned(file.meshes[int(file.tree.meshes[node])], int(file.tree.skins[node]))
 
 
 def _check_positions(

@@ -164,7 +164,11 @@ class _Grouping:
         for key, wanted in self.wanted.items():
             for root in {int(self.roots[node]) for node in wanted}:
                 in_tree.setdefault(root, []).append(key)
-        skinned = {n for n in self.mesh_nodes if self._is_skinned(n)}
+        skinned = {
+            node
+            for node in self.mesh_nodes
+            if is_skinned(self.file.meshes[self.meshes[node]], int(self.tree.skins[node]))
+        }
         is_alone = not self.figures
         for node in sorted(self.moved & self.place.keys() - skinned, key=self.place.__getitem__):
             key = self._key(node)
@@ -174,9 +178,6 @@ class _Grouping:
                     continue
                 key = keys[0]
             self._figure(("all", 0) if is_alone else key)[1].add(node)
-
-    def _is_skinned(self, node: int) -> bool:
-        return is_skinned(self.file.meshes[self.meshes[node]], int(self.tree.skins[node]))
 
     def _bare(self) -> list[int]:
         return [node for node in self.order if self.tree.cameras[node] < 0]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Part, Phrase, wording
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
-from viewer.formats._text.words import Words, number_key, read_words, refuse_words
+from viewer.formats._text.words import number_key, read_words, refuse_words
 from viewer.phrases import quoted
 from viewer.rig.arrays import Floats
 
@@ -96,7 +96,13 @@ def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places
     fits = sizes == columns
     owners = np.repeat(np.arange(len(begins)), sizes)
     if not fits.any() and len(words.bad):
-        raise _word_fault(source, words, int(words.bad[0]), int(owners[words.bad[0]]))
+        first = int(words.bad[0])
+        raise source.fault(
+            number_key(words.word(first)),
+            int(words.offsets[first]),
+            item=Phrase("row {index}", index=int(owners[first])),
+            found=quoted(words.word(first)),
+        )
     bad = words.bad
     refuse_words(
         source,
@@ -116,11 +122,3 @@ def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places
     rows = np.full((len(begins), columns), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
     return rows, words.offsets[begins]
-
-
-def _word_fault(source: Source, words: Words, index: int, row: int) -> Exception:
-    found = words.word(index)
-    offset = int(words.offsets[index])
-    return source.fault(
-        number_key(found), offset, item=Phrase("row {index}", index=row), found=quoted(found)
-    )

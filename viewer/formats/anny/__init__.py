@@ -136,7 +136,7 @@ def _space(
     blended = _phenotype_targets(package)
     names = (
         [name for name, _ in blended]
-        + _action_targets()
+        + [f"{_FACE_UNITS}{name}.target" for name in ACTIONS]
         + [name for pair in pairs for name in pair]
     )
     newborn = {row for row, (_, of) in enumerate(blended) if "newborn" in of}
@@ -188,11 +188,6 @@ def _breast_targets(package: Package, whole: list[tuple[str, ...]]) -> Iterator[
 def _filed(names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the variations as spelled in file names; a newborn uses the targets of a baby."""
     return tuple("baby" if name == "newborn" else name for name in names)
-
-
-def _action_targets() -> list[str]:
-    """Return the files of the facial actions."""
-    return [f"{_FACE_UNITS}{name}.target" for name in ACTIONS]
 
 
 def _change_targets(package: Package) -> dict[str, tuple[str, str]]:

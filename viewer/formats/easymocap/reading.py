@@ -132,37 +132,30 @@ class Reading:
             except FormatError as problem:
                 self._fault(problem.diagnostic)
                 continue
-            self._take_people(people, folder, frame, path, part)
-
-    def _take_people(
-        self, people: list[Any], folder: FrameFolder, frame: int, path: str, part: _Part
-    ) -> None:
-        seen: set[int] = set()
-        for place, record in enumerate(people):
-            try:
-                person = self._number_of(person_of(record, place))
-            except RecordError as problem:
-                self._fault_of(path, place, problem, problem.key)
-                continue
-            if person < 0:  # the identity is unknown: the number is unique only within the frame
-                person = min(seen) - 1 if -1 in seen else -1
-                self.note(wording.RECORD_UNTRACKED, path)
-            if person in seen:
-                line = self._line(path, place, "")
-                values = {"item": f"person {person}"}
-                self._fault(
-                    Diagnostic(
-                        "F002.record-twice: {item} occurs twice: the first one is used",
-                        Path(path),
-                        line,
-                        values=values,
+            seen: set[int] = set()
+            for place, record in enumerate(people):
+                try:
+                    person = self._number_of(person_of(record, place))
+                except RecordError as problem:
+                    self._fault_of(path, place, problem, problem.key)
+                    continue
+                if person < 0:  # the identity is unknown: the number is unique only in the frame
+                    person = min(seen) - 1 if -1 in seen else -1
+                    self.note(wording.RECORD_UNTRACKED, path)
+                if person in seen:
+                    self._fault(
+                        Diagnostic(
+                            "F002.record-twice: {item} occurs twice: the first one is used",
+                            Path(path),
+                            self._line(path, place, ""),
+                            values={"item": f"person {person}"},
+                        )
                     )
-                )
-                continue
-            if record.get("id") is None or "personID" in record:
-                self._note_ids(path, record)
-            seen.add(person)
-            self._take_person(person, record, folder, frame, (path, place), part)
+                    continue
+                if record.get("id") is None or "personID" in record:
+                    self._note_ids(path, record)
+                seen.add(person)
+                self._take_person(person, record, folder, frame, (path, place), part)
 
     def _note_ids(self, path: str, record: dict[str, Any]) -> None:
         """Add a note on the identity that is used if a record has none, or two different ones."""
@@ -201,9 +194,29 @@ class Reading:
         has_points = folder.has_points and _POINTS in record
         try:
             if has_points:
-                self._add_points(part, person, record, frame, origin)
+                points = part.points.get(person)
+                if points is None:
+                    layout, parts = self.point_layout or _point_layout(record, self.options.layout)
+                    points = _PointRows(layout=layout, parts=parts)
+                points.add(record, frame, path, place)
+                if self.point_layout is None:
+                    points.check_any()
+                    self.point_layout = points.layout, points.parts
+                part.points[person] = points
             if has_body:
-                self._add_body(part, person, record, frame, origin)
+                of_body = self._layout_of(record, path)
+                rows = part.bodies.get(person)
+                if rows is None:
+                    known = self._known.setdefault(person, {}) if is_tracked(person) else None
+                    rows = BodyRows(layout=of_body, known=known)
+                elif rows.layout is not of_body:
+                    rows.widen(of_body)
+                rows.add(record, frame, path, place)
+                part.bodies[person] = rows
+                if "vertices" in record:
+                    self.note(
+                        "F007.record-vertices: vertices are ignored: they are not needed", path
+                    )
             elif not has_points:
                 raise RecordError("", _lacks(record, folder))
         except RecordError as problem:
@@ -220,22 +233,6 @@ class Reading:
                 "folder are used",
                 path,
             )
-
-    def _add_body(
-        self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
-    ) -> None:
-        path, place = origin
-        layout = self._layout_of(record, path)
-        rows = part.bodies.get(person)
-        if rows is None:
-            known = self._known.setdefault(person, {}) if is_tracked(person) else None
-            rows = BodyRows(layout=layout, known=known)
-        elif rows.layout is not layout:
-            rows.widen(layout)
-        rows.add(record, frame, path, place)
-        part.bodies[person] = rows
-        if "vertices" in record:
-            self.note("F007.record-vertices: vertices are ignored: they are not needed", path)
 
     def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
         """Return the layout of all bodies, extended by the first record with coefficients."""
@@ -254,19 +251,6 @@ class Reading:
         self.body_layout, keys = layout, [key for key, _ in layout.widths]
         self._awaited = tuple(key for key in COEFFICIENTS if key not in keys)
         return layout
-
-    def _add_points(
-        self, part: _Part, person: int, record: dict[str, Any], frame: int, origin: tuple[str, int]
-    ) -> None:
-        rows = part.points.get(person)
-        if rows is None:
-            layout, parts = self.point_layout or _point_layout(record, self.options.layout)
-            rows = _PointRows(layout=layout, parts=parts)
-        rows.add(record, frame, *origin)
-        if self.point_layout is None:
-            rows.check_any()
-            self.point_layout = rows.layout, rows.parts
-        part.points[person] = rows
 
     def _finished(self, part: _Part, stop: int) -> CapturePart:
         """Return the collected rows as motions on the timeline of the whole recording."""

@@ -352,12 +352,11 @@ class _BinaryRows:
         self.position += size * element.count
         return True
 
-    def _row_size(self, element: Element, start: int) -> int:
-        """Return the size of one row in bytes; counts beyond the end of the file are 0."""
-        return self._list_sizes(element, start)[0]
-
     def _list_sizes(self, element: Element, start: int) -> tuple[int, list[int]]:
-        """Return the size of one row in bytes, and the lengths of its lists as declared."""
+        """Return the size of one row in bytes, and the lengths of its lists as declared.
+
+        Counts beyond the end of the file are 0.
+        """
         place, counts = start, list[int]()
         for prop in element.properties:
             size = int(prop.kind[1])
@@ -383,7 +382,7 @@ class _BinaryRows:
         place, end = self.position, len(self.data)
         for row in range(element.count):
             starts[row] = place
-            place += self._row_size(element, place)
+            place += self._list_sizes(element, place)[0]
             if place > end:
                 raise self._short(element, end - self.position)
         return starts

@@ -14,7 +14,6 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, parse_few
 from viewer.formats.skin.tables import (
     KEYWORDS,
-    Block,
     OffsetOf,
     find_block,
     read_count,
@@ -124,9 +123,12 @@ def _read_section(source: Source, sections: Sections, word: _Word) -> int:
         source.remember("weights", offset_of)
         sections.starts, sections.joints, sections.weights = starts, joints, weights
     elif name == "triangles":
-        run = _read_triangles(source, sections, block, count)
+        first = sections.n_triangles
+        rows, offset_of = read_rows(source, block, count, 3, first, "triangle {index}")
+        corners = whole_corners(source, rows, offset_of, first)
+        run = _TriangleRun(corners, len(sections.materials) - 1, offset_of)
         sections.triangles.append(run)
-        sections.n_triangles += len(run.triangles)
+        sections.n_triangles += len(corners)
     else:
         sections.tables[name], offset_of = read_rows(source, block, count, _WIDTHS[name])
         source.remember(name, offset_of)
@@ -146,13 +148,6 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
     if declared != found:
         offset = sections.offsets[name]
         source.refuse(wording.SKIN_DECLARED, offset, section=name, expected=declared, found=found)
-
-
-def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> _TriangleRun:
-    first = sections.n_triangles
-    rows, offset_of = read_rows(source, block, count, 3, first, "triangle {index}")
-    corners = whole_corners(source, rows, offset_of, first)
-    return _TriangleRun(corners, len(sections.materials) - 1, offset_of)
 
 
 def _read_material(

@@ -173,34 +173,30 @@ def _row_begins(
         begins, sizes = words.rows()
         if block.closed and (sizes == width).sum() * 2 >= len(sizes):
             return begins, sizes
-        if not block.closed or total % width:
-            raise _no_rows(source, block, total, count, width)
+        if not block.closed:
+            raise source.fault(
+                'F002.skin-rows-end: expected "}}" to close {section} (line {line}), found the '
+                "end of the file after {found} of {expected} rows",
+                source.end,
+                section=block.name,
+                line=source.line(block.header),
+                found=total // width,
+                expected=count,
+            )
+        if total % width:
+            raise source.fault(
+                "F002.skin-rows: {section}: expected {expected} rows of {width} numbers, found "
+                "{found}{rest} (to line {end})",
+                block.count,
+                section=block.name,
+                expected=count,
+                width=width,
+                found=total // width,
+                rest=optional(" and {} numbers", total % width),
+                end=source.line(block.end),
+            )
     begins = np.arange(0, total, width)
     return begins, np.full(len(begins), width)
-
-
-def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -> FormatError:
-    if not block.closed:
-        return source.fault(
-            'F002.skin-rows-end: expected "}}" to close {section} (line {line}), found the end '
-            "of the file after {found} of {expected} rows",
-            source.end,
-            section=block.name,
-            line=source.line(block.header),
-            found=total // width,
-            expected=count,
-        )
-    return source.fault(
-        "F002.skin-rows: {section}: expected {expected} rows of {width} numbers, found "
-        "{found}{rest} (to line {end})",
-        block.count,
-        section=block.name,
-        expected=count,
-        width=width,
-        found=total // width,
-        rest=optional(" and {} numbers", total % width),
-        end=source.line(block.end),
-    )
 
 
 def words_of(source: Source, block: Block) -> Words:

@@ -110,15 +110,11 @@ def _people(frame: Archive) -> list[tuple[int, Floats | None]]:
         if is_lost or bodies is None or not isinstance(places, list | tuple):
             found.append((track, None))
             continue
-        body = bodies.inside(str(index))
-        parts = [_flat(body or bodies, key, count) for key, count in _SIZES.items()]
+        body = bodies.inside(str(index)) or bodies
+        parts = [_as_numbers(body, key, body.array(key), n) for key, n in _SIZES.items()]
         place = _as_numbers(frame, "camera", places[index], 3)
         found.append((track, np.concatenate([*parts, place])))
     return found
-
-
-def _flat(body: Archive, key: str, count: int) -> NDArray[Any]:
-    return _as_numbers(body, key, body.array(key), count)
 
 
 def _as_numbers(archive: Archive, key: str, value: Value, count: int) -> NDArray[Any]:
