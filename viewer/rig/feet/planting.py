@@ -439,7 +439,7 @@ def _rotated(clip: SampledClip, body: BodyLegs, old: Floats, new: Floats) -> Sam
 
 # The length s of the smooth curve of a correction, seconds. Outside contacts the target is 0 with
 # weight 1, so the curve obeys s^4 c'''' = -c. Its solution that begins at rest and fades is
-# exp(-a) (cos a + sin a) with a = t / (sqrt(2) s): 70 % after s, 28 % after 2 s, 3 % after 3 s.
+# exp(-a) (cos a + sin a) with a = t / (sqrt(2) s): 70 % after s, 28 % after 2 s, 4 % after 3 s.
 _EASE = 0.15
 _JUMP = 0.03  # seconds below which a jump of the recording is sudden
 _JUMPS = (0.002, 0.004)  # its sizes, relative to the body, between which it becomes a jump

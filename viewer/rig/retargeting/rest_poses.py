@@ -86,9 +86,9 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     """Return the rotations from the target's rest pose to the source's at every matched joint.
 
     In limbs, the bone is rotated to the source's direction by the smallest rotation from the body's
-    orientation, in fingers from the hand's, and therefore without twist. For hands with fingers, the knuckle
-    line is also aligned. Trunk and feet only follow the body, unless their directions differ by
-    more than 25 degrees. The last joint of a limb follows the joint before it.
+    orientation, in fingers from the hand's, and therefore without twist. For hands with fingers,
+    the knuckle line is also aligned. Trunk and feet only follow the body, unless their directions
+    differ by more than 25 degrees. The last joint of a limb follows the joint before it.
 
     ``parents``: (J,), parents of the target's joints. Returns (J, 3, 3), rotations in the common
     axes; the identity for unmatched joints.
