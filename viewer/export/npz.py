@@ -97,7 +97,7 @@ def _export_frames(
 ) -> list[Diagnostic]:
     """Write float64 arrays of all frames; see ``viewer.export.export``."""
     figure = animation.figure
-    _check(animation.name, animation.frames.present, figure.unit, options)
+    _check(figure.unit, options)
     up = options.up or options.world_up
     if options.gaps == "split":
         raise RigError('gaps of arrays: expected hold or interpolate, found "split"')
@@ -179,7 +179,7 @@ def _export_points(
     written to the file. Raises ``RigError`` if another unit or up axis is requested, or no frame is
     present. Raises ``OutputError`` if the file cannot be written.
     """
-    _check(animation.name, animation.present, "", options)
+    _check("", options)
     up, points = options.up or options.world_up, animation.points
     if up != options.world_up:
         points = points @ np.round(rotation_vector_to_matrix(_turn(up))).T
@@ -210,8 +210,8 @@ def _turn(up: str) -> Floats:
     return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
 
 
-def _check(name: str, present: Bools, unit: str, options: ExportOptions) -> None:
-    """Raise RigError if another unit or an unknown axis is requested, or no frame is present."""
+def _check(unit: str, options: ExportOptions) -> None:
+    """Raise RigError if another unit, or an unknown axis or order, is requested."""
     if options.unit not in ("", unit):
         raise RigError(
             f'unit of arrays: expected {unit or "none"}, as in the scene, found "{options.unit}"'

@@ -116,7 +116,15 @@ def _fill(
     above = {bone: _parent(bone, bones) for bone in bones}
     order = sorted(bones, key=lambda bone: _depth(bone, above))
     places, rotations = _rest(figure, bones)
-    nodes = _add_nodes(document, order, above, places)
+    nodes: dict[str, int] = {}
+    for bone in order:
+        start = places[above[bone]] if above[bone] else np.zeros(3)
+        item = {"name": bone, "translation": (places[bone] - start).tolist()}
+        nodes[bone] = document.add("nodes", item)
+        if above[bone]:
+            parent = document.root["nodes"][nodes[above[bone]]]
+            parent.setdefault("children", []).append(nodes[bone])
+    document.root["scene"] = document.add("scenes", {"nodes": [nodes["hips"]]})
     turns, hips = _moved(figure, frames, world_up, bones, rotations)
     keys = _Keys(document, np.arange(frames.n_frames) / animation.frame_rate)
     for bone in order:
@@ -162,21 +170,6 @@ def _rest(figure: Figure, bones: dict[str, int]) -> tuple[dict[str, Floats], dic
     world = world_matrices(still.require_skeleton(), figure_pose(still))
     places = {bone: world[joint, :3, 3] for bone, joint in bones.items()}
     return places, {bone: unit_rotation(world[joint]) for bone, joint in bones.items()}
-
-
-def _add_nodes(
-    document: Document, order: list[str], above: dict[str, str], places: dict[str, Floats]
-) -> dict[str, int]:
-    nodes: dict[str, int] = {}
-    for bone in order:
-        start = places[above[bone]] if above[bone] else np.zeros(3)
-        item = {"name": bone, "translation": (places[bone] - start).tolist()}
-        nodes[bone] = document.add("nodes", item)
-        if above[bone]:
-            parent = document.root["nodes"][nodes[above[bone]]]
-            parent.setdefault("children", []).append(nodes[bone])
-    document.root["scene"] = document.add("scenes", {"nodes": [nodes["hips"]]})
-    return nodes
 
 
 def _moved(

@@ -132,10 +132,6 @@ def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
     return own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]
 
 
-# Search for the times at which two motions of one figure differ most, given as curves.
-#
-# Curves are smooth between their keys, so the difference is sampled there, and the highest
-# samples are refined.
 @dataclass(frozen=True, slots=True, eq=False)
 class _WorstTimes:
     """Candidate times of the largest distance."""
@@ -178,6 +174,9 @@ def _worst_times(
     figure: Figure, one: _Sampler, other: _Sampler, edges: Floats, rate: float, how: Skinning
 ) -> _WorstTimes:
     """Return candidate times of the largest distance between two motions.
+
+    Curves are smooth between their keys, so the distance is sampled there, and the highest samples
+    are refined.
 
     ``figure``: figure without its shape applied.
     ``one``, ``other``: functions from seconds (T,) to poses of the figure, none of them missing.

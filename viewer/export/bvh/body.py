@@ -146,7 +146,16 @@ def _positions(
     """Return the positions of joints relative to their parents, from those in the world."""
     parents = figure.require_skeleton().parents
     inner = (parents >= 0)[:, None]
-    places = _places(figure, frames, weights, scale) @ space.world.T * space.factor
+    # Bones have a fixed shape and scale; only the roots follow those of each frame.
+    fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
+    places = world_frames(figure, fixed)[..., :3, 3]
+    if len(frames.shape_weights) > 1 or (frames.figure_scales != scale).any():
+        roots = _roots(parents)
+        rest = rest_translations_of(figure, frames.shape_weights)
+        own = rest[:, roots] + frames.translations[:, roots]
+        own = own * frames.figure_scales[:, None, None] + frames.figure_translations[:, None]
+        places = places + own - places[:, roots]
+    places = places @ space.world.T * space.factor
     world = joint_worlds(parents, rotations, np.zeros(3))[..., :3, :3]
     from_parent = places - np.where(inner, places[:, parents], 0.0)
     within = np.einsum("njba,njb->nja", world[:, parents], from_parent)
@@ -166,22 +175,6 @@ def shape_at(frames: Frames, frame: int) -> Floats:
     """Return the shape weights of one frame: (1, S)."""
     weights = frames.shape_weights
     return weights if len(weights) == 1 else weights[frame : frame + 1]
-
-
-def _places(figure: Figure, frames: Frames, weights: Floats, scale: float) -> Floats:
-    """Return joint positions in the world, for bones of fixed shape and scale: (F, J, 3)."""
-    skeleton = figure.require_skeleton()
-    fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
-    places = world_frames(figure, fixed)[..., :3, 3]
-    is_shaped = len(frames.shape_weights) > 1
-    if not is_shaped and (frames.figure_scales == scale).all():
-        return places
-    roots = _roots(skeleton.parents)
-    own = (
-        rest_translations_of(figure, frames.shape_weights)[:, roots] + frames.translations[:, roots]
-    )
-    own = own * frames.figure_scales[:, None, None] + frames.figure_translations[:, None]
-    return places + own - places[:, roots]
 
 
 def _roots(parents: Ints) -> Ints:

@@ -226,8 +226,23 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
     lenses = _add_cameras(document, scene.views, to_file, [*zip(actors, built, strict=True)])
     (data,) = _files([(path, document)])
     seconds = max(start_of(each) + seconds_of(each.animation) for each in parts) - begin
-    notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
-    notes += _beside(data, path, document)
+    cameras = [Phrase("{n}", n=counted(len(scene.views), "camera"))] if scene.views else []
+    values = {
+        "n_figures": counted(len(actors), "figure"),
+        "figures": listed([actor.name for actor in actors]),
+        "seconds": rounded(seconds, 4),
+        "others": optional("; {}", cameras),
+        "size": file_size(len(data[path])),
+    }
+    notes = [
+        Diagnostic(
+            "X001.gltf-motions: {n_figures}: {figures}; one animation of {seconds} s{others}, "
+            "{size}",
+            path,
+            values=values,
+        ),
+        *_beside(data, path, document),
+    ]
     file = GltfFile(path, [*data.values()], placing)
     for part, sampled, made in zip(parts, found, built, strict=False):
         own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
@@ -240,26 +255,6 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
     for actor, each in zip(others, added, strict=True):
         notes += [_of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]
     return notes + lenses
-
-
-def _motions_written(
-    path: Path, actors: Sequence[Actor], seconds: float, n_views: int, size: int
-) -> Diagnostic:
-    """Return the note about a file of several moving figures."""
-    values = {
-        "n_figures": counted(len(actors), "figure"),
-        "figures": listed([actor.name for actor in actors]),
-        "seconds": rounded(seconds, 4),
-        "others": optional(
-            "; {}", [Phrase("{n}", n=counted(n_views, "camera"))] if n_views else []
-        ),
-        "size": file_size(size),
-    }
-    return Diagnostic(
-        "X001.gltf-motions: {n_figures}: {figures}; one animation of {seconds} s{others}, {size}",
-        path,
-        values=values,
-    )
 
 
 def _figure_notes(

@@ -183,13 +183,6 @@ def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Place
     return own  # glTF ignores the transform of a skinned mesh's own node
 
 
-# Application data and copyright of a figure's original glTF file.
-#
-# The root of a file has one ``extras``. If figures have different ones, all are kept, each with
-# the names of its figures::
-#
-#     "extras": {"sources": [{"figures": ["hero"], "extras": ...},
-#                            {"figures": ["wolf", "cub"], "extras": ...}]}
 def _add_record(document: Document, record: FileRecord, joints: list[int], name: str) -> None:
     """Add the application data and copyright of a figure's file and of its joints.
 

@@ -33,7 +33,6 @@ from viewer.export.gltf.reading import GltfFile, Keys
 from viewer.export.gltf.skin import shape_of
 from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_of, still_frames, still_pose
 from viewer.rig.motion.transform_clip import (
@@ -200,7 +199,7 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
     lost = sorted({shape for each in keyed for shape in each} - drawn)
     if lost and shapes is not None:
         values = {
-            "names": listed(_names(shapes, lost)),
+            "names": listed([shapes.names[row] or f"#{row}" for row in lost]),
             "n": counted(len(lost), "blend shape"),
             "change": agree(len(lost), "changes", "change"),
         }
@@ -211,10 +210,6 @@ def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagno
             )
         )
     return notes
-
-
-def _names(shapes: BlendShapes, rows: list[int]) -> list[str]:
-    return [shapes.names[row] or f"#{row}" for row in rows]
 
 
 def _shown_weights(figure: Figure, weights: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -73,21 +73,19 @@ class Clips:
                 joined = _joined_weights(moved, rows, weights)
                 if joined is not None:
                     keys.add(placed.node, joined)
-            if keys.channels:
-                added[self._put(clip, keys, added)] = clip
+            if not keys.channels:
+                continue
+            # Share the animation of another figure that played the same clip, or begin a new one.
+            name = (clip.name, clip.number, clip.start, clip.end, first_time(clip))
+            known = self._known.setdefault(name, [])
+            common = next((index for index in known if index not in added), -1)
+            item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
+            item |= {} if clip.extras is None else {"extras": clip.extras}
+            index = _put_animation(self._document, item, keys.samplers, keys.channels, common)
+            if common < 0:
+                known.append(index)
+            added[index] = clip
         return added
-
-    def _put(self, clip: TransformClip, keys: _Keys, taken: Collection[int]) -> int:
-        """Add keys to the animation shared with another figure, or to a new one."""
-        name = (clip.name, clip.number, clip.start, clip.end, first_time(clip))
-        known = self._known.setdefault(name, [])
-        common = next((index for index in known if index not in taken), -1)
-        item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
-        item |= {} if clip.extras is None else {"extras": clip.extras}
-        index = _put_animation(self._document, item, keys.samplers, keys.channels, common)
-        if common < 0:
-            known.append(index)
-        return index
 
 
 def first_time(clip: TransformClip) -> float:

@@ -12,7 +12,7 @@ from viewer.export.gltf.document import Document, text_of
 from viewer.media.png import encode_png
 from viewer.phrases import brief
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.material import MINIFICATIONS, Material, Texture
+from viewer.rig.material import MINIFICATIONS, Texture
 from viewer.rig.mesh import Mesh
 
 Color = tuple[float, float, float]
@@ -87,10 +87,6 @@ class Materials:
             packed = _packed(shown.get("metallic_texture"), shown.get("roughness_texture"))
             surface["metallicRoughnessTexture"] = self._reference(packed, name)
         title = material.name if self._is_own else name
-        return self._add(title, surface, self._rest(material, shown, name))
-
-    def _rest(self, material: Material, shown: dict[str, Texture], name: str) -> dict[str, Any]:
-        """Return the remaining properties: normals, occlusion, emission, opacity and culling."""
         rest: dict[str, Any] = {"doubleSided": material.double_sided}
         rest |= {} if material.extras is None else {"extras": material.extras}
         extensions: dict[str, Any] = {}
@@ -116,7 +112,7 @@ class Materials:
         if extensions:
             rest["extensions"] = extensions
             self._declare(*extensions)
-        return rest
+        return self._add(title, surface, rest)
 
     def _add(self, name: str, surface: dict[str, Any], rest: dict[str, Any] | None = None) -> int:
         # Triangles may be wound either way unless the file states that they are single-sided.

@@ -13,7 +13,6 @@ from viewer.export.gltf.document import INDICES, VERTICES, Document, text_of
 from viewer.export.gltf.materials import Materials
 from viewer.export.gltf.skin import Influences, Shape, influence_sets
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import moved_tangents, unit
@@ -49,7 +48,18 @@ def add_mesh(
     """
     mesh, surface = shape.figure.require_mesh(), _surface(part, shape)
     document = encoding.document
-    attributes = _attributes(encoding, mesh, part, surface)
+    attributes = {
+        "POSITION": encoding.positions(surface.positions, part.joint < 0),
+        "NORMAL": encoding.normals(surface.normals),
+    }
+    if mesh.uvs is not None and len(mesh.uvs):
+        # In glTF, the first image row is at v = 0; in this program, at v = 1.
+        for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
+            flipped = uvs[part.uv_indices] * [1.0, -1.0] + [0.0, 1.0]
+            attributes[f"TEXCOORD_{number}"] = encoding.uvs(flipped)
+    if mesh.colors is not None:
+        colors = np.clip(mesh.colors[part.sources], 0.0, 1.0)
+        attributes["COLOR_0"] = encoding.colors(colors)
     own = None if tangents is None else moved_tangents(tangents[part.sources], surface.linear)
     if own is not None and own[:, 3].all() and own[:, :3].any(axis=1).all():
         attributes["TANGENT"] = document.array(own, "VEC4", VERTICES)
@@ -63,8 +73,18 @@ def add_mesh(
     extras = None if record is None else record.mesh_extras.get(part.index)
     shapes = shape.figure.blend_shapes
     if shapes is not None and len(part.targets):
-        rows = shape.targets[part.targets]
-        shared["targets"] = _targets(encoding, part, surface, shapes, rows)
+        # Normals are written with length 1, and their offsets at the same scale.
+        lengths = surface.lengths
+        scales = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+        directions = shapes.direction_values()
+        shared["targets"] = targets = []
+        for row in shape.targets[part.targets]:
+            offsets = directions[row][part.sources] @ surface.linear.T
+            target = {"POSITION": encoding.offsets(offsets, part.joint < 0)}
+            if shapes.normal_offsets is not None:
+                normals = shapes.normal_values()[row][part.sources] @ np.linalg.inv(surface.linear)
+                target["NORMAL"] = encoding.normal_offsets(normals * scales)
+            targets.append(target)
         item["weights"] = shape.weights[0, part.targets].tolist()
         if any(part.target_names):
             kept = extras if isinstance(extras, dict) else {}
@@ -103,22 +123,6 @@ def _surface(part: Part, shape: Shape) -> _Surface:
     return _Surface(apply_transform(matrix, positions), turned / stretch, lengths * stretch, linear)
 
 
-def _attributes(encoding: Encoding, mesh: Mesh, part: Part, surface: _Surface) -> dict[str, int]:
-    attributes = {
-        "POSITION": encoding.positions(surface.positions, part.joint < 0),
-        "NORMAL": encoding.normals(surface.normals),
-    }
-    if mesh.uvs is not None and len(mesh.uvs):
-        # In glTF, the first image row is at v = 0; in this program, at v = 1.
-        for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
-            flipped = uvs[part.uv_indices] * [1.0, -1.0] + [0.0, 1.0]
-            attributes[f"TEXCOORD_{number}"] = encoding.uvs(flipped)
-    if mesh.colors is not None:
-        colors = np.clip(mesh.colors[part.sources], 0.0, 1.0)
-        attributes["COLOR_0"] = encoding.colors(colors)
-    return attributes
-
-
 def _normals(mesh: Mesh) -> Floats:
     """Return unit normals; those that cannot be normalised are computed from the triangles."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -127,28 +131,6 @@ def _normals(mesh: Mesh) -> Floats:
     if odd.any():
         normals[odd] = vertex_normals(mesh.positions, mesh.triangles)[odd]
     return normals
-
-
-def _targets(
-    encoding: Encoding,
-    part: Part,
-    surface: _Surface,
-    shapes: BlendShapes,
-    rows: NDArray[np.intp],
-) -> list[dict[str, int]]:
-    # Normals are written with length 1, and their offsets at the same scale.
-    scales = np.divide(
-        1.0, surface.lengths, out=np.zeros_like(surface.lengths), where=surface.lengths > 0.0
-    )
-    targets, directions = [], shapes.direction_values()
-    for row in rows:
-        offsets = directions[row][part.sources] @ surface.linear.T
-        target = {"POSITION": encoding.offsets(offsets, part.joint < 0)}
-        if shapes.normal_offsets is not None:
-            normals = shapes.normal_values()[row][part.sources] @ np.linalg.inv(surface.linear)
-            target["NORMAL"] = encoding.normal_offsets(normals * scales)
-        targets.append(target)
-    return targets
 
 
 def _primitives(
@@ -304,14 +286,10 @@ def _part_targets(
         target
         for target in every.tolist()
         if shapes.is_expression(int(shape.targets[target]))
-        and _moves(shapes.direction_values()[shape.targets[target]], sources)
+        and shapes.direction_values()[shape.targets[target]][sources].any()
     ]
     labels = (given.get(int(shape.targets[target])) or names[target] for target in targets)
     return np.array(targets, dtype=np.intp), tuple(labels)
-
-
-def _moves(offsets: Floats, sources: Ints) -> bool:
-    return bool(offsets[sources].any())
 
 
 @dataclass(slots=True, eq=False)

@@ -223,29 +223,22 @@ def _one_body(
     if not np.array_equal(space, np.eye(4)):
         positions = apply_transform(space, positions)
         directions = directions @ space[:3, :3].T
-    slot = joint if joint >= 0 else len(bound) - 1
-    return _OneBody(positions, _skin(file, attributes, slot, bound, sets), directions, weights)
-
-
-def _skin(
-    file: GltfFile, attributes: dict[str, int], slot: int, bound: Floats, sets: int | None
-) -> Skin:
-    """Return the influences of a mesh; if it has none, all vertices follow one slot."""
-    count = file.root["accessors"][attributes["POSITION"]]["count"]
+    count = len(positions)
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]
-    if not numbers:
-        last = np.full(count, slot)
-        return skin_from_entries(count, np.arange(count), last, np.ones(count), bound)
-    joints = np.concatenate([file.integers(attributes[f"JOINTS_{n}"]) for n in numbers], axis=1)
-    weights = np.concatenate([file.floats(attributes[f"WEIGHTS_{n}"]) for n in numbers], axis=1)
-    if sets is not None:
-        weights = weights / weights.sum(axis=1, keepdims=True)
-    used = weights != 0.0
-    rows, _ = np.nonzero(used)
-    return skin_from_entries(
-        count, rows.astype(np.int32), joints[used].astype(np.int32), weights[used], bound
-    )
+    if numbers:
+        slots = np.concatenate([file.integers(attributes[f"JOINTS_{n}"]) for n in numbers], axis=1)
+        values = np.concatenate([file.floats(attributes[f"WEIGHTS_{n}"]) for n in numbers], axis=1)
+        if sets is not None:
+            values = values / values.sum(axis=1, keepdims=True)
+        used = values != 0.0
+        rows, followed, values = np.nonzero(used)[0], slots[used], values[used]
+    else:
+        # All vertices follow the node of the mesh.
+        rows, values = np.arange(count), np.ones(count)
+        followed = np.full(count, joint if joint >= 0 else len(bound) - 1)
+    skin = skin_from_entries(count, rows.astype(np.int32), followed.astype(np.int32), values, bound)
+    return _OneBody(positions, skin, directions, weights)
 
 
 def _joined(skins: list[Skin], bound: Floats) -> Skin:

@@ -68,7 +68,7 @@ def sampled_of(
 
     Raises RigError if no frame is present or an option is unknown.
     """
-    _check(animation, options)
+    _check(options)
     frames = filled(animation.frames, options.closing == "interpolate")
     reference = int(animation.frames.present.argmax())
     shape = shape_of(animation.figure, frames.shape_weights, reference)
@@ -76,7 +76,7 @@ def sampled_of(
     return Sampled(animation, frames, body, options.world_up, color)
 
 
-def _check(animation: SampledAnimation, options: ExportOptions) -> None:
+def _check(options: ExportOptions) -> None:
     for what, value, known in (
         ("unit", options.unit, ("", "m")),
         ("up axis", options.up, ("", "y")),

@@ -257,7 +257,8 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
         if _TOON in given:
             item[_TOON] = kept_toon(given[_TOON], maps)
             _declare(document, _TOON)
-            if any(_TRANSFORM in part(each, "extensions") for each in _textures(item[_TOON])):
+            extensions = (part(each, "extensions") for each in item[_TOON].values())
+            if any(isinstance(each, dict) and _TRANSFORM in each for each in extensions):
                 _declare(document, _TRANSFORM)
         if _UNLIT in given:
             item[_UNLIT] = given[_UNLIT]
@@ -269,11 +270,6 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
     used = document.root.get("extensionsUsed", [])
     if _UNLIT in used and not is_used:
         used.remove(_UNLIT)
-
-
-def _textures(toon: Mapping[str, Any]) -> list[Any]:
-    """Return the textures of toon shading that have extensions."""
-    return [each for each in toon.values() if isinstance(part(each, "extensions"), dict)]
 
 
 def _add_made(

@@ -156,12 +156,11 @@ def kept_toon(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
     return result
 
 
-# Extension of a VRM 0.x file, with the indices of the file that is written.
-#
-# Version 0.x binds expressions to meshes, which become one mesh per node here: such binds are
-# repeated. Its materials are parallel to those of the file.
 def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
-    """Return the root extension ``VRM`` of a character.
+    """Return the root extension ``VRM`` of a character, with the indices of the written file.
+
+    Version 0.x binds expressions to meshes, which become one mesh per node here: such binds are
+    repeated. Its materials are parallel to those of the file.
 
     ``names``: names of the written materials.
     """

@@ -217,16 +217,11 @@ def _thumbnail(texture: Any, record: VrmRecord) -> int | None:
     return source if isinstance(source, int) else None
 
 
-# Expressions of VRM 0.x as those of VRM 1.0.
-#
-# ::
-#
-#     blendShapeGroups  name, presetName, isBinary, binds (mesh, index, weight in percent),
-#                       materialValues, see ``viewer.formats._vrm.materials``
 def _upgraded_expressions(told: Any, record: VrmRecord, lost: list[str]) -> dict[str, Any]:
     """Return the preset and custom expressions; a further one of a preset becomes a custom one.
 
-    ``told``: the extension ``VRM``.
+    ``told``: the extension ``VRM``, whose ``blendShapeGroups`` have name, presetName, isBinary,
+    binds (mesh, index, weight in percent), and materialValues.
     ``lost``: extended by the material values without a counterpart.
     """
     found: dict[str, dict[str, Any]] = {"preset": {}, "custom": {}}
@@ -284,17 +279,14 @@ def _material_binds(told: dict[str, Any], materials: list[Any], lost: list[str])
     return {name: rows for name, rows in named.items() if rows}
 
 
-# Spring bones of VRM 0.x as those of VRM 1.0.
-#
-# In version 0.x all joints below a bone swing, each towards its first child, and the last one
-# towards a point 7 cm further. In version 1.0 a chain is a list of joints; the last one only ends
-# it.
 def _with_ends(
     figure: Figure, record: VrmRecord, springs: Springs | None
 ) -> tuple[Figure, VrmRecord]:
     """Return a figure with an end joint below the last joint of each chain, and its record.
 
-    In the record, the nodes of end joints are additional to those of the file.
+    In version 0.x all joints below a bone swing, each towards its first child, and the last one
+    towards a point 7 cm further. In version 1.0 a chain is a list of joints; the last one only ends
+    it. In the record, the nodes of end joints are additional to those of the file.
 
     ``springs``: those of the figure as read, which include the swinging points.
     """
