@@ -150,7 +150,7 @@ def draw_image_planes(
     for camera in drawn_cameras(scene, view.camera.fixed, options):
         image = _image(scene, camera)
         if image is not None:
-            late.camera_image_pass.draw_plane(camera, image, view, frustum_depth(box), 1.0)
+            late.camera_image_pass.draw_plane(camera, image, view, frustum_depth(box))
 
 
 def _image(scene: Scene, camera: CameraView) -> CameraImage | None:

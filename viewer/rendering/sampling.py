@@ -14,7 +14,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.view import View
+from viewer.rendering.view import View, light_axes
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Scene
 
@@ -87,10 +87,7 @@ def jittered(view: View, shift: tuple[float, float], size: tuple[int, int]) -> V
 
 def tilted(direction: Floats, light: tuple[float, float]) -> Floats:
     """Return the unit vector towards a point of a light's disc: (3,)."""
-    aside = np.eye(3)[np.argmin(np.abs(direction))]
-    right = np.cross(aside, direction)
-    right /= np.linalg.norm(right)
-    above = np.cross(direction, right)
+    right, above = light_axes(direction)
     found = direction + _LIGHT_RADIUS * (light[0] * right + light[1] * above)
     return np.asarray(found / np.linalg.norm(found))
 

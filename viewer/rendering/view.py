@@ -155,6 +155,14 @@ def normal_matrix(linear: Floats) -> Floats:
     return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
 
 
+def light_axes(direction: Floats) -> tuple[Floats, Floats]:
+    """Return two unit vectors at right angles to a light's direction and to each other: (3,)."""
+    aside = np.eye(3)[np.argmin(np.abs(direction))]
+    right = np.cross(aside, direction)
+    right /= np.linalg.norm(right)
+    return right, np.cross(direction, right)
+
+
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
     """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program uses."""
     pair = (lights.key, lights.rim)

@@ -14,6 +14,7 @@ from viewer.errors import RenderError
 from viewer.rendering.gpu import upload
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import Skinning
 
 OPTIONS = (
     plain(show="both"),
@@ -99,10 +100,11 @@ def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch) 
 
         monkeypatch.setattr(upload, "check_errors", second_fails)
         moved = replace(figure, mesh=replace(mesh, positions=mesh.positions + 0.1))
+        shape = replace(opened.actors[0].require_pose(), shape_weights=np.ones(1))
         with pytest.raises(RenderError, match=r"^a shaped mesh of 0\.\d MB: not enough"):
-            rest._write(moved, None, normals=True)
+            rest.update(moved, shape, Skinning())
         assert gl_objects() == before
-        rest._write(moved, None, normals=True)
+        rest.update(moved, shape, Skinning())
         found = np.frombuffer(rest.positions.read(), "f4").reshape(-1, 3)
         expected = (mesh.positions + 0.1 - buffers.center)[buffers.sources]
         np.testing.assert_allclose(found, expected, atol=1e-6)

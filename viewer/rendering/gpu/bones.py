@@ -60,7 +60,7 @@ class BoneBuffers:
     """
 
     def __init__(
-        self, context: moderngl.Context, skeleton: Skeleton, style: str, size: float = 1.0
+        self, context: moderngl.Context, skeleton: Skeleton, style: str, size: float
     ) -> None:
         links = _bone_links(skeleton, size)
         self._owner = Owner()
@@ -205,7 +205,7 @@ class _BoneLinks:
     """Size from which widths are derived, figure units."""
 
 
-def _bone_links(skeleton: Skeleton, size: float = 1.0) -> _BoneLinks:
+def _bone_links(skeleton: Skeleton, size: float) -> _BoneLinks:
     """Return the links of a skeleton.
 
     A joint with several children has a bone to each. A joint without children has a short end in

@@ -80,33 +80,29 @@ class RestBuffers:
         shape = b"" if figure is self.mesh.figure else pose.shape_weights.tobytes()
         key = (shape, weights.tobytes() if active and self.way == "product" else b"")
         if key != self._key:
-            self._write(figure, weights if key[1] else None, normals=key[0] != self._key[0])
+            mesh, is_reshaped = figure.require_mesh(), key[0] != self._key[0]
+            if self._own is None:
+                size = self.mesh.positions.size
+                positions = reserved(self.context, size, "a shaped mesh")
+                try:
+                    self._own = positions, reserved(self.context, size, "a shaped mesh")
+                except RenderError:
+                    positions.release()
+                    raise
+                self.positions, self.normals = self._own
+                is_reshaped = True
+            rest = float32(mesh.positions - self.mesh.center)
+            if key[1]:
+                rest += self.mesh.summed(weights[None])[0].reshape(-1, 3)
+            self.positions.write(rest[self.mesh.sources])
+            if is_reshaped:
+                self.normals.write(float32(mesh.normals[self.mesh.sources]))
             self._key = key
 
     def _weights(self, figure: Figure, pose: Pose) -> Floats:
         if figure.correctives is None or figure.skeleton is None:
             return np.zeros(0)
         return pose_weights(figure.correctives, figure.skeleton, pose)
-
-    def _write(self, figure: Figure, weights: Floats | None, normals: bool) -> None:
-        """Upload positions, and normals if the shape changed, of every split vertex."""
-        shape = figure.require_mesh()
-        if self._own is None:
-            size = self.mesh.positions.size
-            positions = reserved(self.context, size, "a shaped mesh")
-            try:
-                self._own = positions, reserved(self.context, size, "a shaped mesh")
-            except RenderError:
-                positions.release()
-                raise
-            self.positions, self.normals = self._own
-            normals = True
-        rest = float32(shape.positions - self.mesh.center)
-        if weights is not None:
-            rest += self.mesh.summed(weights[None])[0].reshape(-1, 3)
-        self.positions.write(rest[self.mesh.sources])
-        if normals:
-            self.normals.write(float32(shape.normals[self.mesh.sources]))
 
     def attributes(
         self, program: moderngl.Program, skin: SkinBuffers, attached: bool = True

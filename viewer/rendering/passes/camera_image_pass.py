@@ -42,14 +42,12 @@ class CameraImagePass:
         with without_depth_test(self.context):
             self._draw(camera, image, (corner, *steps), brightness)
 
-    def draw_plane(
-        self, camera: CameraView, image: CameraImage, view: View, depth: float, brightness: float
-    ) -> None:
+    def draw_plane(self, camera: CameraView, image: CameraImage, view: View, depth: float) -> None:
         """Draw an image at a distance in front of its camera, in scene units."""
         corners = frustum_corners(camera, depth)
         places = np.hstack([corners, np.ones((4, 1))]) @ (view.projection @ view.matrix).T
         rectangle = places[0], places[1] - places[0], places[3] - places[0]
-        self._draw(camera, image, rectangle, brightness)
+        self._draw(camera, image, rectangle, 1.0)
 
     def _draw(
         self,

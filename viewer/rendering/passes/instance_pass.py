@@ -320,17 +320,7 @@ class InstanceBuffers:
         key = (id(listed), id(skin), id(self._rest.positions))
 
         def content() -> list[Any]:
-            found: list[Any] = self._rest.attributes(program, skin)
-            found += [
-                (buffer, layout, name)
-                for buffer, layout, name in (
-                    (mesh.uvs, "2f4", "in_uv"),
-                    (mesh.other_uvs, "4f4", "in_other_uvs"),
-                    (mesh.tints, "4f4", "in_tint"),
-                    (mesh.colors, "3f4", "in_color"),
-                )
-                if name in program and buffer is not None
-            ]
+            found: list[Any] = self._rest.attributes(program, skin) + mesh.attributes(program)
             # Skip the bytes of attributes that the compiler removed, four per number.
             layout = " ".join(
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE

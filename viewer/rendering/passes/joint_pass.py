@@ -134,8 +134,8 @@ def joint_program(
     programs: Programs,
     skeleton: SkeletonBuffers,
     options: DisplayOptions,
-    chunk: str = "phong",
-    fragment: str = "mesh",
+    chunk: str,
+    fragment: str,
     effects: tuple[str, ...] = (),
 ) -> moderngl.Program:
     """Return the program for ``draw_joints`` that draws a skeleton in its style."""
@@ -171,11 +171,10 @@ def draw_boxes(
     placement: Floats,
     view: View,
     options: DisplayOptions,
-    color: Color | None = None,
     opacity: float = 1.0,
 ) -> None:
     """Draw boxes whose matrices have been uploaded."""
-    _set_up(program, boxes, placement, view, options, -1, opacity, color)
+    _set_up(program, boxes, placement, view, options, -1, opacity, None)
     set_uniforms(program, {"u_only": -1})
     _draw_instances(program, boxes)
 

@@ -225,15 +225,9 @@ class MeshPass:
             found: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
             if "in_normal" in program:
                 found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
-            for values, layout, name in (
-                (mesh.mesh.uvs, "2f4", "in_uv"),
-                (mesh.mesh.other_uvs, "4f4", "in_other_uvs"),
-                (mesh.mesh.tints, "4f4", "in_tint"),
-                (mesh.mesh.colors, "3f4", "in_color"),
-                (mesh.scalars.values, "f4", "in_scalar"),
-            ):
-                if name in program and values is not None:
-                    found.append((values, layout, name))
+            found += mesh.mesh.attributes(program)
+            if "in_scalar" in program and mesh.scalars.values is not None:
+                found.append((mesh.scalars.values, "f4", "in_scalar"))
             return found
 
         buffer = indices.indices

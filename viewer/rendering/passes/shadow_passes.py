@@ -19,7 +19,7 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rendering.view import FILTER_RADIUS, SHADOW_UNIT, Shadow, View, set_model
+from viewer.rendering.view import FILTER_RADIUS, SHADOW_UNIT, Shadow, View, light_axes, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.geometry.vectors import unit
@@ -271,10 +271,7 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
     ``spheres``: (N, 4), centres and radii, scene space. ``direction``: (3,), unit vector towards
     the light.
     """
-    aside = np.eye(3)[np.argmin(np.abs(direction))]
-    right = np.cross(aside, direction)
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(direction, right), direction])
+    axes = np.stack([*light_axes(direction), direction])
     centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
     low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
     half = 0.5 * max(high[0] - low[0], high[1] - low[1])
