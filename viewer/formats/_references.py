@@ -49,5 +49,13 @@ def refused_text(name: str) -> Phrase:
     )
 
 
+def is_file(path: Path) -> bool:
+    """Return whether a path is an existing file."""
+    try:
+        return path.is_file()
+    except OSError:  # the name is too long for a file
+        return False
+
+
 def _is_absolute(written: str) -> bool:
     return written.startswith("/") or _DRIVE.match(written) is not None

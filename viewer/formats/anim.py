@@ -89,7 +89,29 @@ class _Parser:
                 channels.append(self._channel(len(channels)))
             else:
                 raise self._fault("F002.anim-item: {where}: expected a channel, found {found}")
-        self._finish(count, stated, len(channels))
+        self.channel, found = None, len(channels)
+        if self.word is None:
+            self.source.warn(wording.CLOSING)
+        if count is None:
+            self._refuse(
+                "F002.anim-no-count: {where}: expected numchannels, found {found}{begins}",
+                found=found,
+            )
+        elif count != found:
+            self._refuse(
+                "F002.anim-channels: {where}: expected {expected} as declared by numchannels, "
+                "found {found}",
+                stated,
+                expected=counted(count, "channel"),
+                found=found,
+            )
+        self._advance()
+        if self.word is not None:
+            self.source.warn(
+                "F006.anim-after: ignored data after the animation, starting with {found}",
+                self.word.start(),
+                found=quoted(self.word.group()),
+            )
         self.source.remember("channels", self.starts.__getitem__)
         return Clip(self.source.path.stem, tuple(channels), *(span or self._key_span(channels)))
 
@@ -116,31 +138,6 @@ class _Parser:
             end=end,
         )
         return span
-
-    def _finish(self, count: int | None, stated: Word | None, found: int) -> None:
-        self.channel = None
-        if self.word is None:
-            self.source.warn(wording.CLOSING)
-        if count is None:
-            self._refuse(
-                "F002.anim-no-count: {where}: expected numchannels, found {found}{begins}",
-                found=found,
-            )
-        elif count != found:
-            self._refuse(
-                "F002.anim-channels: {where}: expected {expected} as declared by numchannels, "
-                "found {found}",
-                stated,
-                expected=counted(count, "channel"),
-                found=found,
-            )
-        self._advance()
-        if self.word is not None:
-            self.source.warn(
-                "F006.anim-after: ignored data after the animation, starting with {found}",
-                self.word.start(),
-                found=quoted(self.word.group()),
-            )
 
     def _channel(self, index: int) -> Channel:
         self.channel = index

@@ -61,13 +61,13 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     is_own = len(frame_time.partition(b".")[2]) >= _DECIMALS
     if _LONGEST <= seconds <= max(_RATES) and not is_own:
         return _mistaken_rate(source, frame_time, seconds)
-    return _nearest_rate(frame_time, seconds, 1.0 / seconds)
+    return _nearest_rate(frame_time, 1.0 / seconds)
 
 
 def _mistaken_rate(source: Source, frame_time: bytes, seconds: float) -> float:
     """Return the frame rate of a file whose frame time cannot be in seconds, and warn."""
-    is_standard = _nearest_rate(frame_time, seconds, seconds) in _RATES
-    in_milliseconds = _nearest_rate(frame_time, seconds, 1000.0 / seconds)
+    is_standard = _nearest_rate(frame_time, seconds) in _RATES
+    in_milliseconds = _nearest_rate(frame_time, 1000.0 / seconds)
     if is_standard or seconds.is_integer() or in_milliseconds not in _RATES:
         source.warn(
             "C017.bvh-rate: Frame Time: expected seconds, found {found}, which looks like a "
@@ -87,7 +87,7 @@ def _mistaken_rate(source: Source, frame_time: bytes, seconds: float) -> float:
     return in_milliseconds
 
 
-def _nearest_rate(frame_time: bytes, seconds: float, exact: float) -> float:
+def _nearest_rate(frame_time: bytes, exact: float) -> float:
     """Return the standard rate from which an exact rate differs only by rounding, or the latter."""
     digits = frame_time.lower().partition(b"e")[0].rstrip(b"f").replace(b".", b"").lstrip(b"+0")
     if len(digits) < 2:

@@ -146,7 +146,17 @@ def _rows(
     if held is not None:
         return held
     if bad >= 0:
-        _refuse_word(source, start, bad, width, declared)
+        offset = source.word_offset(start, bad)
+        match = source.next_word(offset)
+        word = b"" if match is None else match.group()
+        if declared is None or bad < declared * width:
+            frame = Phrase("frame {frame}", frame=bad // width)
+            raise source.fault(number_key(word), offset, item=frame, found=quoted(word))
+        source.warn(
+            "F006.bvh-after: ignored data after the last frame, starting with {found}",
+            offset,
+            found=quoted(word),
+        )
     if rest or (declared is not None and whole != declared):
         _check_lines(source, start, width, declared)
         _warn_of_difference(source, width, declared, whole, rest)
@@ -236,22 +246,6 @@ def _refuse_sizes(source: Source, offsets: _Places, sizes: _Places, width: int) 
             expected=counted(width, "number"),
             found=int(sizes[first]),
         )
-
-
-def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int | None) -> None:
-    """Refuse a word that is not a number, unless it follows the last frame."""
-    offset = source.word_offset(start, bad)
-    match = source.next_word(offset)
-    word = b"" if match is None else match.group()
-    if declared is not None and bad >= declared * width:
-        source.warn(
-            "F006.bvh-after: ignored data after the last frame, starting with {found}",
-            offset,
-            found=quoted(word),
-        )
-        return
-    frame = Phrase("frame {frame}", frame=bad // width)
-    raise source.fault(number_key(word), offset, item=frame, found=quoted(word))
 
 
 def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:

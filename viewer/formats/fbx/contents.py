@@ -94,7 +94,7 @@ def node_file(source: Source) -> NodeFile:
     first_mesh: dict[tuple[int, tuple[int, ...], bytes], int] = {}
     for at, mesh in enumerate(told["meshes"]):
         prefix = f"mesh{at}"
-        _say_reduced(source, arrays, prefix, mesh)
+        _say_reduced(source, mesh)
         skin = skin_of(source, arrays, prefix, mesh)
         first_skin = len(skins)
         if skin is not None:
@@ -317,7 +317,7 @@ def _say_unused(source: Source, told: dict[str, Any]) -> None:
         )
 
 
-def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, Any]) -> None:
+def _say_reduced(source: Source, mesh: dict[str, Any]) -> None:
     """Report the properties of a mesh that have no equivalent."""
     if mesh["color_sets"] > 1:
         source.warn(

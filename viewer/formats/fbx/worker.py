@@ -416,6 +416,7 @@ class _Sampled:
         return {"keys": self.told, "cut": self.cut}
 
     def _add_nodes(self) -> None:
+        """Add the channels of nodes: their baked keys, and their transforms at further times."""
         kept = self.kept
         baked = kept.keep(
             kept.ufbx.bake_anim(
@@ -441,7 +442,15 @@ class _Sampled:
                 if path == "rotation":
                     turns = [value for name, value in values if name == "Lcl Rotation"]
                     extra = np.union1d(extra, self._turning(turns, table[:, 0], extra))
-                self._add({"node": int(moved.typed_id), "path": path}, table, node, extra)
+                extra = np.setdiff1d(extra, table[:, 0])
+                if len(extra):
+                    more = []
+                    for time in extra.tolist():
+                        transform = kept.ufbx.evaluate_transform(self.animation, node, time)
+                        more.append((time, *getattr(transform, path)))
+                    table = np.concatenate([table.reshape(-1, len(more[0])), np.array(more)])
+                    table = table[np.argsort(table[:, 0], kind="stable")]
+                self._put({"node": int(moved.typed_id), "path": path}, table)
 
     def _values(self, node: Any) -> list[tuple[str, Any]]:
         """Return the animated properties that move a node; helper nodes follow their parents."""
@@ -450,20 +459,6 @@ class _Sampled:
             above = self.kept.get(node, "parent")
             found += self.animated.get(int(above.element_id), []) if above is not None else []
         return found
-
-    def _add(
-        self, channel: dict[str, Any], table: NDArray[np.float64], node: Any, extra: _Times
-    ) -> None:
-        """Add a channel of a node: its baked keys, and its transform at further times."""
-        extra = np.setdiff1d(extra, table[:, 0])
-        if len(extra):
-            kept, path, rows = self.kept, channel["path"], []
-            for time in extra.tolist():
-                transform = kept.ufbx.evaluate_transform(self.animation, node, time)
-                rows.append((time, *getattr(transform, path)))
-            table = np.concatenate([table.reshape(-1, len(rows[0])), np.array(rows)])
-            table = table[np.argsort(table[:, 0], kind="stable")]
-        self._put(channel, table)
 
     def _put(self, channel: dict[str, Any], table: NDArray[np.float64]) -> None:
         """Add a channel; if its value never changes, only the first key."""

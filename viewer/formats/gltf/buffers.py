@@ -13,7 +13,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import read_bytes
-from viewer.formats._references import referenced_path, refused_text
+from viewer.formats._references import is_file, referenced_path, refused_text
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.meshopt import decoded_view, meshopt_of
 from viewer.phrases import counted, quoted
@@ -204,14 +204,7 @@ def _uri_path(element: Element) -> Path:
         )
     # Many exporters do not encode names, so a name may contain a literal %.
     literal = referenced_path(folder, uri) if "%" in uri else None
-    return literal if literal is not None and _is_file(literal) else path
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # the name is too long
-        return False
+    return literal if literal is not None and is_file(literal) else path
 
 
 def _data_uri_bytes(element: Element, most: int | None = None) -> bytes:

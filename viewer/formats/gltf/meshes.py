@@ -84,7 +84,7 @@ def _mesh(reading: _Reading, mesh: Element) -> NodeMesh:
     primitives = mesh.table("primitives")
     if not len(primitives):
         mesh.warn("G002.no-primitives: mesh without primitives")
-    count = _n_targets(mesh, primitives)
+    count = _n_targets(primitives)
     read = (_primitive(reading, primitives[place]) for place in range(len(primitives)))
     return NodeMesh(
         mesh.text("name"),
@@ -466,7 +466,7 @@ def _finite_weights(attributes: _Attributes, number: int, weights: Floats) -> Fl
     return weights
 
 
-def _n_targets(mesh: Element, primitives: Table) -> int:
+def _n_targets(primitives: Table) -> int:
     """Return the number of morph targets of a mesh, which all its primitives must have."""
     counts = [len(primitives[place].table("targets")) for place in range(len(primitives))]
     for place, found in enumerate(counts):

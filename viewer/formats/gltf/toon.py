@@ -23,7 +23,7 @@ from typing import Any
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._vrm.materials import modern_toon, overridden
-from viewer.formats._vrm.parts import part, rows_of, value_of
+from viewer.formats._vrm.parts import list_in, part, rows_of, value_of
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.textures import Slot, read_slot
@@ -165,7 +165,7 @@ def _outline(told: Mapping[str, Any]) -> Outline | None:
 def stored_toon(document: Document) -> dict[int, Any]:
     """Return the toon and unlit extensions of the materials, by index, as parsed from JSON."""
     found = {}
-    for index, material in enumerate(_listed(document, "materials")):
+    for index, material in enumerate(list_in(document.root.values, "materials")):
         extensions = material.get("extensions") if isinstance(material, dict) else None
         given = extensions if isinstance(extensions, dict) else {}
         found[index] = {name: given[name] for name in _KEPT if isinstance(given.get(name), dict)}
@@ -184,10 +184,5 @@ def stored_textures(document: Document) -> StoredTextures:
             return None
         return StoredImage(found.name, found.data)
 
-    textures, samplers = (_listed(document, name) for name in ("textures", "samplers"))
+    textures, samplers = (list_in(document.root.values, name) for name in ("textures", "samplers"))
     return StoredTextures(tuple(textures), tuple(samplers), image)
-
-
-def _listed(document: Document, name: str) -> list[Any]:
-    found = document.root.values.get(name)
-    return found if isinstance(found, list) else []

@@ -212,24 +212,19 @@ def rows_of(lines: Lines, keyword: str) -> Rows:
     # Neighbours lose the line ends between them, where comments end.
     is_plain = b"#" not in lines.data
     if is_plain and len(chosen) and chosen[-1] - chosen[0] == len(chosen) - 1:
-        return _adjacent_rows(lines, starts, ends, int(lines.starts[chosen[0]]), keyword)
+        first = int(lines.starts[chosen[0]])
+        letters = lines.letters[first : ends[-1]].copy()
+        places = starts - first
+        # A keyword has at most two characters; any before the first one ends another line.
+        for back in (1, 2):
+            letters[np.maximum(places - back, 0)] = ord(" ")
+        return _plain_rows(letters, np.append(places, len(letters)), starts + lines.base, keyword)
     steps = np.zeros(len(lines.letters) + 1, dtype=np.int8)
     steps[starts] += 1
     steps[ends] -= 1
     letters = lines.letters[np.cumsum(steps[:-1], dtype=np.int8).view(np.bool_)]
     places = np.concatenate([[0], np.cumsum(ends - starts)])
     return _plain_rows(letters, places, starts + lines.base, keyword)
-
-
-def _adjacent_rows(lines: Lines, starts: Places, ends: Places, first: int, keyword: str) -> Rows:
-    """Return the text of lines that follow each other, with blanks in place of keywords."""
-    letters = lines.letters[first : ends[-1]].copy()
-    starts = starts - first
-    # A keyword has at most two characters; any before the first one is the end of another line.
-    for back in (1, 2):
-        letters[np.maximum(starts - back, 0)] = ord(" ")
-    places = np.append(starts, len(letters))
-    return _plain_rows(letters, places, starts + first + lines.base, keyword)
 
 
 def _plain_rows(letters: Letters, starts: Places, origins: Places, keyword: str) -> Rows:

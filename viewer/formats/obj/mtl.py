@@ -29,7 +29,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._mesh.texture import load_image
-from viewer.formats._references import referenced_path, refused_text
+from viewer.formats._references import is_file, referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, to_number
 from viewer.phrases import counted, listed, quoted
@@ -179,7 +179,7 @@ def _name_here(folder: Path, written: str) -> str | None:
     name = written.strip("\"'").replace("\\", "/")
     for tried in (name, name.rsplit("/", 1)[-1]):
         path = referenced_path(folder, tried) if tried else None
-        if path is not None and _is_file(path):
+        if path is not None and is_file(path):
             return tried
         found = None if path is None else _in_any_case(folder, tried)
         if found is not None:
@@ -199,14 +199,7 @@ def _in_any_case(folder: Path, name: str) -> str | None:
             return None
         parts.append(same[0])
         here = here / same[0]
-    return "/".join(parts) if _is_file(here) else None
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # the name is too long for a file
-        return False
+    return "/".join(parts) if is_file(here) else None
 
 
 def _read(library: Source, known: dict[str, _Statements], load: _Load) -> None:

@@ -353,7 +353,9 @@ def _level_of_people(
     list, tells it.
     """
     keys = {level: [one.path[level] for one in found] for level in levels}
-    persons = [_stated(one, one.layout.person) for one in found]
+    persons = [
+        None if one.layout.person is None else identities(one.layout.person, 1)[0] for one in found
+    ]
     genders = [_genders(one.layout.gender, 1)[0] for one in found]
     shapes = [None if one.shape is None else one.shape.tobytes() for one in tracks]
     outer, inner = levels
@@ -384,10 +386,6 @@ def _level_of_people(
             frames=counted(sizes[other], "frame"),
         )
     return chosen
-
-
-def _stated(one: ParameterDict, value: StatedValue | None) -> int | str | None:
-    return None if value is None else identities(value, 1)[0]
 
 
 def _most_repeated(groups: Sequence[str], values: Sequence[object]) -> int:
