@@ -13,6 +13,7 @@ from house import reached
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
+WIDE = {"Exception", "BaseException"}  # types that nearly every problem has
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 TESTS = ROOT / "tests"
 TEST_FILES = sorted(TESTS.rglob("*.py"))
@@ -329,3 +330,40 @@ def test_modules_have_no_circular_imports() -> None:
         if name in behind[name]
     }
     assert not circles
+
+
+def test_assertions_only_tell_readers_and_type_checkers_what_a_value_is() -> None:
+    def narrows(test: ast.expr) -> bool:
+        if isinstance(test, ast.BoolOp):
+            return isinstance(test.op, ast.And) and all(map(narrows, test.values))
+        if isinstance(test, ast.UnaryOp):
+            return isinstance(test.op, ast.Not) and narrows(test.operand)
+        if isinstance(test, ast.Compare):
+            return ast.unparse(test).endswith((" is None", " is not None"))
+        return isinstance(test, ast.Call) and ast.unparse(test.func) in {"isinstance", "callable"}
+
+    wrong = [
+        f"{path}:{node.lineno}: {ast.unparse(node)}"
+        for path in SOURCES
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Assert) and not narrows(node.test)
+    ]
+    assert not wrong
+
+
+def test_broad_handlers_raise_again_or_hand_the_problem_on() -> None:
+    """One that tries the next of several devices says so on its line."""
+    wrong = []
+    for path in SOURCES:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        for node in ast.walk(tree(path)):
+            if not isinstance(node, ast.ExceptHandler):
+                continue
+            if node.type is not None and ast.unparse(node.type) not in WIDE:
+                continue
+            body = [inner for line in node.body for inner in ast.walk(line)]
+            raises = any(isinstance(inner, ast.Raise) for inner in body)
+            uses = any(isinstance(inner, ast.Name) and inner.id == node.name for inner in body)
+            if not raises and not uses and "#" not in lines[node.lineno - 1]:
+                wrong.append(f"{path}:{node.lineno}")
+    assert not wrong
