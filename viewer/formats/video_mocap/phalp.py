@@ -166,5 +166,4 @@ def _size(frame: Archive) -> tuple[int, int] | None:
 
 def _camera(size: tuple[int, int]) -> Cameras:
     focal = _FOCAL / _IMAGE * max(size)
-    intrinsics = intrinsics_of(focal, np.array(size) / 2)
-    return Cameras(np.zeros(1, np.int64), intrinsics, np.eye(3)[None], np.zeros((1, 3)), size)
+    return Cameras.still(intrinsics_of(focal, np.array(size) / 2), size)

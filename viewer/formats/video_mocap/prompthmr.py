@@ -91,8 +91,7 @@ def _cameras(archive: Archive) -> dict[str, Cameras]:
     center = numbers(source, "img_center", 2)
     matrix = intrinsics_of(numbers(source, "img_focal", 1), center)
     size = round(2 * float(center[0])), round(2 * float(center[1]))
-    still = np.eye(3)[None], np.zeros((1, 3))
-    found["camera"] = Cameras(np.zeros(1, np.int64), matrix, *still, size)
+    found["camera"] = Cameras.still(matrix, size)
     if world is not None:
         pose = _pose(world)
         if pose is not None:

@@ -130,6 +130,11 @@ class Cameras:
     size: tuple[int, int] | None = None
     """Width and height of the video, pixels."""
 
+    @classmethod
+    def still(cls, intrinsics: Floats, size: tuple[int, int]) -> Cameras:
+        """Return the camera in its own space, with the same K, (1, 3, 3), in all frames."""
+        return cls(np.zeros(1, np.int64), intrinsics, np.eye(3)[None], np.zeros((1, 3)), size)
+
     @property
     def invalid(self) -> Bools:
         """Mask of the frames in which a number is NaN: (N,)."""

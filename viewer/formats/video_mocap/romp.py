@@ -109,8 +109,7 @@ def _camera(images: list[Archive]) -> Cameras | None:
         return None
     center = solution[1:].astype(np.float64)
     size = round(2.0 * float(center[0])), round(2.0 * float(center[1]))
-    matrix, still = intrinsics_of(float(solution[0]), center), (np.eye(3)[None], np.zeros((1, 3)))
-    return Cameras(np.zeros(1, np.int64), matrix, *still, size)
+    return Cameras.still(intrinsics_of(float(solution[0]), center), size)
 
 
 def _projected(image: Archive) -> Floats | None:

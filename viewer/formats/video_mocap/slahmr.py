@@ -79,10 +79,9 @@ def read(source: Source, archive: Archive) -> Results:
             values = _intrinsics(archive)
             matrix = intrinsics_of(values[None, :2], values[2:])
             size = round(2 * float(values[2])), round(2 * float(values[3]))
-            still = np.eye(3)[None], np.zeros((1, 3))
             cameras = {
                 "world": Cameras(np.arange(n_frames), matrix, turned, placed, size),
-                "camera": Cameras(np.zeros(1, np.int64), matrix, *still, size),
+                "camera": Cameras.still(matrix, size),
             }
     ups = {"world": "-y", "camera": "-y"}
     return Results("SLAHMR", "SMPL+H", spaces, ups, cameras, notes=notes)

@@ -88,8 +88,7 @@ def _results(people: dict[int, Archive], camera: Archive | None) -> Results:
     intrinsics = _intrinsics(camera, next(iter(people.values()), None))
     if intrinsics is not None:
         matrix, size = intrinsics
-        still = np.eye(3)[None], np.zeros((1, 3))
-        cameras["camera"] = Cameras(np.zeros(1, np.int64), matrix, *still, size)
+        cameras["camera"] = Cameras.still(matrix, size)
     if camera is not None and pose is not None:
         turned, placed, up = pose
         world = {}
