@@ -81,10 +81,28 @@ def read_header(source: Source) -> Header:
                 )
             header.end = _behind(source.data, match)
             return header
-        if words and words[0] == "format":
+        keyword = words[0] if words else ""
+        if keyword == "format":
             header.order, has_format = _order(source, words, position), True
-        elif number:
-            _take(source, header, words, match[1], position)
+        elif keyword in ("comment", "obj_info"):
+            text = match[1].decode("utf-8", "surrogateescape").strip()
+            header.comments.append((text[len(keyword) :].strip(), position))
+        elif keyword == "element":
+            header.elements.append(_element(source, words, position))
+        elif keyword == "property":
+            if not header.elements:
+                raise source.fault(
+                    "F002.ply-no-element: property: expected an element before it, found none",
+                    position,
+                )
+            properties = header.elements[-1].properties
+            properties.append(_property(source, properties, words, position))
+        elif keyword and number:
+            raise source.fault(
+                'F002.ply-line: expected element, property, comment or end_header, found "{found}"',
+                position,
+                found=brief(keyword),
+            )
         position, number = match.end(), number + 1
     raise source.fault("F002.ply-no-end: missing end_header", position)
 
@@ -122,28 +140,6 @@ def _order(source: Source, words: list[str], offset: int) -> str:
     return _ORDERS[words[1]]
 
 
-def _take(source: Source, header: Header, words: list[str], line: bytes, offset: int) -> None:
-    """Parse one line after the first two."""
-    keyword = words[0] if words else ""
-    if keyword in ("comment", "obj_info"):
-        text = line.decode("utf-8", "surrogateescape").strip()
-        header.comments.append((text[len(keyword) :].strip(), offset))
-    elif keyword == "element":
-        header.elements.append(_element(source, words, offset))
-    elif keyword == "property":
-        if not header.elements:
-            raise source.fault(
-                "F002.ply-no-element: property: expected an element before it, found none", offset
-            )
-        _add(source, header.elements[-1], words, offset)
-    elif keyword:
-        raise source.fault(
-            'F002.ply-line: expected element, property, comment or end_header, found "{found}"',
-            offset,
-            found=brief(keyword),
-        )
-
-
 def _element(source: Source, words: list[str], offset: int) -> Element:
     is_count = len(words) == 3 and words[2].isascii() and words[2].isdecimal()
     if not is_count or len(words[2]) > 18:
@@ -155,7 +151,7 @@ def _element(source: Source, words: list[str], offset: int) -> Element:
     return Element(words[1], int(words[2]), offset)
 
 
-def _add(source: Source, element: Element, words: list[str], offset: int) -> None:
+def _property(source: Source, others: list[Property], words: list[str], offset: int) -> Property:
     kinds, name = (words[2:-1], words[-1]) if words[1:2] == ["list"] else (words[1:-1], words[-1])
     is_list = words[1:2] == ["list"]
     if len(kinds) != 1 + is_list or any(kind not in TYPES for kind in kinds):
@@ -165,7 +161,7 @@ def _add(source: Source, element: Element, words: list[str], offset: int) -> Non
             offset,
             found=brief(" ".join(words[1:])),
         )
-    if any(prop.name == name for prop in element.properties):
+    if any(prop.name == name for prop in others):
         raise source.fault(
             'F002.ply-property-again: property: expected a unique name, found "{found}" again',
             offset,
@@ -178,4 +174,4 @@ def _add(source: Source, element: Element, words: list[str], offset: int) -> Non
             offset,
             found=brief(kinds[0]),
         )
-    element.properties.append(Property(name, TYPES[kinds[-1]], TYPES[kinds[0]] if is_list else ""))
+    return Property(name, TYPES[kinds[-1]], TYPES[kinds[0]] if is_list else "")
