@@ -141,12 +141,14 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
     points = _closest(template, target)
     normals = sheet_normals(target)
     angles = _angles(template, points, normals)
-    near = points.distances <= settings.max_distance * size
-    inside_out = _inside_out(target, angles, near & normals.any(axis=1))
+    meets = points.distances <= settings.max_distance * size
+    inside_out = _inside_out(target, angles, meets & normals.any(axis=1))
     normals[np.isin(target.islands, inside_out)] *= -1.0
     angles = _judged(_angles(template, points, normals), normals, settings)
-    matched = _accepted(points.distances, angles, size, settings)
-    rest = np.nonzero(~matched & (points.distances <= settings.near_distance * size))[0]
+    is_near = points.distances <= settings.near_distance * size
+    matched = meets & (angles <= settings.max_angle)
+    matched |= is_near & (angles <= settings.near_angle)
+    rest = np.nonzero(~matched & is_near)[0]
     sides = _sides(template, target.positions[rest], normals[rest])
     side_angles = _judged(_angles(template, sides, normals[rest]), normals[rest], settings)
     fits = (sides.distances <= settings.near_distance * size) & (side_angles <= settings.near_angle)
@@ -174,12 +176,6 @@ def _judged(angles: Floats, normals: Floats, settings: MatchSettings) -> Floats:
     if not settings.flipped_normals:
         return angles
     return np.where(normals.any(axis=1), np.minimum(angles, math.pi - angles), 0.0)
-
-
-def _accepted(distances: Floats, angles: Floats, size: float, settings: MatchSettings) -> Bools:
-    far = (distances <= settings.max_distance * size) & (angles <= settings.max_angle)
-    near = (distances <= settings.near_distance * size) & (angles <= settings.near_angle)
-    return far | near
 
 
 def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:

@@ -193,18 +193,15 @@ def _rotate_joints(
         world[joint] = world[parents[joint]] @ within[joint]
     axes = similarity.rotation @ world[parents[below]]
     local = np.einsum("jba,jb->ja", axes, rotations[below])
-    _put_rotations(skeleton, pose, below, rotation_vector_to_matrix(local) @ within[below])
-
-
-def _put_rotations(skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats) -> None:
-    """Set rotations (N, 3, 3) by DOFs within their limits, and quaternions for the remainder."""
-    rows = rotation_rows(skeleton)[joints]
+    turned = rotation_vector_to_matrix(local) @ within[below]
+    # DOFs take what their limits allow, and quaternions the remainder.
+    rows = rotation_rows(skeleton)[below]
     ball = rows[:, 0] >= 0
-    base = quaternion_to_matrix(skeleton.rest_rotations[joints[ball]])
-    pose.dofs[rows[ball]] = matrix_to_euler(np.swapaxes(base, 1, 2) @ rotations[ball])
+    base = quaternion_to_matrix(skeleton.rest_rotations[below[ball]])
+    pose.dofs[rows[ball]] = matrix_to_euler(np.swapaxes(base, 1, 2) @ turned[ball])
     pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
-    held = dof_rotations(skeleton, pose.dofs)[joints]
-    pose.rotations[joints] = matrix_to_quaternion(rotations @ np.swapaxes(held, 1, 2))
+    held = dof_rotations(skeleton, pose.dofs)[below]
+    pose.rotations[below] = matrix_to_quaternion(turned @ np.swapaxes(held, 1, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -168,8 +168,9 @@ def align(
         Cloud(exact.samples, sample_surface(side.positions, side.triangles, settings.dense))
         for exact, side in zip(fine, (template, target), strict=True)
     ]
+    scale = 1.0 if settings.scale == "none" else None
     if settings.landmarks is not None:
-        start = _landmark_fit(settings.landmarks, settings.scale)
+        start = fit_similarity(settings.landmarks[:, 0], settings.landmarks[:, 1], scale)
         if settings.refines:
             report_fraction(0.2, "aligning the template")
             start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
@@ -179,7 +180,6 @@ def align(
     report_fraction(0.1, "aligning the template")
     if stays.error <= _SURELY:
         return Alignment.of(ours, theirs, stays.similarity, "in place")
-    scale = 1.0 if settings.scale == "none" else None
     with part_of_work(span=(0.1, 0.8)):
         best = search(coarse[0], coarse[1], rotations, scale)
     left = Alignment.of(ours, theirs, stays.similarity, "in place")
@@ -200,10 +200,6 @@ def align(
 
 def _surface(side: Posed, samples: int) -> Triangles:
     return Triangles(side.positions, side.triangles, samples)
-
-
-def _landmark_fit(landmarks: Floats, scale: str) -> Similarity:
-    return fit_similarity(landmarks[:, 0], landmarks[:, 1], 1.0 if scale == "none" else None)
 
 
 def _refined(

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.autorig.correspondence import Matches, MatchSettings, Template, match, wound_backwards
+from viewer.autorig.correspondence import MatchSettings, Template, match, wound_backwards
 from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import Welded, edges, weld
 from viewer.autorig.weights.result import (
@@ -126,9 +126,28 @@ def transferred_weights(
         *match_lines(found, inpainted, method),
         *rigid_lines(rigid),
     )
+    # Each vertex gets the values of the welded vertex that represents it.
+    welded, points = target.vertices, found.points
     skin = skin_of(rows, weights.inverse_bind, settings.max_influences)
-    backwards = wound_backwards(target, found.inside_out)
-    return _in_vertices(target.vertices, skin, found, inpainted, backwards, rigid, lines)
+    expanded = skin_rows(skin, welded)
+    return WeightTransfer(
+        starts=expanded.starts,
+        joints=expanded.joints,
+        weights=expanded.weights,
+        matched=found.matched[welded],
+        inpainted=inpainted[welded],
+        distances=points.distances[welded],
+        angles=found.angles[welded],
+        points=SurfacePoints(
+            points.triangles[welded],
+            points.barycentric[welded],
+            points.positions[welded],
+            points.distances[welded],
+        ),
+        backwards=wound_backwards(target, found.inside_out),
+        rigid=rigid,
+        lines=lines,
+    )
 
 
 def _without_residue(points: SurfacePoints) -> SurfacePoints:
@@ -210,38 +229,6 @@ def _inpainted(
     with part_of_work(span=(0.55, 0.95)):
         values, method = inpaint(operator, areas, rows, matched, unknown)
     return put_rows(rows, np.nonzero(unknown)[0], values), method
-
-
-def _in_vertices(
-    welded: Ints,
-    skin: Skin,
-    found: Matches,
-    inpainted: Bools,
-    backwards: Bools,
-    rigid: RigidIslands,
-    lines: tuple[Diagnostic, ...],
-) -> WeightTransfer:
-    """Return arrays of welded vertices expanded to the vertices that they represent."""
-    rows = skin_rows(skin, welded)
-    points = found.points
-    return WeightTransfer(
-        starts=rows.starts,
-        joints=rows.joints,
-        weights=rows.weights,
-        matched=found.matched[welded],
-        inpainted=inpainted[welded],
-        distances=points.distances[welded],
-        angles=found.angles[welded],
-        points=SurfacePoints(
-            points.triangles[welded],
-            points.barycentric[welded],
-            points.positions[welded],
-            points.distances[welded],
-        ),
-        backwards=backwards,
-        rigid=rigid,
-        lines=lines,
-    )
 
 
 def inpaint(
