@@ -233,7 +233,15 @@ def _draw_keys(state: AppState) -> None:
     imgui.set_next_window_size_constraints((0.0, 0.0), (room[0] + edges[0], room[1] + edges[1]))
     imgui.set_next_window_bg_alpha(_OPACITY)
     if imgui.begin("##keys", None, _flags(columns.fits))[0]:
-        _draw_lines(lines, columns, first, column)
+        left, top = imgui.get_cursor_pos()
+        step = imgui.get_text_line_height_with_spacing()
+        for index, (label, text) in enumerate(lines):
+            at, row = divmod(index, columns.rows)
+            place = left + at * column, top + row * step
+            imgui.set_cursor_pos(place)
+            imgui.text_colored(ink(_COLOR), label)
+            imgui.set_cursor_pos((place[0] + first, place[1]))
+            imgui.text_unformatted(text)
     overlay_rect(state, "##keys")
     imgui.end()
 
@@ -259,18 +267,3 @@ def column_layout(count: int, room: tuple[float, float], line: tuple[float, floa
     number = max(min(wanted, int(room[0] / line[0])), 1)
     rows = -(-count // number)
     return _Columns(number, rows, number == wanted and number * line[0] <= room[0])
-
-
-def _draw_lines(
-    lines: Sequence[tuple[str, str]], columns: _Columns, first: float, column: float
-) -> None:
-    """Draw the lines column by column; a key and its text form one line."""
-    left, top = imgui.get_cursor_pos()
-    step = imgui.get_text_line_height_with_spacing()
-    for index, (label, text) in enumerate(lines):
-        at, row = divmod(index, columns.rows)
-        place = left + at * column, top + row * step
-        imgui.set_cursor_pos(place)
-        imgui.text_colored(ink(_COLOR), label)
-        imgui.set_cursor_pos((place[0] + first, place[1]))
-        imgui.text_unformatted(text)

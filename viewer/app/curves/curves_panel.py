@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field
@@ -20,7 +21,6 @@ from viewer.app.curves.data import Curve, channel_of, curves_of
 from viewer.app.curves.editing import (
     Curves,
     DofKeys,
-    KeyedMotion,
     KeyPlace,
     TransformKeys,
     add_key_at,
@@ -40,8 +40,7 @@ from viewer.app.curves.editing import (
 )
 from viewer.app.curves.plot import curve_color, draw_plot, factor_of
 from viewer.app.files.files import offer_files
-from viewer.rig.arrays import Floats
-from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Tangent, slopes
+from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, slopes
 from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
 
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
@@ -286,14 +285,30 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
         return
     imgui.same_line()
     imgui.text_unformatted(f"{curves[place[0]].label}, key {place[1]}{more}")
+    row, key = place
     if len(view.keys) == 1:
-        _draw_numbers(state, keys, place, factor)
-    channel = channel_of(keyed.clip, place[0]) if isinstance(keyed, DofKeys) else None
+        time = _field(state, "Time", float(keys[0][key]))
+        if time is not None:
+            place_key(state, place, time=time)
+        value = _field(state, "Value", factor * float(keys[1][key]))
+        if value is not None:
+            place_key(state, place, value=value / factor)
+    channel = channel_of(keyed.clip, row) if isinstance(keyed, DofKeys) else None
     if channel is not None:
         for side, text in enumerate(_SIDES):
             _draw_rule(state, channel, place, side, text)
-    if len(view.keys) == 1:
-        _draw_slopes(state, keyed, place, factor)
+    if len(view.keys) != 1:
+        return
+    # Explicit tangents have fields for their slopes, per second.
+    own: Sequence[float | None] = ()
+    if channel is not None:
+        own = [None if isinstance(rule, str) else rule for rule in channel.tangents[key]]
+    elif (known := keyed.slopes(row)) is not None:
+        own = known[key].tolist()
+    for side, slope in enumerate(own):
+        typed = None if slope is None else _field(state, f"{_SIDES[side]} slope", factor * slope)
+        if typed is not None:
+            change_slope(state, [place], side, typed / factor)
 
 
 def _field(state: AppState, label: str, value: float) -> float | None:
@@ -301,18 +316,6 @@ def _field(state: AppState, label: str, value: float) -> float | None:
     typed = number_field(state, begin_field(label), plain_zero(value, "%.5g"), "%.5g")
     note_item(state, label)
     return typed if typed is not None and abs(typed) < _FARTHEST else None
-
-
-def _draw_numbers(
-    state: AppState, keys: tuple[Floats, Floats], place: KeyPlace, factor: float
-) -> None:
-    key = place[1]
-    time = _field(state, "Time", float(keys[0][key]))
-    if time is not None:
-        place_key(state, place, time=time)
-    value = _field(state, "Value", factor * float(keys[1][key]))
-    if value is not None:
-        place_key(state, place, value=value / factor)
 
 
 def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, text: str) -> None:
@@ -326,21 +329,3 @@ def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, te
     for rule in TANGENT_RULES:
         if new == rule != now:
             change_tangent(state, state.of(Curves).keys, side, rule)
-
-
-def _draw_slopes(state: AppState, keyed: KeyedMotion, place: KeyPlace, factor: float) -> None:
-    """Draw the slopes of explicit tangents, per second."""
-    slopes, rules = keyed.slopes(place[0]), tuple[Tangent, ...]()
-    channel = channel_of(keyed.clip, place[0]) if isinstance(keyed, DofKeys) else None
-    if channel is not None:
-        rules = channel.tangents[place[1]]
-        slopes = np.array([[0.0 if isinstance(rule, str) else rule for rule in rules]])
-    if slopes is None:
-        return
-    own = slopes[0 if rules else place[1]]
-    for side, slope in enumerate(own.tolist()):
-        if rules and isinstance(rules[side], str):
-            continue
-        typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
-        if typed is not None:
-            change_slope(state, [place], side, typed / factor)

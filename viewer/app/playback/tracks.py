@@ -58,11 +58,24 @@ def draw_tracks(state: AppState) -> None:
         state.clock.scrub(time, between=imgui.get_io().key_alt)
     first = max(0, int((imgui.get_scroll_y() - height) / height))
     last = first + int(imgui.get_window_height() / height) + 3
+    draw_list, gap = imgui.get_window_draw_list(), 0.16 * height
+    back = imgui.get_color_u32(faint(_BACK))
+    edge = imgui.get_color_u32(faint(_CHOSEN_EDGE))
     for row in range(first, min(last, len(moving))):
         index = moving[row]
         top = corner.y + height * (row + 1)
-        chosen = index == state.chosen_actor
-        _draw_track(state.scene.actors[index], state.clock, area, top, height, chosen)
+        chosen, actor = index == state.chosen_actor, state.scene.actors[index]
+        upper, lower = top + gap, top + height - gap
+        draw_list.add_rect_filled((left, upper), (left + width, lower), back)
+        red, green, blue = encode_color(actor.color) if actor.color is not None else _PLAIN
+        color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
+        assert actor.clip is not None  # only moving actors have tracks
+        spans = present_spans(actor.clip, 1.0 / scale)
+        places = [left + (time + actor.offset - low) * scale for span in spans for time in span]
+        for x0, x1 in bars(places, _NARROWEST * size, left + width):
+            draw_list.add_rect_filled((x0, upper), (x1, lower), color, 2.0)
+            if chosen:
+                draw_list.add_rect((x0, upper), (x1, lower), edge, 2.0)
         if chosen:
             _draw_keys(state, area, top, height)
     _draw_ruler(state.clock, area)
@@ -86,33 +99,6 @@ def _draw_names(state: AppState, moving: list[int], height: float) -> None:
             imgui.pop_style_color()
         note_item(state, f"track {index}")
         imgui.pop_id()
-
-
-def _draw_track(
-    actor: Actor,
-    clock: Clock,
-    area: tuple[float, float, float, float],
-    top: float,
-    height: float,
-    chosen: bool,
-) -> None:
-    draw_list = imgui.get_window_draw_list()
-    left, _, width, _ = area
-    low, high = clock.whole
-    scale = width / max(high - low, 1e-9)
-    gap = 0.16 * height
-    back = imgui.get_color_u32(faint(_BACK))
-    draw_list.add_rect_filled((left, top + gap), (left + width, top + height - gap), back)
-    red, green, blue = encode_color(actor.color) if actor.color is not None else _PLAIN
-    color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
-    edge = imgui.get_color_u32(faint(_CHOSEN_EDGE))
-    assert actor.clip is not None  # only moving actors have tracks
-    spans = present_spans(actor.clip, 1.0 / scale)
-    places = [left + (time + actor.offset - low) * scale for span in spans for time in span]
-    for x0, x1 in bars(places, _NARROWEST * imgui.get_font_size(), left + width):
-        draw_list.add_rect_filled((x0, top + gap), (x1, top + height - gap), color, 2.0)
-        if chosen:
-            draw_list.add_rect((x0, top + gap), (x1, top + height - gap), edge, 2.0)
 
 
 def _draw_keys(

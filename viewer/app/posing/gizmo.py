@@ -24,7 +24,6 @@ from viewer.app.core.view_frame import Place, ViewFrame, view_frame
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.move_tool import (
     LENGTH,
-    Arrow,
     MoveHandle,
     ReachHandle,
     arrows,
@@ -36,7 +35,6 @@ from viewer.app.posing.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing.posing import Drag, Handle, Outcome, Posing, pause_for_edit
 from viewer.app.posing.rotate_tool import (
     RADIUS,
-    Ring,
     RotateHandle,
     circle,
     grab_ring,
@@ -374,23 +372,19 @@ def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | Non
         return
     assert pose is not None  # limits imply a posed joint
     under = hot.ring if isinstance(hot, RotateHandle) else None
+    unit, eye = pen.frame.unit_length(posed.center), toward_eye(pen.frame, posed.center)
     for ring in rings(posed, pose, state.of(Posing).orientation, pen.frame):
         is_hot = under is not None and (ring.color, ring.dof) == (under.color, under.dof)
-        _draw_ring(pen, posed.center, ring, is_hot)
-
-
-def _draw_ring(pen: _Pen, center: Floats, ring: Ring, is_hot: bool) -> None:
-    """Draw a ring, with a faint far side."""
-    unit, eye = pen.frame.unit_length(center), toward_eye(pen.frame, center)
-    points = circle(center, ring.axis, ring.size * unit)
-    color, thickness = (_HOT, 4.0) if is_hot else (_AXES[ring.color], 2.5)
-    if ring.color == 3:
-        pen.line(points, (*color, 1.0 if is_hot else 0.6), thickness - 1.0)
-        return
-    in_front = (points - center) @ eye >= -1e-9
-    for run in _runs(in_front):
-        opacity = 1.0 if in_front[run[len(run) // 2]] else _BEHIND
-        pen.line(points[run], (*color, opacity), thickness)
+        points = circle(posed.center, ring.axis, ring.size * unit)
+        color, thickness = (_HOT, 4.0) if is_hot else (_AXES[ring.color], 2.5)
+        if ring.color == 3:
+            pen.line(points, (*color, 1.0 if is_hot else 0.6), thickness - 1.0)
+            continue
+        # The far side is faint.
+        in_front = (points - posed.center) @ eye >= -1e-9
+        for run in _runs(in_front):
+            opacity = 1.0 if in_front[run[len(run) // 2]] else _BEHIND
+            pen.line(points[run], (*color, opacity), thickness)
 
 
 def _runs(flags: np.ndarray) -> list[list[int]]:
@@ -446,28 +440,22 @@ def _draw_arrows(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | No
     arrow = held.arrow if isinstance(held, MoveHandle) else None
     is_middle = isinstance(held, ReachHandle) or (isinstance(held, MoveHandle) and arrow is None)
     pen.dot(posed.center, 8.0, (*(_HOT if is_middle else _AXES[3]), 1.0), filled=False)
+    unit, scale = pen.frame.unit_length(posed.center), pen.scale
     for one in arrows(posed, state.of(Posing).orientation):
         is_hot = arrow is not None and arrow.color == one.color
-        _draw_arrow(pen, posed.center, one, is_hot)
-
-
-def _draw_arrow(pen: _Pen, center: Floats, arrow: Arrow, is_hot: bool) -> None:
-    color: _Color = (*(_HOT if is_hot else _AXES[arrow.color]), 1.0)
-    unit = pen.frame.unit_length(center)
-    ends = pen.frame.project(np.stack([center, center + LENGTH * unit * arrow.axis]))
-    way = ends[1] - ends[0]
-    size = float(np.linalg.norm(way))
-    one = pen.scale
-    if not np.isfinite(size) or size < 12.0 * one:
-        return
-    along, across = way / size, np.array([-way[1], way[0]]) / size
-    tip, foot = ends[1], ends[0] + 9.0 * one * along
-    neck = tip - 11.0 * one * along
-    ink = imgui.get_color_u32(color)
-    pen.list.add_line(tuple(foot), tuple(neck), ink, (4.0 if is_hot else 2.5) * one)
-    pen.list.add_triangle_filled(
-        tuple(tip), tuple(neck + 5.0 * one * across), tuple(neck - 5.0 * one * across), ink
-    )
+        tip_in_space = posed.center + LENGTH * unit * one.axis
+        ends = pen.frame.project(np.stack([posed.center, tip_in_space]))
+        way = ends[1] - ends[0]
+        size = float(np.linalg.norm(way))
+        if not np.isfinite(size) or size < 12.0 * scale:
+            continue
+        along, across = way / size, np.array([-way[1], way[0]]) / size
+        tip, foot = ends[1], ends[0] + 9.0 * scale * along
+        neck = tip - 11.0 * scale * along
+        color = imgui.get_color_u32((*(_HOT if is_hot else _AXES[one.color]), 1.0))
+        pen.list.add_line(tuple(foot), tuple(neck), color, (4.0 if is_hot else 2.5) * scale)
+        wings = neck + 5.0 * scale * across, neck - 5.0 * scale * across
+        pen.list.add_triangle_filled(tuple(tip), tuple(wings[0]), tuple(wings[1]), color)
 
 
 def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:

@@ -277,7 +277,8 @@ def _dof_slider(state: AppState, skeleton: Skeleton, now: float, dof: int) -> fl
     """Draw the slider in the displayed unit and return the value in radians or lengths."""
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
     is_rotation = skeleton.dof_kinds[dof] >= FIRST_ROTATION
-    unlimited = math.pi if is_rotation else _reach(state)
+    # Sliders of unlimited translations reach as far as the scene is large.
+    unlimited = math.pi if is_rotation else box_size(state.box) or 1.0
     factor = math.degrees(1.0) if is_rotation and state.in_degrees else 1.0
     text = ("%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad") if is_rotation else "%.4f"
     if low == high:
@@ -294,11 +295,6 @@ def _dof_slider(state: AppState, skeleton: Skeleton, now: float, dof: int) -> fl
     )
     # The widget's float32 must not change a value that was not moved; "nan" can be typed.
     return moved / factor if changed and math.isfinite(moved) else now
-
-
-def _reach(state: AppState) -> float:
-    """Return the range of sliders for unlimited translations: the size of the scene."""
-    return box_size(state.box) or 1.0
 
 
 def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:

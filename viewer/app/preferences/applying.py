@@ -53,11 +53,6 @@ def change(state: AppState, preferences: Preferences) -> None:
         state.say_status(problem)
 
 
-def _scale_of(state: AppState) -> float:
-    """Return the scale of the interface in the current window."""
-    return chosen_scale(state.of(Preferences), state.of(Appearance))
-
-
 def chosen_scale(preferences: Preferences, appearance: Appearance) -> float:
     """Return the scale of the interface: the given, the preferred, or the monitor's scale."""
     return appearance.given_scale or preferences.scale or appearance.screen_scale
@@ -77,7 +72,7 @@ def follow_preferences(state: AppState, shortcuts: Sequence[Shortcut]) -> None:
     if theme != applied.theme:
         set_theme(theme)
         applied.theme = theme
-    scale = _scale_of(state)
+    scale = chosen_scale(preferences, applied)
     if scale != applied.scale:
         change_scale(applied.scale, scale)
         applied.scale = scale

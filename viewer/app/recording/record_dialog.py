@@ -160,22 +160,17 @@ class Preview:
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        recording.preview = self._draw(state, settings, size)
-
-    def _draw(self, state: AppState, settings: RecordSettings, size: tuple[int, int]) -> int:
-        """Draw the preview and return the ID of its texture."""
         options = recorded_options(state, settings, 2)
         target = self.target
         if target is None or (target.size, target.asked_samples) != (size, options.samples):
             self._retire()
             self.target = target = Target(self.context, size, options.samples)
-        camera = state.camera.copy()
         selected = (state.chosen_actor, state.selected_joint)
         # The view's renderer may still be averaging its own image.
         renderer = self._renderer = self._renderer or Renderer(self._programs)
-        renderer.draw(state.scene, camera, options, target, state.box, selected)
+        renderer.draw(state.scene, state.camera.copy(), options, target, state.box, selected)
         target.resolve()
-        return int(target.texture.glo)
+        recording.preview = int(target.texture.glo)
 
     def _retire(self) -> None:
         """Release the target in the next frame: panels of this frame may show its texture."""

@@ -404,7 +404,11 @@ def _draw_numbers(state: AppState, template: Template) -> None:
     """Draw input fields of the template's placement: translation, Euler angles, scale."""
     now = similarity_now(state, template)
     angles = np.degrees(matrix_to_euler(now.rotation[None])[0])
-    shift, angle, scale = _inputs(state, now.shift, angles, now.scale)
+    shift = _vector_field(state, "Translation", now.shift, "%.4g")
+    angle = _vector_field(state, "Rotation", angles, "%.2f\N{DEGREE SIGN}")
+    typed = number_field(state, begin_field("Scale factor"), now.scale)
+    note_item(state, "Scale factor")
+    scale = typed if typed is not None and typed > 0.0 else None
     if shift is None and angle is None and scale is None:
         if button(state, "Align boxes"):
             fit = box_fit(posed_template(state.of(Rigging), template), target_mesh(state))
@@ -421,17 +425,6 @@ def _draw_numbers(state: AppState, template: Template) -> None:
         shift=now.shift if shift is None else shift,
     )
     _move(state, template, moved)
-
-
-def _inputs(
-    state: AppState, shift: Floats, angles: Floats, scale: float
-) -> tuple[Floats | None, Floats | None, float | None]:
-    """Draw the input fields; return the values that were typed, None for unchanged fields."""
-    moved = _vector_field(state, "Translation", shift, "%.4g")
-    rotated = _vector_field(state, "Rotation", angles, "%.2f\N{DEGREE SIGN}")
-    size = number_field(state, begin_field("Scale factor"), scale)
-    note_item(state, "Scale factor")
-    return moved, rotated, size if size is not None and size > 0.0 else None
 
 
 def _vector_field(state: AppState, label: str, values: Floats, text: str) -> Floats | None:

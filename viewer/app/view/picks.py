@@ -31,7 +31,6 @@ from viewer.rig.inspection.single_vertices import (
 )
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
-from viewer.rig.skinning import Skinning
 
 _LONGEST = 40  # maximum length of a name in characters
 _REST = 0.2  # seconds without mouse movement before a vertex is described
@@ -247,8 +246,15 @@ def _look_under_mouse(
     else:  # something else is drawn over the surface
         found = vertex_at(state, renderer, size, pixel)
     if found is not None:
-        _describe(state, hover, *found)
-        hover.lines = (*hover.lines, *_click_text(state, pick))
+        index, vertex, triangle = found
+        actor, options = state.scene.actors[index], state.options
+        facts = vertex_facts(actor.figure, actor.pose, options.skinning, vertex, triangle)
+        if options.show == "binding":
+            mesh = actor.figure.require_mesh()
+            facts = replace(facts, position=mesh.positions[vertex], normal=mesh.normals[vertex])
+        hover.point = apply_transform(actor.placement, facts.position)
+        title = (actor.name,) if len(state.scene.actors) > 1 else ()
+        hover.lines = (*title, *facts_text(facts), *_click_text(state, pick))
 
 
 def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
@@ -265,17 +271,3 @@ def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
         return (f"click: {printable(joint_label(skeleton, joint), _LONGEST)}",)
     mover = _mover(state, pick)
     return () if mover is None else (f"click: {mover.text}",)
-
-
-def _describe(state: AppState, hover: Hover, index: int, vertex: int, triangle: int) -> None:
-    """Set the hover text for a vertex, and its position in the scene."""
-    actor, options = state.scene.actors[index], state.options
-    skinning: Skinning = options.skinning
-    facts = vertex_facts(actor.figure, actor.pose, skinning, vertex, triangle)
-    if options.show == "binding":
-        mesh = actor.figure.mesh
-        assert mesh is not None  # the vertex belongs to this mesh
-        facts = replace(facts, position=mesh.positions[vertex], normal=mesh.normals[vertex])
-    hover.point = apply_transform(actor.placement, facts.position)
-    title = (actor.name,) if len(state.scene.actors) > 1 else ()
-    hover.lines = (*title, *facts_text(facts))

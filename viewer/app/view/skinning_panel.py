@@ -49,8 +49,15 @@ def _draw_method(state: AppState, skinning: Skinning) -> None:
         if imgui.is_item_hovered():
             imgui.set_tooltip(method.title)
     for key, method in METHODS.items():
-        if method.ends:
-            _draw_blend_factor(state, skinning, key, method.ends)
+        if not method.ends:
+            continue
+        # The fraction of a mixture of two methods; moving it selects the mixture.
+        blend = 0.5 if skinning.blend_factor is None else skinning.blend_factor
+        shown = dict(zip(method.ends, (0.0, 1.0), strict=True)).get(skinning.method, blend)
+        title = f"{METHODS[method.ends[1]].short} fraction"
+        factor = slider(state, title, shown, 0.0, 1.0, flags=_CLAMP)
+        if factor != shown:
+            skinning.method, skinning.blend_factor = key, factor
 
 
 def _draw_stated(state: AppState, figure: Figure, skinning: Skinning) -> None:
@@ -60,18 +67,6 @@ def _draw_stated(state: AppState, figure: Figure, skinning: Skinning) -> None:
     is_stated = skinning.method == "mix" and skinning.blend_factor is None
     if checkbox(state, "Fractions of the file", is_stated) != is_stated:
         skinning.method, skinning.blend_factor = "mix", 0.5 if is_stated else None
-
-
-def _draw_blend_factor(
-    state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]
-) -> None:
-    """Draw the blend factor of a method between two others; moving it selects the method."""
-    shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(
-        skinning.method, 0.5 if skinning.blend_factor is None else skinning.blend_factor
-    )
-    factor = slider(state, f"{METHODS[ends[1]].short} fraction", shown, 0.0, 1.0, flags=_CLAMP)
-    if factor != shown:
-        skinning.method, skinning.blend_factor = key, factor
 
 
 def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> None:

@@ -223,7 +223,7 @@ def _draw_range(state: AppState, key: str) -> None:
                 "colours", why)  # fmt: skip
     if options.scalar_range is not None and not why:
         low, high = options.scalar_range
-        unit = _unit(state.actor.figure, options.scalar)
+        unit = shown_unit(options.scalar, state.actor.figure)[1]
         options.scalar_range = (
             _end_field(state, "From", low, unit, -math.inf, high),
             _end_field(state, "To", high, unit, low, math.inf),
@@ -250,10 +250,6 @@ def _present_range(state: AppState) -> tuple[float, float]:
     factor, _ = shown_unit(state.options.scalar, state.actor.figure)
     low, high = state.stats.scalar_ends
     return float(f"{factor * low:.3g}"), float(f"{factor * high:.3g}")
-
-
-def _unit(figure: Figure, name: str) -> str:
-    return shown_unit(name, figure)[1]
 
 
 def _draw_marks(state: AppState, key: str) -> None:
