@@ -57,7 +57,7 @@ def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
             offscreen.context.finish()
 
         frame(Skinning())
-        buffers = offscreen.renderer.posed_mesh(actor).mesh
+        buffers = offscreen.renderer.buffers.posed_mesh(actor).mesh
         meshes = {
             way: PosedMesh(offscreen.context, offscreen.renderer.programs, buffers, way)
             for way in ("texture", "product")

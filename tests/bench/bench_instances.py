@@ -160,7 +160,7 @@ def processor(figure: Figure, rounds: int) -> None:
     with Offscreen() as offscreen, offscreen.context:
         offscreen.target((16, 16), 1).framebuffer.use()
         instances = offscreen.renderer.buffers.instanced(figure, 1)[0]
-        meshes = [offscreen.renderer.posed_mesh(actor) for actor in actors]
+        meshes = [offscreen.renderer.buffers.posed_mesh(actor) for actor in actors]
 
         def together(how: Skinning) -> None:
             change(actors, rng)

@@ -83,7 +83,7 @@ def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Ca
     def prepare() -> None:
         pose_actors([actor], clock.next())
         assert actor.pose is not None
-        renderer.posed_mesh(actor).upload(actor.pose, options.skinning)
+        renderer.buffers.posed_mesh(actor).upload(actor.pose, options.skinning)
 
     return frame, prepare
 

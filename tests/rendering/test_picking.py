@@ -121,10 +121,10 @@ def test_posed_meshes_are_picked_at_their_drawn_position(offscreen):
 def test_picking_does_not_skin_actors_again(offscreen, monkeypatch):
     scene = Scene([bent(arm(3), (1, "z", 0.5))])
     offscreen.render(scene, (80, 80), parallel(), DisplayOptions(), scene_box(scene))
-    before = offscreen.renderer.posed_mesh(scene.actors[0]).n_updates
+    before = offscreen.renderer.buffers.posed_mesh(scene.actors[0]).n_updates
     monkeypatch.setattr(PosedMesh, "upload", None)
     assert click(offscreen, scene, 0.5, 0.0) is not None
-    assert offscreen.renderer.posed_mesh(scene.actors[0]).n_updates == before
+    assert offscreen.renderer.buffers.posed_mesh(scene.actors[0]).n_updates == before
 
 
 def test_boxes_of_joints_are_also_found_over_the_skin(offscreen):

@@ -59,9 +59,10 @@ def test_one_outlier_does_not_flatten_the_other_colours():
     actor.pose.translations[1] = 0.3, 0.0, 0.0
     with Offscreen() as offscreen:
         front_view(offscreen, scene, shading="scalar", scalar="stretch")
-        scalars, legend = offscreen.renderer.scalars, offscreen.renderer.legend
+        scalars = offscreen.renderer.scalars
+        legend = scalars.legend
         front_view(offscreen, scene, shading="scalar", scalar="stretch", scalar_range=(-10.0, 10.0))
-        fixed = scalars.ends, offscreen.renderer.legend.note
+        fixed = scalars.ends, offscreen.renderer.scalars.legend.note
         numbers = compute("stretch", actor.figure, actor.pose, DisplayOptions().skinning)
         front_view(offscreen, scene, shading="scalar", scalar="stretch")
     amounts = np.sort(np.abs(numbers[numbers != 0.0]))

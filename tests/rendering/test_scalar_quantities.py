@@ -255,7 +255,7 @@ def test_fixed_range_is_in_the_unit_of_the_legend(offscreen):
     same = shown(offscreen, scene, "correctives", scalar_range=(0.0, 2.0),
                  skinning=Skinning(correctives=False))  # fmt: skip
     np.testing.assert_array_equal(same, whole)
-    assert offscreen.renderer.legend.unit == "mm"
+    assert offscreen.renderer.scalars.legend.unit == "mm"
 
 
 def test_isolines_are_at_tenths_of_the_range(offscreen):
@@ -339,9 +339,9 @@ def test_view_without_a_joint_shows_the_selected_joint(offscreen):
         target = offscreen.target((80, 80), 1)
         offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), (0, 1))
         found = target.read()
-        assert offscreen.renderer.legend.title == "Weight of j1"
+        assert offscreen.renderer.scalars.legend.title == "Weight of j1"
         offscreen.renderer.draw(scene, camera, options, target, scene_box(scene), (0, -1))
-        assert offscreen.renderer.legend.note == "no joint is selected"
+        assert offscreen.renderer.scalars.legend.note == "no joint is selected"
     np.testing.assert_array_equal(found, wanted)
 
 
@@ -360,9 +360,9 @@ def test_same_colour_means_same_value_on_all_figures(offscreen):
     how = Skinning(correctives=False)
     options = {"shading": "scalar", "scalar": "correctives", "skinning": how}
     front_view(offscreen, both, **options)
-    ends = [offscreen.renderer.posed_mesh(actor).scalars.look.ends for actor in both.actors]
+    ends = [offscreen.renderer.buffers.posed_mesh(actor).scalars.look.ends for actor in both.actors]
     assert ends == [(0.0, 1.0), (0.0, 1.0)]
-    assert offscreen.renderer.scalar_range == (0.0, 1.0)
+    assert offscreen.renderer.scalars.range == (0.0, 1.0)
 
 
 def test_figure_without_the_quantity_is_drawn_normally(offscreen):
@@ -371,7 +371,7 @@ def test_figure_without_the_quantity_is_drawn_normally(offscreen):
     having.placement[0, 3], lacking.placement[0, 3] = -2.0, 2.0
     colors = {"shading": "scalar", "skinning": Skinning(correctives=False)}
     together = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
-    legend = offscreen.renderer.legend
+    legend = offscreen.renderer.scalars.legend
     assert legend.title == "Effect of pose correctives" and len(legend.colors)
     apart = [front_view(offscreen, Scene([having]), scalar="correctives", **colors),
              front_view(offscreen, Scene([lacking]))]  # fmt: skip
@@ -383,7 +383,7 @@ def test_figure_without_the_quantity_is_drawn_normally(offscreen):
     having.visible = False
     alone_now = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
     np.testing.assert_array_equal(alone_now[:, half:], apart[1][:, half:])
-    legend = offscreen.renderer.legend
+    legend = offscreen.renderer.scalars.legend
     assert legend.title == "Effect of pose correctives"
     assert legend.note == "not available for the visible figures"
-    assert offscreen.renderer.scalar_range == (0.0, 0.0)
+    assert offscreen.renderer.scalars.range == (0.0, 0.0)

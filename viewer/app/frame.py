@@ -183,9 +183,9 @@ class Frame:
                 self.context.finish()
                 self.pace.measured(step, time.perf_counter() - started)
             state.stats.samples = target.samples
-            state.stats.scalar_range = self.renderer.scalar_range
+            state.stats.scalar_range = self.renderer.scalars.range
             state.stats.scalar_ends = self.renderer.scalars.ends
-            state.stats.legend = self.renderer.legend
+            state.stats.legend = self.renderer.scalars.legend
         except ViewerError as problem:
             state.error = str(problem)
         state.say(*self.renderer.notes)

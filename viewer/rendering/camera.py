@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -62,18 +62,7 @@ class Camera:
 
     def copy(self) -> Camera:
         """Return an independent copy."""
-        return Camera(
-            self.target.copy(),
-            self.distance,
-            self.azimuth,
-            self.inclination,
-            self.fov,
-            self.orthographic,
-            self.up,
-            self.fixed,
-            self.front,
-            self.seen,
-        )
+        return replace(self, target=self.target.copy())
 
     @property
     def pinhole(self) -> CameraView | None:

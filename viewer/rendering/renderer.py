@@ -18,7 +18,6 @@ from viewer.rendering.camera_views import (
 from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import draw_nearest, without_depth_writes
-from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
@@ -50,7 +49,6 @@ from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.overlay.annotation import Annotation, Marks
-    from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.passes.ghost_pass import Ghost
     from viewer.rendering.passes.outline_pass import Outlined
     from viewer.rendering.picking import Pick
@@ -82,16 +80,6 @@ class Renderer:
         self.names_left_out = 0, 0
         self.lighting = Lighting(context, programs)
         self.late = LatePasses(context, programs, self.mesh_pass, self.joint_pass, self.buffers)
-
-    @property
-    def scalar_range(self) -> tuple[float, float]:
-        """Lowest and highest value of the last drawn scalar quantity, over all figures."""
-        return self.scalars.range
-
-    @property
-    def legend(self) -> Legend | None:
-        """Legend of the last drawn scalar quantity; None if there was none."""
-        return self.scalars.legend
 
     def draw(
         self,
@@ -140,11 +128,12 @@ class Renderer:
 
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
-            assert self.legend is not None  # meshes were drawn with values, so there is a legend
+            legend = self.scalars.legend
+            assert legend is not None  # meshes were drawn with values, so there is a legend
             width, height = target.size
             note = f"an image of {width} x {height} pixels has no room for a legend"
             light = is_light(options.background)
-            is_drawn = self.late.legend_pass.draw(self.legend, target.size, light)
+            is_drawn = self.late.legend_pass.draw(legend, target.size, light)
             if not is_drawn and note not in self.notes:
                 self.notes.append(note)
 
@@ -367,10 +356,6 @@ class Renderer:
         skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
         how = selected, opacity * options.opacity * actor.opacity, actor.color, overlays
         self.joint_pass.draw(skeleton, placement, view, options, *how)
-
-    def posed_mesh(self, actor: Actor) -> PosedMesh:
-        """Return an actor's posed mesh, created on first use; its figure must have a mesh."""
-        return self.buffers.posed_mesh(actor)
 
     def release(self) -> None:
         """Free everything except the programs."""

@@ -24,7 +24,11 @@ if TYPE_CHECKING:
 
 
 class ScalarQuantities:
-    """Values, colours and legend of the displayed scalar quantity, updated on demand."""
+    """Values, colours and legend of the displayed scalar quantity, updated on demand.
+
+    ``range``: lowest and highest value of the last drawn quantity, over all figures. ``legend``:
+    its legend; None if there was none.
+    """
 
     def __init__(self) -> None:
         self.range = self.ends = 0.0, 0.0

@@ -90,7 +90,7 @@ def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch) 
     draw(offscreen, opened)
     with offscreen.context:
         buffers = offscreen.renderer.buffers.mesh(figure)
-        rest = offscreen.renderer.posed_mesh(opened.actors[0])._rest
+        rest = offscreen.renderer.buffers.posed_mesh(opened.actors[0])._rest
         before, calls = gl_objects(), []
 
         def second_fails(context, doing) -> None:

@@ -243,7 +243,7 @@ class Drawing:
     def draw(self) -> int:
         """Draw; return the number of times the first actor has been skinned so far."""
         self.renderer.draw(self.scene, self.camera, self.options, self.target, self.box)
-        return self.renderer.posed_mesh(self.scene.actors[0]).n_updates
+        return self.renderer.buffers.posed_mesh(self.scene.actors[0]).n_updates
 
     def release(self) -> None:
         self.renderer.release()
@@ -366,7 +366,7 @@ def test_moving_the_camera_uploads_no_data(drawing, uploads):
 def test_actors_of_one_figure_share_its_mesh_but_not_their_poses(ctx):
     figure = arm(3)
     drawing = Drawing(ctx, figure, figure)
-    first, second = (drawing.renderer.posed_mesh(actor) for actor in drawing.scene.actors)
+    first, second = (drawing.renderer.buffers.posed_mesh(actor) for actor in drawing.scene.actors)
     assert first.mesh is second.mesh
     drawing.scene.actors[1].pose.dofs[4] = 0.7
     drawing.draw()
@@ -380,7 +380,7 @@ def test_removed_actors_are_freed(ctx, monkeypatch):
     original = PosedMesh.release
     monkeypatch.setattr(PosedMesh, "release", lambda s: (released.append(s), original(s)))
     drawing = Drawing(ctx, arm(2), arm(3))
-    gone = drawing.renderer.posed_mesh(drawing.scene.actors[1])
+    gone = drawing.renderer.buffers.posed_mesh(drawing.scene.actors[1])
     del drawing.scene.actors[1]
     drawing.draw()
     assert released == [gone]

@@ -166,7 +166,7 @@ def draw(offscreen, name="dominant", size=SIZE, **options):
 def test_legend_is_drawn_pixel_by_pixel_into_the_corner(offscreen, samples):
     plain = draw(offscreen, samples=samples)
     picture = draw(offscreen, samples=samples, legend=True)
-    pixels = legend_pixels(offscreen.renderer.legend, SIZE)
+    pixels = legend_pixels(offscreen.renderer.scalars.legend, SIZE)
     changed = (plain != picture).any(axis=2)
     rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
     top, left = rows[0], columns[0]
@@ -180,7 +180,7 @@ def test_legend_is_drawn_pixel_by_pixel_into_the_corner(offscreen, samples):
 def test_legend_covers_the_figure_and_is_drawn_last(offscreen):
     plain = draw(offscreen, size=(200, 150))
     picture = draw(offscreen, size=(200, 150), legend=True, show="both", wireframe=True)
-    pixels = legend_pixels(offscreen.renderer.legend, (200, 150))
+    pixels = legend_pixels(offscreen.renderer.scalars.legend, (200, 150))
     height, width = pixels.shape[:2]
     inside = picture[2 : 2 + height, 2 : 2 + width].astype(int)
     solid = pixels[..., 3] == 255

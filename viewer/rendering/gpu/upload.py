@@ -54,13 +54,6 @@ def as_uniform(matrix: NDArray[np.floating]) -> bytes:
     return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()
 
 
-def matrix_rows(matrices: Floats) -> bytes:
-    """Return the affine rows of (J, 4, 4) matrices, three texels each, padded to whole rows."""
-    rows = np.zeros((_height(len(matrices), _MATRICES_PER_ROW) * _MATRICES_PER_ROW, 3, 4), "f4")
-    rows[: len(matrices)] = matrices[:, :3, :]
-    return rows.tobytes()
-
-
 def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
     """Return an empty texture for ``count`` joint matrices."""
     size = (3 * _MATRICES_PER_ROW, _height(count, _MATRICES_PER_ROW))
@@ -68,8 +61,13 @@ def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
 
 
 def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
-    """Upload (J, 4, 4) matrices, the only per-frame upload of a posed figure."""
-    texture.write(matrix_rows(matrices))
+    """Upload (J, 4, 4) matrices, the only per-frame upload of a posed figure.
+
+    Their affine rows take three texels each, padded to whole rows of the texture.
+    """
+    rows = np.zeros((_height(len(matrices), _MATRICES_PER_ROW) * _MATRICES_PER_ROW, 3, 4), "f4")
+    rows[: len(matrices)] = matrices[:, :3, :]
+    texture.write(rows.tobytes())
 
 
 def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.gpu.upload import checked
+from viewer.rendering.gpu.upload import as_uniform, checked
 from viewer.rendering.pinhole import frustum_corners, picture_size
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
@@ -65,8 +65,8 @@ class CameraImagePass:
         values |= {
             "u_pixels": (-0.5, -0.5, width - 0.5, height - 0.5),
             "u_size": (width, height),
-            "u_intrinsic": _columns(intrinsic),
-            "u_inverse": _columns(np.linalg.inv(intrinsic)),
+            "u_intrinsic": as_uniform(intrinsic),
+            "u_inverse": as_uniform(np.linalg.inv(intrinsic)),
             "u_lens": np.append(camera.distortion, np.zeros(8))[:8].astype("f4").tobytes(),
             "u_brightness": brightness,
             "u_texture": _UNIT,
@@ -100,8 +100,3 @@ class CameraImagePass:
             texture.release()
         self._textures.clear()
         self._array.release()
-
-
-def _columns(matrix: Floats) -> bytes:
-    """Return a (3, 3) matrix in OpenGL's order, column by column."""
-    return np.ascontiguousarray(matrix.T).astype("f4").tobytes()
