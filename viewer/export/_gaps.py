@@ -12,6 +12,7 @@ from viewer.errors import RigError
 from viewer.export._options import GAPS
 from viewer.phrases import agree, listed
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.motion.evaluation import Frames
 
@@ -22,12 +23,6 @@ _CLOSED = {
     "interpolate": "interpolated, held at both ends",
     "split": "one file for each run of frames",
 }
-
-
-def runs(flags: Bools) -> list[tuple[int, int]]:
-    """Return the runs of True as half-open ranges of indices."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> list[Diagnostic]:
@@ -81,7 +76,7 @@ def _gaps(present: Bools, first_frame: int) -> dict[str, object]:
         Phrase("{frame}", frame=start)
         if stop == start + 1
         else Phrase("{first} to {last}", first=start, last=stop - 1)
-        for start, stop in (np.array(runs(~present)) + first_frame).tolist()
+        for start, stop in (np.array(runs_of(~present)) + first_frame).tolist()
     ]
     n = int((~present).sum())
     return {"n": n, "gaps": listed(found), "noun": agree(n, "frame", "frames")}

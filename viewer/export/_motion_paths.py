@@ -9,10 +9,10 @@ import numpy as np
 
 from viewer.errors import OutputError
 from viewer.export._exporter import Exporter, Part
-from viewer.export._gaps import runs
 from viewer.export._options import ExportOptions
 from viewer.phrases import printable
 from viewer.rig.captures.person import person_name
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.scene import Actor
 
 PERSON = "{person}"
@@ -104,5 +104,5 @@ def part_files(kind: Exporter, part: Part, path: Path, options: ExportOptions) -
         )
     paths = [path]
     if part.content == "frames" and not kind.keeps_gaps and options.closing == "split":
-        paths = split_paths(path, len(runs(part.present)))
+        paths = split_paths(path, len(runs_of(part.present)))
     return [file for each in paths for file in files_at(kind, each)]

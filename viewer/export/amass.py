@@ -29,7 +29,7 @@ from viewer.export._family import (
     read_frames,
     up_axis,
 )
-from viewer.export._gaps import filled, gaps_note, runs
+from viewer.export._gaps import filled, gaps_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
@@ -38,6 +38,7 @@ from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
@@ -97,7 +98,7 @@ def write_layout(
     model = title if title == "SMPL-X" else member.title
     body, notes = family_frames(animation, frames, member, options, model)
     is_split = options.closing == "split" and not present.all()
-    spans = runs(present) if is_split else [(0, len(present))]
+    spans = runs_of(present) if is_split else [(0, len(present))]
     paths = split_paths(path, len(spans))
     up = up_axis(options)
     written = []

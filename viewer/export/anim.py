@@ -10,7 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
-from viewer.export._gaps import filled, gaps_note, runs
+from viewer.export._gaps import filled, gaps_note
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import between_losses
 from viewer.export._losses.lines import frames_losses
@@ -20,6 +20,7 @@ from viewer.export.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.phrases import counted, optional
 from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.clip import Clip, Tangent, evaluate_all, is_course_rig
@@ -90,7 +91,7 @@ def _export_frames(
     whole = filled(frames, options.closing == "interpolate")
     dofs = _dofs(animation, skeleton, whole)
     is_split = options.closing == "split" and not frames.present.all()
-    spans = runs(frames.present) if is_split else [(0, frames.n_frames)]
+    spans = runs_of(frames.present) if is_split else [(0, frames.n_frames)]
     clips, rules = [], []
     for start, stop in spans:
         part = slice(start, stop)

@@ -12,7 +12,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._exporter import SampledParts, Selection
-from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
+from viewer.export._gaps import filled, frames_phrase, gaps_note
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import shape_changes
@@ -26,6 +26,7 @@ from viewer.formats import all_or_none, save_parts
 from viewer.phrases import Remedy, agree, brief, counted, listed, optional
 from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.hierarchy import depth_first
@@ -71,7 +72,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     first, present = writer.first, writer.first.frames.present
     spans = [(0, motion.n_frames)]
     if options.closing == "split" and not present.all():
-        spans = runs(present)
+        spans = runs_of(present)
     paths = split_paths(path, len(spans))
     n_there = [motion.n_frames if present.all() else int(present[slice(*s)].sum()) for s in spans]
     files = [_File(writer, *each) for each in zip(paths, spans, n_there, strict=True)]

@@ -17,7 +17,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Part, Selection
-from viewer.export._gaps import frames_phrase, runs
+from viewer.export._gaps import frames_phrase
 from viewer.export._left_out import motion_notes, other_animations_note, rate_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
@@ -45,6 +45,7 @@ from viewer.phrases import agree, all_of, counted, file_size, listed, optional, 
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.cameras import CameraPath, CameraView
 from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
+from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
 from viewer.rig.motion.transform_clip import TransformClip
@@ -164,7 +165,7 @@ def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagno
     sampled = sampled_of(animation, options)
     present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
     if options.closing == "split" and not present.all():
-        spans = runs(present)
+        spans = runs_of(present)
     paths = split_paths(path, len(spans))
     documents, built = [], []
     for span in spans:
