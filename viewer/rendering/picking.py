@@ -95,7 +95,13 @@ class PickPass:
         self._begin()
         near = replace(view, projection=_window(size, pixel) @ view.projection)
         self._found, self._is_small = [], []
-        self._draw_meshes(scene, near, options)
+        meshes = update_meshes(self._buffers, scene.actors, options)
+        numbers = {id(actor): number for number, actor in enumerate(scene.actors)}
+        for actor, mesh in meshes.singles:
+            self._draw_mesh(numbers[id(actor)], mesh, placement_of(actor, options), near, options)
+        for actors, instances in meshes.instanced:
+            whose_numbers = [numbers[id(actor)] for actor in actors]
+            self._draw_instances(whose_numbers, actors, instances, near, options)
         update_skeletons(self._buffers, scene.actors, options)
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
@@ -128,16 +134,6 @@ class PickPass:
         self._found.append(found)
         self._is_small.append(is_small)
         set_uniforms(program, {"u_item": len(self._found)})
-
-    def _draw_meshes(self, scene: Scene, view: View, options: DisplayOptions) -> None:
-        meshes = update_meshes(self._buffers, scene.actors, options)
-        index = {id(actor): number for number, actor in enumerate(scene.actors)}
-        for actor, mesh in meshes.singles:
-            self._draw_mesh(index[id(actor)], mesh, placement_of(actor, options), view, options)
-        for actors, instances in meshes.instanced:
-            self._draw_instances(
-                [index[id(actor)] for actor in actors], actors, instances, view, options
-            )
 
     def _draw_mesh(
         self, index: int, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
