@@ -107,7 +107,7 @@ HOMES = {
         "rendering/overlay/legend.py",
         "rendering/overlay/typeface.py",
     },
-    "av": {"media/video.py", "media/video_frames.py"},
+    "av": {"media/video.py", "media/video_reading.py"},
     "isal": {"media/png.py"},
     "orjson": {"formats/_text"},
     "rich": {"commands"},

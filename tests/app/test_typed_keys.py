@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
+from viewer.app.native_window import TypedKeys, end_frame, end_frame_before
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.shell import TypedKeys, end_frame, end_frame_before
 
 A, ENTER, BACKSPACE, KEYPAD_1, KEYPAD_ENTER = 65, 257, 259, 321, 335
 LEFT_CTRL = 341

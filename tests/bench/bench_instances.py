@@ -24,8 +24,8 @@ from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.instance_pass import InstanceBuffers
+from viewer.rendering.passes.material_runs import draw_runs
 from viewer.rendering.passes.mesh_pass import set_surface
-from viewer.rendering.passes.runs import draw_runs
 from viewer.rendering.view import View, set_lights, view_of
 from viewer.resources import resource
 from viewer.rig.figure import Figure

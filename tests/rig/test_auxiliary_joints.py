@@ -8,7 +8,7 @@ import pytest
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.single_vertices import vertex_facts
 from viewer.rig.mesh import Mesh
-from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._inputs import Asked
 from viewer.rig.scalars.weights import weight
 from viewer.rig.skeleton import (
     ball_skeleton,

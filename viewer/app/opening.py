@@ -10,7 +10,7 @@ from viewer.phrases import printable
 from viewer.progress import Cancelled
 
 if TYPE_CHECKING:
-    from viewer.app.shell import Shell
+    from viewer.app.native_window import Shell
 
 _PATIENCE = 0.6  # seconds before the window opens; most files take less time to read
 _EVERY = 0.05  # seconds between frames
@@ -53,7 +53,7 @@ def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
     """
     if opening.wait(_PATIENCE):
         return None
-    from viewer.app.shell import Shell
+    from viewer.app.native_window import Shell
     from viewer.interrupts import hold
 
     hold()  # exceptions raised in GLFW's callbacks, such as interrupts, would be lost

@@ -33,9 +33,9 @@ from viewer.app.files.recent import (  # noqa: E402
 )
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.layout import Layout  # noqa: E402
+from viewer.app.native_window import Shell, create_context, create_window  # noqa: E402
 from viewer.app.preferences.applying import start_with  # noqa: E402
 from viewer.app.preferences.preferences import load_preferences  # noqa: E402
-from viewer.app.shell import Shell, create_context, create_window  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.weights_panel import start_heat_map  # noqa: E402

@@ -39,7 +39,7 @@ from viewer.commands._view import (
     warn_of_missing,
 )
 from viewer.formats import free_path, opened_text
-from viewer.media.kept_files import to_stderr
+from viewer.media.state_files import to_stderr
 from viewer.phrases import printable
 from viewer.progress import Cancelled
 from viewer.rendering.camera import Camera

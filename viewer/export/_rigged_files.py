@@ -13,7 +13,7 @@ from viewer.autorig.rigged import Rigged
 from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import UnsupportedFormatError
 from viewer.export import VrmMeta, export, files_written
-from viewer.export._losses.posed import PoseLosses
+from viewer.export._losses.pose_errors import PoseLosses
 from viewer.export.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.phrases import counted

@@ -30,7 +30,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._gaps import kept_gaps
-from viewer.export._losses.posed import PoseLosses
+from viewer.export._losses.pose_errors import PoseLosses
 from viewer.export._options import QUATERNIONS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats._archive.opening import open_archive

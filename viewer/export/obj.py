@@ -16,7 +16,7 @@ from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Selection, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
-from viewer.export._losses.posed import PoseLosses, look_at_mesh
+from viewer.export._losses.pose_errors import PoseLosses, look_at_mesh
 from viewer.export._motion_paths import numbered_paths
 from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, free_path, save_bytes, save_parts

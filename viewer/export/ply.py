@@ -9,7 +9,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Selection, require_mesh
 from viewer.export._left_out import not_held_note, surface_parts
-from viewer.export._losses.posed import mesh_losses
+from viewer.export._losses.pose_errors import mesh_losses
 from viewer.export._options import ExportOptions
 from viewer.formats import Source, save_bytes
 from viewer.phrases import counted, printable

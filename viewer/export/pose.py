@@ -10,7 +10,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._left_out import not_held_note
-from viewer.export._losses.posed import PoseLosses
+from viewer.export._losses.pose_errors import PoseLosses
 from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, write
 from viewer.formats.pose import read

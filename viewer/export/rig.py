@@ -14,7 +14,7 @@ from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._left_out import extra_parts, not_held_note
-from viewer.export._losses.posed import PoseLosses
+from viewer.export._losses.pose_errors import PoseLosses
 from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, free_path, keeping_written, read, write
 from viewer.formats.skel import KEYWORDS

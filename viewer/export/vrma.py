@@ -19,12 +19,12 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note
-from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
+from viewer.export._losses.largest_distances import Apart, Farthest, apart_notes, negligible
 from viewer.export._options import ExportOptions
 from viewer.export.gltf.document import Document, text_of
+from viewer.export.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
 from viewer.export.vrm.humanoid import bone_above, human_bones
-from viewer.export.vrm.made import PRESETS
-from viewer.export.vrm.standing import in_t_pose, standing, unit_rotation, vrm_axes
+from viewer.export.vrm.new_extension import PRESETS
 from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
 from viewer.rig.arrays import Floats

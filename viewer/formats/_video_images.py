@@ -6,7 +6,7 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
-from viewer.media.video_frames import VideoFrames
+from viewer.media.video_reading import VideoFrames
 from viewer.rig.captures.cameras import CameraImage
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from viewer.errors import FormatError, ViewerError
 from viewer.media.image import decode_picture, is_picture
-from viewer.media.video_frames import VideoFrames
 from viewer.media.video_kinds import VIDEOS
+from viewer.media.video_reading import VideoFrames
 from viewer.rig.arrays import Bytes
 
 _QUALITY = 82  # JPEG quality

@@ -30,7 +30,7 @@ def _settings_file() -> Path:
 
 def load_model_folder() -> Path | None:
     """Return the folder in use, else the remembered one; None if there is none or it is damaged."""
-    from viewer.media.kept_files import load_kept
+    from viewer.media.state_files import load_kept
 
     if _in_use is not None:
         return _in_use
@@ -39,7 +39,7 @@ def load_model_folder() -> Path | None:
 
 
 def _folder_in(data: bytes) -> Path | None:
-    from viewer.media.kept_files import as_json
+    from viewer.media.state_files import as_json
 
     found = as_json(data)
     if not isinstance(found, dict) or not isinstance(found.get("folder"), str):

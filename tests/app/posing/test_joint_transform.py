@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from viewer.app.posing.joint_fields import moved_joints
+from viewer.app.posing.joint_transform import moved_joints
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 
 

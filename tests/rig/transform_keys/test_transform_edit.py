@@ -21,7 +21,7 @@ from viewer.rig.transform_keys.edit import (
     value_at,
     with_interpolation,
 )
-from viewer.rig.transform_keys.rows import row_values, rows_of
+from viewer.rig.transform_keys.euler_curves import row_values, rows_of
 
 SKELETON = leg().require_skeleton()
 GAP = 1e-3

@@ -18,7 +18,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton, joint_labels, shown_joints
-from viewer.rig.transform_keys.rows import rows_of
+from viewer.rig.transform_keys.euler_curves import rows_of
 
 _AXES = "xyz"
 _PREFIXES = {"translation": "t", "rotation": "", "scale": "s"}

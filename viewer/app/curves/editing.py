@@ -49,7 +49,7 @@ from viewer.rig.transform_keys.edit import (
     set_transform_key,
     set_transform_slope,
 )
-from viewer.rig.transform_keys.rows import TransformRow, key_values, row_values, rows_of
+from viewer.rig.transform_keys.euler_curves import TransformRow, key_values, row_values, rows_of
 
 _GAP = 1e-3  # minimum distance between dragged keys, seconds
 KeyPlace = tuple[int, int]

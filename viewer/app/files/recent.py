@@ -10,7 +10,7 @@ from typing import Any
 
 import platformdirs
 
-from viewer.media.kept_files import (
+from viewer.media.state_files import (
     as_json,
     checked,
     has_checksum,

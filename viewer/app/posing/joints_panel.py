@@ -25,7 +25,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.curves.editing import Curves
 from viewer.app.files.files import offer_files
-from viewer.app.posing.joint_fields import (
+from viewer.app.posing.joint_transform import (
     draw_own_numbers,
     draw_scale,
     draw_translation,

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import platformdirs
 
 from viewer.data_classes import dataclass
-from viewer.media.kept_files import as_json, load_kept, save_kept, to_stderr
+from viewer.media.state_files import as_json, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES
 

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
-from viewer.export._losses.lines import PartLosses
-from viewer.export._losses.skinned import (
+from viewer.export._losses.motion_errors import PartLosses
+from viewer.export._losses.posed_bodies import (
     Poses,
     Side,
     anchored,

@@ -15,8 +15,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.apart import negligible
-from viewer.export._losses.skinned import Side, vertices
+from viewer.export._losses.largest_distances import negligible
+from viewer.export._losses.posed_bodies import Side, vertices
 from viewer.export.gltf.body import Body, Built, add_body, body_of
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.gltf.keyed import Clips, first_time

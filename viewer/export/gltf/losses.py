@@ -11,9 +11,15 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._left_out import extra_parts, not_held_note
-from viewer.export._losses.apart import apart, apart_notes, extent_of, negligible, with_values
-from viewer.export._losses.posed import requested_causes
-from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figure_side
+from viewer.export._losses.largest_distances import (
+    apart,
+    apart_notes,
+    extent_of,
+    negligible,
+    with_values,
+)
+from viewer.export._losses.pose_errors import requested_causes
+from viewer.export._losses.posed_bodies import Rows, Side, body_rows, changing, figure_side
 from viewer.export.gltf.nodes import Tree
 from viewer.export.gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
 from viewer.export.gltf.skin import PER_SET, Influences, Shape

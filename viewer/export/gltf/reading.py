@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.export._losses.skinned import Body, Poses, Rows, Side
+from viewer.export._losses.posed_bodies import Body, Poses, Rows, Side
 from viewer.export.gltf.mesh import Part
 from viewer.export.gltf.nodes import Tree
 from viewer.formats import Source

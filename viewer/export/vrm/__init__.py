@@ -23,12 +23,12 @@ from viewer.export._exporter import Part, Selection
 from viewer.export._options import ExportOptions, VrmMeta
 from viewer.export.gltf.body import Body, Built
 from viewer.export.gltf.document import Document, text_of
+from viewer.export.vrm.canonical_pose import in_t_pose, standing
 from viewer.export.vrm.humanoid import human_bones
-from viewer.export.vrm.kept import Maps, kept_modern, kept_old, kept_toon
-from viewer.export.vrm.made import made_character
+from viewer.export.vrm.kept_extensions import Maps, kept_modern, kept_old, kept_toon
 from viewer.export.vrm.meta import LICENCE, changed_meta, checked_meta
-from viewer.export.vrm.standing import in_t_pose, standing
-from viewer.export.vrm.upgraded import upgraded
+from viewer.export.vrm.new_extension import made_character
+from viewer.export.vrm.upgrade import upgraded
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
 from viewer.formats._vrm.parts import list_in, part, value_of

@@ -31,6 +31,7 @@ from viewer.rendering.gpu.upload import (
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.material_runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.mesh_pass import (
     SKIN_COLOR,
     fragment_macros,
@@ -38,7 +39,6 @@ from viewer.rendering.passes.mesh_pass import (
     set_surface,
     shading_of,
 )
-from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure

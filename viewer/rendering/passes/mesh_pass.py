@@ -19,7 +19,7 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS, Surface
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.runs import Prepare, SortedTriangles, draw_runs, draw_shapes
+from viewer.rendering.passes.material_runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.material import TEXTURES, Outline

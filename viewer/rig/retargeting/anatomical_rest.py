@@ -26,7 +26,7 @@ from viewer.rig.geometry.rotation import (
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.retargeting.rest_poses import shortest_arc
+from viewer.rig.retargeting.rest_alignment import shortest_arc
 from viewer.rig.skeleton import Skeleton
 
 _TRUNK = ("pelvis", "spine", "neck", "head", "collar")

@@ -16,7 +16,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.feet import feet_notes, plant_feet
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
-from viewer.rig.retargeting.rest_poses import rest_of, up_rotation
+from viewer.rig.retargeting.rest_alignment import rest_of, up_rotation
 from viewer.rig.retargeting.retarget import retargeted
 from viewer.rig.retargeting.source_rest import with_source_rest, with_upright_rest
 

@@ -23,7 +23,7 @@ from viewer.rig.feet.planting import STEPS, PlantedFeet, plant
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.retargeting.rest_poses import rest_of
+from viewer.rig.retargeting.rest_alignment import rest_of
 from viewer.rig.retargeting.retarget import Retargeted
 from viewer.rig.scalars import length_text
 

@@ -33,7 +33,7 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.joint_names import joint_meanings
-from viewer.rig.retargeting.rest_poses import (
+from viewer.rig.retargeting.rest_alignment import (
     RestPose,
     alignment,
     is_same_rest,

@@ -20,7 +20,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose
-from viewer.rig.scalars._asked import Asked, field_of, influences_kept
+from viewer.rig.scalars._inputs import Asked, field_of, influences_kept
 from viewer.rig.skeleton import find_joint, joint_label, joint_labels
 from viewer.rig.skinning import METHODS, PURE, Skinning
 from viewer.rig.units import METRES

@@ -7,7 +7,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
-from viewer.rig.scalars._asked import Asked, field_of
+from viewer.rig.scalars._inputs import Asked, field_of
 
 
 def parts(asked: Asked) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.mirror import mirror_axis
-from viewer.rig.scalars._asked import Asked, influences_kept
+from viewer.rig.scalars._inputs import Asked, influences_kept
 from viewer.rig.skinning import PURE, Skinning, deform
 
 

@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, box_size, triangle_areas
-from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._inputs import Asked
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 

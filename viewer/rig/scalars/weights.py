@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.scalars._asked import Asked
+from viewer.rig.scalars._inputs import Asked
 from viewer.rig.skin import (
     has_influence,
     limit_influences,

@@ -29,7 +29,7 @@ from viewer.rig.motion.transform_clip import (
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.transform_keys.rows import TransformRow, angles_of, from_angles, rows_of
+from viewer.rig.transform_keys.euler_curves import TransformRow, angles_of, from_angles, rows_of
 
 _Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""

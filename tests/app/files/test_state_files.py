@@ -24,7 +24,7 @@ from viewer.app.preferences.preferences import (
     preferences_file,
     save_preferences,
 )
-from viewer.media.kept_files import checked
+from viewer.media.state_files import checked
 
 # As ImGui writes it; the ids of docks must fit together.
 LAYOUT = """\

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from viewer.export._losses.apart import apart
-from viewer.export._losses.skinned import Body, Poses, Side, poses_of
+from viewer.export._losses.largest_distances import apart
+from viewer.export._losses.posed_bodies import Body, Poses, Side, poses_of
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.skin import skin_from_entries
 

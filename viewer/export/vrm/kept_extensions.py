@@ -20,6 +20,7 @@ _BINDS = {
     "materialColorBinds": ("material", "material-binds"),
     "textureTransformBinds": ("material", "material-binds"),
 }
+
 # Material of version 0.x that is drawn as glTF describes it
 _PLAIN = {
     "shader": "VRM_USE_GLTFSHADER",

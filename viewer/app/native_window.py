@@ -43,6 +43,7 @@ _KEYPAD = (*range(320, 335), 336)  # digits and operators, without Enter
 _RELEASE, _PRESS = 0, 1
 _CTRL, _ALT, _SUPER = 0x2, 0x4, 0x8
 _MODIFIERS = range(340, 348)  # GLFW's keys from left Shift to right Super
+
 # No keyboard has this key. ImGui ends a frame's events at the second event of the same key.
 _SEPARATOR = imgui.Key.gamepad_back
 

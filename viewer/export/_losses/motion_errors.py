@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.export._losses.apart import (
+from viewer.export._losses.largest_distances import (
     Apart,
     Farthest,
     apart,
@@ -18,7 +18,7 @@ from viewer.export._losses.apart import (
     sampling,
     tolerance,
 )
-from viewer.export._losses.skinned import Side, changing, figure_side, linear_as_opened
+from viewer.export._losses.posed_bodies import Side, changing, figure_side, linear_as_opened
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between

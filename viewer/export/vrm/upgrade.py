@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from viewer.export.vrm.canonical_pose import facing_front
 from viewer.export.vrm.meta import LICENCE
-from viewer.export.vrm.standing import facing_front
 from viewer.formats._vrm.bones import modern_bone
 from viewer.formats._vrm.materials import modern_toon, old_binds
 from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
@@ -35,6 +35,7 @@ _VIEWS["firstpersononly"] = "firstPersonOnly"
 _RANGES = ("HorizontalInner", "HorizontalOuter", "VerticalDown", "VerticalUp")
 _STRAIGHT = [0, 0, 0, 1, 1, 1, 1, 0]  # time, value and two slopes of the first and last key
 _SAME = 1e-6
+
 # Meta data
 _USERS = {
     "OnlyAuthor": "onlyAuthor",
@@ -53,10 +54,13 @@ _LICENCES = {
         for name in ("BY", "BY_NC", "BY_SA", "BY_NC_SA", "BY_ND", "BY_NC_ND")
     },
 }
+
 # Expressions
 _PERCENT = 100.0
+
 # Springs
 _DOWN = {"x": 0.0, "y": -1.0, "z": 0.0}
+
 # Materials
 _TOON, _UNLIT = "VRMC_materials_mtoon", "KHR_materials_unlit"
 _BLENDS, _WRITES_DEPTH = (2, 3), 3  # _BlendMode

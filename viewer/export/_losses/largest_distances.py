@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.skinned import Rows, Side, body_rows, vertices
+from viewer.export._losses.posed_bodies import Rows, Side, body_rows, vertices
 from viewer.phrases import Shown, brief, optional
 from viewer.progress import report
 from viewer.rig.arrays import Floats

@@ -14,7 +14,6 @@ from viewer.media.saving import save_bytes
 from viewer.phrases import printable
 
 Content = TypeVar("Content")
-
 _LARGEST = 1 << 22  # bytes; all kept files are far smaller
 _MARK = b"; viewer "
 

@@ -8,9 +8,9 @@ from media.small_videos import write
 from PIL import Image
 
 from viewer.errors import FormatError
-from viewer.media import video_frames
+from viewer.media import video_reading
 from viewer.media.video import VideoSink
-from viewer.media.video_frames import VideoFrames
+from viewer.media.video_reading import VideoFrames
 
 pytest.importorskip("av")
 
@@ -40,15 +40,15 @@ def test_properties_are_known_without_decoding(path):
 @pytest.mark.parametrize("keeps_all", [True, False])
 def test_frames_are_exact_in_any_order(path, keeps_all, monkeypatch):
     if not keeps_all:  # every step back is a seek
-        monkeypatch.setattr(video_frames, "_BYTES", 0)
-        monkeypatch.setattr(video_frames, "_AHEAD", 0.2)
+        monkeypatch.setattr(video_reading, "_BYTES", 0)
+        monkeypatch.setattr(video_reading, "_AHEAD", 0.2)
     video = VideoFrames(path)
     order = [0, 1, 2, 3, 3, 10, 9, 8, 59, 0, 40, 41, 39, 58, 59, 12]
     assert [number(video.at(n / RATE)) for n in order] == order
 
 
 def test_number_of_cached_frames_is_bounded(path, monkeypatch):
-    monkeypatch.setattr(video_frames, "_BYTES", 10 * 2 * SIZE[0] * SIZE[1])
+    monkeypatch.setattr(video_reading, "_BYTES", 10 * 2 * SIZE[0] * SIZE[1])
     video = VideoFrames(path)
     for n in range(COUNT):
         video.at(n / RATE)

@@ -8,7 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible, with_values
+from viewer.export._losses.largest_distances import (
+    Apart,
+    Farthest,
+    apart_notes,
+    negligible,
+    with_values,
+)
 from viewer.formats import Source, read
 from viewer.phrases import agree, counted, optional
 from viewer.rig.arrays import Floats, Ints

@@ -14,15 +14,15 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export._losses.apart import REGULAR, evenly, followed_vertices, heights, with_values
-from viewer.export._losses.lines import frames_losses
-from viewer.export._losses.skinned import (
-    Rows,
-    Side,
-    changing,
-    figure_side,
-    linear_as_opened,
+from viewer.export._losses.largest_distances import (
+    REGULAR,
+    evenly,
+    followed_vertices,
+    heights,
+    with_values,
 )
+from viewer.export._losses.motion_errors import frames_losses
+from viewer.export._losses.posed_bodies import Rows, Side, changing, figure_side, linear_as_opened
 from viewer.phrases import Shown, counted, optional
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -35,6 +35,7 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skinning import Skinning
 
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
+
 # Search for the times of the largest errors
 _MOST = 8192  # total number of samples before refinement
 _STEPS = 16  # maximum number of samples between two keys or frames
