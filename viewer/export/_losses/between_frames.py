@@ -46,8 +46,9 @@ _SHORT = 1e-6  # spans shorter than this, in frames, are ignored
 _BLOCK = 1024  # poses per block
 _PEAKS = 64  # maximum number of refined peaks
 _HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
-_PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
-_ROUNDS = 4  # number of rounds of refinement
+# Each round divides the interval around a peak and keeps two parts, so that four rounds narrow it
+# by 4^4 = 256.
+_PARTS, _ROUNDS = 8, 4
 _Sampler = Callable[[Floats], Frames]
 
 
