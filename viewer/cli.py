@@ -38,7 +38,7 @@ def run(arguments: Sequence[str]) -> int:
     Signals end the command as they would end the program; afterwards, the caller's handlers are
     restored.
 
-    ``arguments``: arguments without the program's name. Returns exit code: 0, the code of the
+    ``arguments``: arguments without the program's name. Returns the exit code: 0, the code of the
     ``ViewerError``, or 128 plus the signal number.
     """
     try:

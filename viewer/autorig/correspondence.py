@@ -135,8 +135,8 @@ def sheet_normals(mesh: Welded) -> Floats:
 def match(template: Template, target: Welded, size: float, settings: MatchSettings) -> Matches:
     """Match the vertices of a target that lie on the template.
 
-    ``template``: positions in the target's space. Returns vertices without a normal are judged by
-    distance alone.
+    ``template``: positions in the target's space. Vertices without a normal are judged by distance
+    alone.
     """
     points = _closest(template, target)
     normals = sheet_normals(target)

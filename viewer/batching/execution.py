@@ -55,9 +55,9 @@ def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
     """Run one item; a failure becomes a result, and only a signal is raised.
 
     ``call``: called with the item. An int that it returns is the exit code, where 0 and 1 stand for
-    success; a dict is the values of the result; anything else is ignored. Returns with captured
-    text, recorded diagnostics, values and outputs. Raises ``Interrupted`` if a signal arrives whose
-    handling is not deferred.
+    success; a dict is the values of the result; anything else is ignored. The result has the
+    captured text, recorded diagnostics, values and outputs. Raises ``Interrupted`` if a signal
+    arrives whose handling is not deferred.
     """
     out, err = io.StringIO(), io.StringIO()
     start = time.perf_counter()

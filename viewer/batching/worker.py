@@ -17,7 +17,7 @@ def name_worker(name: object) -> None:
 def worker_rank() -> int | None:
     """Return the rank of this worker, which determines its graphics card.
 
-    Returns none in the process that runs the batch. Replacement workers get new ranks.
+    The result is None in the process that runs the batch. Replacement workers get new ranks.
     """
     if not _name and multiprocessing.parent_process() is None:
         return None

@@ -288,8 +288,8 @@ def _joined(alike: list[Diagnostic]) -> Diagnostic:
 def described(found: Diagnostic) -> dict[str, Any]:
     """Return all data of a diagnostic, worded as for the command line.
 
-    Returns code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
-    returned by ``plain``, the first 100 indices, and the number of indices.
+    Returns the code, key, severity, message, file, line (or None), JSON pointer, part, count,
+    values as returned by ``plain``, the first 100 indices, and the number of indices.
     """
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     with as_data():

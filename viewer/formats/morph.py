@@ -40,9 +40,9 @@ class _Section:
 def read(source: Source) -> MorphTarget:
     """Read a target.
 
-    Returns target named after the file, with vertices in ascending order. Raises ``FormatError`` if
-    the text violates the grammar, or the sections list different vertices; the error has the file
-    and line.
+    Returns a target named after the file, with vertices in ascending order. Raises ``FormatError``
+    if the text violates the grammar, or the sections list different vertices; the error has the
+    file and line.
     """
     sections: dict[bytes, _Section] = {}
     position = 0

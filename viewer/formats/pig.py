@@ -161,9 +161,9 @@ class _PigFiles:
 def read(source: Source) -> Figure:
     """Read the model.
 
-    ``source``: the folder, pickle or ``.npz``; recoverable errors are added to its warnings.
-    Returns figure with z up, in metres. Raises ``FormatError`` if the model is invalid or a
-    required array is missing; the error has the file, and the line in text files.
+    ``source``: the folder, pickle or ``.npz``; recoverable errors are added to its warnings. The
+    figure has z up and is in metres. Raises ``FormatError`` if the model is invalid or a required
+    array is missing; the error has the file, and the line in text files.
     """
     files = _from_folder(source) if source.is_folder else _from_archive(source)
     parts = files.parts

@@ -83,7 +83,7 @@ _RECORDS = "material_records"
 def read(source: Source) -> Figure:
     """Read a rigged mesh.
 
-    Returns figure with mesh, skeleton and skin; correctives are read on first use. Raises
+    Returns a figure with mesh, skeleton and skin; correctives are read on first use. Raises
     ``FormatError`` if an array is missing or has the wrong shape, or the parts do not match each
     other.
     """

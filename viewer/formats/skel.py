@@ -62,7 +62,7 @@ class _Joint:
 def read(source: Source) -> Figure:
     """Read a skeleton.
 
-    Returns figure without mesh; DOFs are clamped to their limits. Raises ``FormatError`` if the
+    Returns a figure without mesh; DOFs are clamped to their limits. Raises ``FormatError`` if the
     text violates the grammar; the error has the file and line.
     """
     joints = _Parser(source).joints()
@@ -358,8 +358,8 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     """Write a figure's skeleton.
 
     ``figure``: figure with a skeleton in depth-first order, with rotation DOFs and without rest
-    rotations. ``path``: file, replaced only when the whole text has been written. Returns empty:
-    the format stores every property of a skeleton that it accepts. Raises
+    rotations. ``path``: file, replaced only when the whole text has been written. The result is
+    empty: the format stores every property of a skeleton that it accepts. Raises
     ``UnsupportedFormatError`` if the format cannot store the skeleton. Raises ``OutputError`` if
     the file cannot be written.
     """

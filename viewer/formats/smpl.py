@@ -75,8 +75,8 @@ _STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STA
 def read(source: Source) -> Figure:
     """Read a body model.
 
-    Returns figure with mesh, skeleton and skin; blend shapes and correctives are read on first use.
-    Raises ``FormatError`` if an array is missing, or has a wrong shape or invalid values.
+    Returns a figure with mesh, skeleton and skin; blend shapes and correctives are read on first
+    use. Raises ``FormatError`` if an array is missing, or has a wrong shape or invalid values.
     """
     archive = archive_of(source)
     missing = [key for key in KEYS if not archive.has(key)]

@@ -191,7 +191,7 @@ def _open(data: bytes) -> Image.Image:
 def save_image(path: Path, pixels: Bytes) -> int:
     """Write an image in the format of its suffix, PNG if there is no suffix.
 
-    ``pixels``: (H, W, 4) uint8, first row at the top. Returns number of bytes. Raises
+    ``pixels``: (H, W, 4) uint8, first row at the top. Returns the number of bytes. Raises
     ``OutputError`` if it cannot be written.
     """
     from viewer.media.saving import save_bytes

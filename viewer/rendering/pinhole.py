@@ -93,7 +93,7 @@ def distortion_error(view: CameraView) -> float:
     p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged.
 
     ``view``: camera with coefficients k1 k2 p1 p2 k3 k4 k5 k6, of which trailing ones may be
-    missing; the thin prism coefficients after them are ignored. Returns pixels; 0 without
+    missing; the thin prism coefficients after them are ignored. The result is in pixels; 0 without
     distortion. Raises ``RigError``: see ``picture_size``.
     """
     k1, k2, p1, p2, k3, k4, k5, k6 = np.append(view.distortion, np.zeros(8))[:8]

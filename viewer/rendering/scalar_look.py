@@ -85,7 +85,7 @@ def shown_ends(
     """Return the common range of the colour map for all figures.
 
     ``figure``: defines the unit of a requested range. ``options``: display options with the
-    requested range, if any. Returns ends in the unit of the values.
+    requested range, if any. Returns the ends, in the unit of the values.
     """
     requested = options.scalar_range
     if requested is not None and not is_whole(name):

@@ -55,7 +55,7 @@ def _part(figure: Figure) -> tuple[Figure, Keypoints]:
 def some_vertices(figure: Figure, vertices: Ints) -> Figure:
     """Return a figure with a few vertices and no triangles that deforms like the whole figure.
 
-    ``vertices``: (N,), their indices. Returns figure without a joint regressor, so its joints do
+    ``vertices``: (N,), their indices. Returns a figure without a joint regressor, so its joints do
     not follow its shape.
     """
     mesh = figure.require_mesh()

@@ -100,7 +100,7 @@ def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
 
     The pose stores the result, so forward kinematics runs once per frame for all passes and panels.
 
-    ``pose``: DOFs in lengths and radians. Returns read-only matrices.
+    ``pose``: DOFs in lengths and radians. The matrices are read-only.
     """
     known, key = pose.posed, pose.skinning_key
     if known is None or known.skeleton is not skeleton or known.key is not key:
@@ -148,8 +148,8 @@ def are_alike(lowest: Floats, highest: Floats) -> Bools:
 def is_rigid(palette: Floats) -> Bools:
     """Return whether all joints only rotate and translate, up to one common uniform scale.
 
-    ``palette``: (..., J, 4, 4), skinning matrices. Returns true if every 3 x 3 part A satisfies A^T
-    A = s^2 I with one common s, and det A > 0.
+    ``palette``: (..., J, 4, 4), skinning matrices. The result is true if every 3 x 3 part A
+    satisfies A^T A = s^2 I with one common s, and det A > 0.
 
     >>> palette = np.stack([np.eye(4)] * 2)
     >>> bool(is_rigid(palette)), bool(is_rigid(palette * np.array([2.0, 1.0, 1.0, 1.0])))

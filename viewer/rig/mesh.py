@@ -203,7 +203,7 @@ def volume(positions: Floats, triangles: Ints) -> float:
     """Return the volume that a closed mesh encloses: sum a . (b x c) / 6 (divergence theorem).
 
     ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices, counter-clockwise
-    from outside. Returns cubed units; negative if the triangles are clockwise.
+    from outside. The result is in cubed units; negative if the triangles are clockwise.
 
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)

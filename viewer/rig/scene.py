@@ -305,7 +305,7 @@ def scene_unit(scene: Scene) -> str:
     A scale that converts the figure's unit into another one, such as a placement's scale, is taken
     into account; any other scale of a pose is assumed to be the user's choice.
 
-    Returns key of ``viewer.rig.units.METRES``; empty if no unit is known.
+    Returns a key of ``viewer.rig.units.METRES``; empty if no unit is known.
     """
     from viewer.rig.units import METRES
 

@@ -145,7 +145,7 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
     """Return a skeleton of unlimited ball joints without rest rotations.
 
     ``parents``: (J,), -1 for the root; parents come before their children. ``joints``: (J, 3), rest
-    positions, figure units. Returns skeleton with three rotation DOFs for every joint, about x, y
+    positions, figure units. Returns a skeleton with three rotation DOFs for every joint, about x, y
     and z.
     """
     count = len(parents)
@@ -229,7 +229,7 @@ def shown_parents(skeleton: Skeleton) -> Ints:
 def dof_label(skeleton: Skeleton, dof: int) -> str:
     """Return the label of a DOF, as on the command line: ``"knee.x"``, ``"root.ty"``.
 
-    Returns joint label, a dot, and the kind from ``DOF_KINDS``.
+    Returns the joint label, a dot, and the kind from ``DOF_KINDS``.
     """
     return f"{joint_label(skeleton, skeleton.dof_joints[dof])}.{DOF_KINDS[skeleton.dof_kinds[dof]]}"
 

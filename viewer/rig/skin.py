@@ -190,7 +190,7 @@ def strongest_first(skin: Skin) -> Skin:
 def limit_influences(skin: Skin, count: int) -> Skin:
     """Prune the influences of each vertex, as an engine limited to ``count`` influences does.
 
-    Returns influences of the same joint are merged, then pruned, then scaled to a sum of 1.
+    Influences of the same joint are merged, then pruned, then scaled to a sum of 1.
     """
     ordered = strongest_first(merged(skin))
     rank = np.arange(len(ordered.joints)) - np.repeat(

@@ -34,8 +34,8 @@ def is_metres(size: float) -> bool:
 def unit_of_scaled(unit: str, scale: float) -> str:
     """Return the unit of a figure from the unit of a similar figure and the ratio of their sizes.
 
-    ``scale``: the figure's length over the other's, each in its own unit. Returns unit; empty if
-    the other unit is unknown, or no unit results in similar sizes.
+    ``scale``: the figure's length over the other's, each in its own unit. Returns the unit; empty
+    if the other unit is unknown, or no unit results in similar sizes.
 
     >>> unit_of_scaled("m", 1.04), unit_of_scaled("m", 950.0), unit_of_scaled("m", 7.0)
     ('m', 'mm', '')

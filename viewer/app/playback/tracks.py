@@ -138,7 +138,7 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     """Return the intervals in which a motion's actor is present.
 
     ``shortest``: gaps shorter than this, in seconds, are ignored, because they would be invisible.
-    Returns start and end times in the clip's own time, seconds.
+    Returns the start and end times in the clip's own time, seconds.
     """
     timing = clip.timing
     if timing is None:

@@ -74,7 +74,7 @@ def label_of(shortcut: Shortcut, keys: Mapping[str, str]) -> str:
 def conflicts(table: Sequence[Shortcut], keys: Mapping[str, str]) -> dict[str, str]:
     """Return the actions whose key also runs another action.
 
-    ``keys``: changed keys, as in ``Preferences.keys``. Returns maps the name of an action to the
+    ``keys``: changed keys, as in ``Preferences.keys``. The result maps the name of an action to the
     text of another action with the same key.
     """
     users: dict[int, list[Shortcut]] = {}

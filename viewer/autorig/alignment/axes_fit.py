@@ -27,7 +27,7 @@ def fit_axes(
 
     ``template``, ``target``, ``rounds``: as for ``slide``. ``rotations``: whether the rotation is
     also refined: a rotation found with a single scale is biased towards the stretched target's
-    diagonal. Returns alignment with factors; the best one so far if the next fit would be a
+    diagonal. Returns an alignment with factors; the best one so far if the next fit would be a
     reflection or too few pairs are left.
     """
     similarity, scales = start, np.full(3, start.scale)

@@ -55,7 +55,7 @@ def axis_rotations(
 
     ``template_up``: either "y" or "z", up axis of the template. Y-up figures face +z, z-up figures
     +x. ``up``, ``facing``: axes, from ``AXES``, to which the template's up and forward axes are
-    mapped. Returns list of (3, 3), proper rotations. Raises ``RigError`` if up and facing are the
+    mapped. Returns a list of (3, 3), proper rotations. Raises ``RigError`` if up and facing are the
     same or opposite.
     """
     for name in filter(None, (up, facing)):

@@ -273,8 +273,8 @@ def solve_step(
 
     ``parents``: (J,), -1 for roots. ``rotated``: (J, 3), sum of the rotations of previous
     iterations, radians. ``grown``: (2, J), sum of the limbs' growths in previous iterations.
-    Returns step in which no joint rotates by more than 0.3 radians and nothing grows by more than a
-    fifth.
+    Returns a step in which no joint rotates by more than 0.3 radians and nothing grows by more than
+    a fifth.
     """
     middle = aligned.positions[pairs.vertices].mean(axis=0)
     frame = _Frame(middle, size, aligned, limbs, parents)

@@ -98,8 +98,8 @@ def align_posed(
 
     ``pose``: pose of the template, without shape weights. ``settings``: known facts about the
     alignment. With a separate scale per axis, nothing is fitted; with a known scale, only the pose
-    is fitted. Returns alignment of the unchanged template, unless a fitted template is much better.
-    Raises ``RigError``: see ``align``.
+    is fitted. Returns an alignment of the unchanged template, unless a fitted template is much
+    better. Raises ``RigError``: see ``align``.
     """
     posed = deform(template, pose)[0]
     ours = Posed(posed, template.require_mesh().triangles)

@@ -70,8 +70,8 @@ def limbs_of(figure: Figure) -> Limbs:
 def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
     """Return a figure with scaled limbs: mesh, bind pose and rest skeleton.
 
-    ``lengths``, ``girths``: (J,), factors along and across the limbs. Returns figure with the same
-    joints and weights; all other vertex data is unchanged.
+    ``lengths``, ``girths``: (J,), factors along and across the limbs. Returns a figure with the
+    same joints and weights; all other vertex data is unchanged.
     """
     mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(

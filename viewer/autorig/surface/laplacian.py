@@ -48,8 +48,8 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     vertices, and the contribution of each triangle stays positive semidefinite, which clamping
     large cotangents would not ensure.
 
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns sparse (V, V),
-    dimensionless, with the opposite sign of the Laplacian in calculus.
+    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns a sparse (V, V)
+    matrix, dimensionless, with the opposite sign of the Laplacian in calculus.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     >>> L = cotangent_laplacian(square, np.array([[0, 1, 2], [0, 2, 3]]))
@@ -65,7 +65,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
 def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
     """Return the Laplacian of the graph of edges: L_ij = -1, L_ii = number of neighbours.
 
-    ``triangles``: (T, 3), vertex indices. Returns sparse (V, V), dimensionless.
+    ``triangles``: (T, 3), vertex indices. Returns a sparse (V, V) matrix, dimensionless.
     """
     links = edges(triangles)
     return _from_edges(n_vertices, links, np.ones(len(links)))

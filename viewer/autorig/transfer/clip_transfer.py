@@ -27,7 +27,7 @@ def transfer_clip(
 
     ``length_scale``: target units per unit of the template's figure space, 1 if nothing was scaled.
     ``path_scale``: replaces ``length_scale`` for the figure's translation and its roots, which
-    scale with the length of the legs; None for the same factor. Returns clip with the same type,
+    scale with the length of the legs; None for the same factor. Returns a clip with the same type,
     name and timing. Shape weights of captures are dropped, as the target has a different shape.
     Raises ``RigError`` if the clip has a different number of joints, or moves a DOF that does not
     exist.

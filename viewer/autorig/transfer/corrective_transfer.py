@@ -31,7 +31,7 @@ def transfer_correctives(
 
     ``triangles``: (T, 3), triangles of the template. ``matched``: (V,) bool, vertices that lie on
     the template. ``positions``: (V, 3), the target's vertices. ``target_triangles``: (F, 3).
-    ``scale``: target units per template unit. Returns none if the result would have more than
+    ``scale``: target units per template unit. The result is None if the result would have more than
     ``MOST_NUMBERS`` values.
     """
     offsets = correctives.values()

@@ -94,7 +94,7 @@ def transfer_joints(
     ``joints``: (J, 3), joint positions, posed and aligned with the target. ``parents``: (J,), -1
     for roots; parents come first. ``regressor``: the model's own regressor, or
     ``boundary_weights``. ``shifts``: (V, 3), from ``surface_shifts``. ``matched``: (V,) bool,
-    whether each shift is reliable. Returns in the unit of ``joints``.
+    whether each shift is reliable. The result is in the unit of ``joints``.
     """
     rows, columns, weights = regressor.joints, regressor.vertices, regressor.weights
     count = len(joints)

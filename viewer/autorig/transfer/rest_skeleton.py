@@ -63,7 +63,7 @@ def fit_rest_skeleton(
     joints that were measured on the target. A symmetric template then gives a symmetric skeleton:
     left and right offsets are averaged, or taken from the measured side. None keeps the joints
     unchanged. ``original``: the template's skeleton before its limbs were scaled; None if they were
-    not. Returns skeleton with lengths in the target's unit.
+    not. Returns a skeleton with lengths in the target's unit.
     """
     skeleton, skin = template.require_skeleton(), template.require_skin()
     scale = similarity.scale * pose.figure_scale

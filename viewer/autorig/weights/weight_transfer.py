@@ -92,7 +92,7 @@ def transferred_weights(
     """Transfer weights by closest points, and inpaint vertices that do not meet the template.
 
     ``positions``: (V, 3), the target's vertices. ``triangles``: (T, 3), triangles of the target.
-    Returns weights whose rows sum to 1. No weight of the template is dropped, only inpainted
+    The weights have rows that sum to 1. No weight of the template is dropped, only inpainted
     weights below 1e-6, and those of corners with a barycentric coordinate below 1e-6. Raises
     ``RigError`` if no vertex of the target meets the template, the target is a point, weights of
     the template are missing, or SciPy is missing.
@@ -354,8 +354,8 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) 
 
     ``weights``: sparse (W, J) in rows, rows that sum to 1 keep that sum. ``triangles``: (F, 3),
     vertex indices; their edges define neighbours. ``active``: (W,) bool, vertices that change; the
-    others are only read. Returns sparse (W, J) in rows, new weights below 1e-6 are dropped, and
-    rows rescaled to their previous sum.
+    others are only read. Returns a sparse (W, J) matrix; in changed rows, new weights below 1e-6
+    are dropped, and rows rescaled to their previous sum.
     """
     from scipy import sparse
 

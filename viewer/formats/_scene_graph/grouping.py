@@ -49,7 +49,7 @@ def group_nodes(file: NodeFile) -> list[Members]:
     joint; the others form one figure per root tree, or a single figure if the file has no skins.
     A file without meshes and skins is one figure of its animated nodes, or of all its nodes.
 
-    Returns empty if there is nothing to show.
+    The result is empty if there is nothing to show.
     """
     return _Grouping(file).result()
 

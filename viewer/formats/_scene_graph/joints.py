@@ -127,7 +127,7 @@ def skeleton_of(
 
     ``humanoid``: node of each human bone; nodes that are not joints of this figure are ignored.
     ``constraints``: constraints between nodes; constraints of other figures are ignored.
-    ``springs``: spring nodes; those of other figures are ignored. Returns skeleton of J joints.
+    ``springs``: spring nodes; those of other figures are ignored. Returns a skeleton of J joints.
     Auxiliary joints have no DOFs, constrained joints have locked DOFs, and all other DOFs have no
     limits.
     """

@@ -31,7 +31,7 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     same default weights, and the same keys in all animations. Only animations of such nodes
     are read.
 
-    Returns dict of (S,) int32.
+    Returns a dict of (S,) int32.
     """
     shaped = [node for node in nodes if _mesh(file, node).target_names]
     looks = {

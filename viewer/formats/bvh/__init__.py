@@ -44,7 +44,7 @@ _THINNEST, _THICKEST = 0.05, 0.3
 def read(source: Source) -> SkeletonMotion:
     """Read a skeleton and its motion.
 
-    Returns lengths as in the file. Every joint is a ball joint; the clip's translations are the
+    Lengths are those of the file. Every joint is a ball joint; the clip's translations are the
     position channels minus the OFFSET. End Sites are the far ends of the joints' boxes. Raises
     ``FormatError`` if the text violates the grammar; the error has the file and line.
     """

@@ -74,9 +74,9 @@ def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
     """Read the frames.
 
     ``source``: the file; warned if the number of frames differs from the declared one. ``start``:
-    offset after the word MOTION; -1 for a file without one. Returns motion with at least one frame:
-    zeros if the file has none. Raises ``FormatError`` if a word is not a number, a row is too short
-    or too long, or no frame is finite; the error has the line.
+    offset after the word MOTION; -1 for a file without one. Returns a motion with at least one
+    frame: zeros if the file has none. Raises ``FormatError`` if a word is not a number, a row is
+    too short or too long, or no frame is finite; the error has the line.
     """
     if start < 0:
         source.warn("F007.bvh-no-motion: no MOTION section: shown in the rest pose", source.end)

@@ -40,8 +40,8 @@ _LEVELS = 3  # number of folders that may contain the cameras, from the folder o
 def read(source: Source) -> Capture:
     """Open a recording with default options.
 
-    Returns recording of which only the first people have been read. Raises ``FormatError`` if there
-    are no frames, or no person in any frame.
+    Returns a recording of which only the first people have been read. Raises ``FormatError`` if
+    there are no frames, or no person in any frame.
     """
     return open_capture(source)
 
@@ -62,7 +62,7 @@ def open_capture(
     "-y", "-z" or "", up axis of the world; empty to estimate it from the people. ``layout``: layout
     of keypoints, see ``keypoint_layout``, to choose between layouts with the same number of points:
     ``"h36m"``, ``"panoptic"``. ``images``: folder of the cameras' image folders; by default
-    ``images`` next to the recording. Returns recording of which only the first people have been
+    ``images`` next to the recording. Returns a recording of which only the first people have been
     read. Errors that concern the files as a whole are in the source's warnings. Raises
     ``FormatError`` if there are no frames, no person in any frame, or no camera in the given
     folder.

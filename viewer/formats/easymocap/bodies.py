@@ -159,7 +159,7 @@ def usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
     They are those of a few frames spread over the recording. The first record alone must not decide
     for all others, because it may be unusual.
 
-    ``max_size``: maximum size of a file in bytes. Returns number of values of a record by key;
+    ``max_size``: maximum size of a file in bytes. Returns the number of values of a record by key;
     empty if there are no valid bodies.
     """
     found = [dict(layout.widths) for layout in _layouts(files, max_size)]

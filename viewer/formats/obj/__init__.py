@@ -131,7 +131,7 @@ class _Gathered:
 def read(source: Source) -> Figure:
     """Read a mesh.
 
-    ``source``: the file; recoverable errors and ignored data are added to its warnings. Returns
+    ``source``: the file; recoverable errors and ignored data are added to its warnings. Returns a
     mesh without skeleton and skin; y up and without a unit, unless a comment written by this
     program states them. Raises ``FormatError`` if the text violates the grammar; the error has the
     file and line.

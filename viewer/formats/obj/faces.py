@@ -179,8 +179,8 @@ def _whole(values: Floats) -> _Corners | None:
 def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
     """Read the faces of some lines; see ``read_faces``.
 
-    ``source``: the file, which records the errors of omitted faces. Returns faces, with the errors
-    to record when their triangles are known.
+    ``source``: the file, which records the errors of omitted faces. Returns the faces, with the
+    errors to record when their triangles are known.
     """
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)

@@ -48,9 +48,9 @@ from viewer.rig.skin import Skin, skin_rows
 def read(source: Source) -> Figure:
     """Read a mesh with its weights and bindings.
 
-    Returns figure without skeleton, and without skin if the file has neither weights nor bindings.
-    Raises ``FormatError`` if the text violates the grammar or its sections do not match; the error
-    has the file and line.
+    Returns a figure without skeleton, and without skin if the file has neither weights nor
+    bindings. Raises ``FormatError`` if the text violates the grammar or its sections do not match;
+    the error has the file and line.
     """
     sections = read_sections(source)
     mesh = _mesh(source, sections)

@@ -74,8 +74,8 @@ def device_of_worker(
     ignores. If the variable is not set, graphics cards are assigned to workers in turn.
 
     ``devices``: devices; this machine's devices if omitted. ``visible``: value of
-    ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted. Returns index of an EGL device;
-    None if there is no graphics card.
+    ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted. Returns the index of an EGL
+    device; None if there is no graphics card.
     """
     cards = [one for one in (devices or egl_devices()) if not one.is_software]
     if visible is None:

@@ -100,7 +100,7 @@ def index_set(
     ``triangles``: (T, 3), indices of split vertices. ``materials``: (T,), index into ``surfaces``
     of each triangle, -1 for none. ``order``: (T,) int32, order of the triangles, see
     ``curve_order``; that of the file if omitted. ``parts``: (T,), part of each triangle, -1 for
-    none. Returns contains a run for each material of each part, in the order of the file.
+    none. The result contains a run for each material of each part, in the order of the file.
     """
     parts = np.full(len(triangles), -1, dtype=np.int32) if parts is None else parts
     edges = _edges(materials, parts)

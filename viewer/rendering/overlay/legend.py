@@ -249,7 +249,7 @@ def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendCo
 
     ``widths``: width of each item's swatch and name, with the gap to the next column, in any unit.
     ``width``: maximum total width of all columns, in the same unit. The first column is used even
-    if it is wider. Returns columns of about equal length if all items fit, otherwise full columns.
+    if it is wider. The columns are of about equal length if all items fit, otherwise full columns.
 
     >>> legend_columns([10.0] * 5, 4, 30.0).counts
     (3, 2)

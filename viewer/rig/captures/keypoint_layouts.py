@@ -134,7 +134,7 @@ _ALIKE = (
 def keypoint_layout(count: int, title: str = "") -> PointLayout:
     """Return the layout of a set of keypoints.
 
-    ``title``: name of a layout, if several have this count; empty for the default. Returns layout
+    ``title``: name of a layout, if several have this count; empty for the default. Returns a layout
     with names ``point0``, ``point1`` … and no limbs if no layout has this count. Raises
     ``RigError`` if the named layout does not exist or has a different number of keypoints.
 
@@ -267,7 +267,7 @@ def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
 
     The joints are the model's: regressed from its shaped mesh, then posed.
 
-    Returns keypoint names to distances in scene units; empty if either actor is absent.
+    Returns a dict of keypoint names to distances in scene units; empty if either actor is absent.
     """
     layout, skeleton = points.figure.points, body.figure.skeleton
     if layout is None or points.points is None or skeleton is None or body.pose is None:

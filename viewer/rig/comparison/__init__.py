@@ -56,7 +56,7 @@ def compare(
     ``first``, ``second``: the first is the reference: lengths are given in its unit and as
     fractions of its size. ``n_poses``: number of test poses for figures without motion; see
     ``steps_of``. ``frames``: (int or None, int or None), first frame and end frame (exclusive), in
-    the numbering of the first motion. Returns result with a mismatch for everything that only one
+    the numbering of the first motion. Returns a result with a mismatch for everything that only one
     actor has. Raises ``RigError`` if the range contains no frame, or surfaces differ and SciPy is
     missing.
     """

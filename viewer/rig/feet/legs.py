@@ -207,7 +207,7 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
     """Return the legs of an animal with at least four legs, left ones first.
 
     ``parents``: (J,), -1 for a root. ``points``: (J, 3), positions of the joints of a standing
-    animal. ``up``: (3,), the up axis. Returns hip, knee and ankle are the two long bones of a leg,
+    animal. ``up``: (3,), the up axis. Hip, knee and ankle are the ends of its two long bones,
     without a scapula. The ankle is the hock of a hind leg and the wrist of a front leg. Chains
     without a counterpart on the other side, such as a tail, are omitted. Empty if there are fewer
     than four legs.

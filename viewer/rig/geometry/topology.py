@@ -146,9 +146,9 @@ class Shell:
 def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     """Return a mesh as a shell; None if its surface is not closed.
 
-    ``skin``: vertices at the same position must have the same influences. Returns none if edges
-    belong to more than two triangles, if neighbours have opposite orientations, if a connected part
-    is clockwise or open, or if the mesh has more than 500,000 triangles.
+    ``skin``: vertices at the same position must have the same influences. The result is None if
+    edges belong to more than two triangles, if neighbours have opposite orientations, if a
+    connected part is clockwise or open, or if the mesh has more than 500,000 triangles.
     """
     if not 0 < mesh.n_triangles <= _MOST_TRIANGLES:
         return None

@@ -41,9 +41,9 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
     """Return the animation that a text selects.
 
     ``wanted``: a name or label, matched exactly or, if there is no exact match, ignoring case; a
-    number from 1; ``NONE``; or an empty string for the first animation. Returns none for ``NONE``,
-    and if there are no animations and none is requested. Raises ``RigError`` if there is no such
-    animation.
+    number from 1; ``NONE``; or an empty string for the first animation. The result is None for
+    ``NONE``, and if there are no animations and none is requested. Raises ``RigError`` if there is
+    no such animation.
     """
     longest = max(figures, key=lambda figure: len(figure.animations), default=None)
     every = () if longest is None else longest.animations

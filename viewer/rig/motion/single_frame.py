@@ -23,7 +23,7 @@ def single_frame(
     """Return an actor's current pose as an animation of one frame.
 
     ``actor``: actor with joints; the frame of an absent actor is missing. ``rate``: nominal frames
-    per second of the animation. ``time``: time of the frame in seconds. Returns animation whose
+    per second of the animation. ``time``: time of the frame in seconds. Returns an animation whose
     ``motion`` also contains the frame: one key per DOF for rigs with keyed clips. Raises
     ``RigError`` if there are no joints.
     """

@@ -205,8 +205,8 @@ def sample_transforms(clip: TransformClip, times: Floats) -> Samples:
     incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
     first key and after its last key, a channel has the value of that key.
 
-    ``times``: (T,), seconds. Returns at the time of a key, exactly the key's value; rotations are
-    normalised.
+    ``times``: (T,), seconds. At the time of a key, the result is exactly the key's value; rotations
+    are normalised.
     """
     table = _tables.get(clip, (), lambda: _transform_table(clip.channels))
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))

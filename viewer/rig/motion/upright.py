@@ -51,7 +51,7 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
 
     A body in a z-up capture is upright along z, regardless of the up axis of its model.
 
-    ``actor``: actor in the scene; not modified. Returns actor with the same placement, which no
+    ``actor``: actor in the scene; not modified. Returns an actor with the same placement, which no
     longer applies to it; the given actor if nothing changes.
     """
     up, hangs = own_up(scene, actor)

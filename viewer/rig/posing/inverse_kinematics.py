@@ -82,7 +82,7 @@ def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, ro
 def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
     """Return the current rotation axis of each rotation DOF of a joint.
 
-    Returns dict of int to (3,), unit vectors in the parent's frame, by row of the DOF table.
+    Returns a dict of int to (3,), unit vectors in the parent's frame, by row of the DOF table.
     """
     own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
     after = quaternion_to_matrix(pose.rotations[joint])
@@ -100,7 +100,7 @@ def reach(
     """Return the DOFs that move a joint as close to a target as its chain allows.
 
     ``pose``: start of the search; not modified. ``target``: (3,), target position, figure units.
-    Returns pose that is not farther from the target than the start. A start outside its limits is
+    Returns a pose that is not farther from the target than the start. A start outside its limits is
     clamped first. Raises ``RigError`` if no joint above it can rotate.
     """
     chain = chain_above(skeleton, joint, length)

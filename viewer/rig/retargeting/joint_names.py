@@ -129,8 +129,8 @@ _TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "f
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the side and the remaining word of every name, in any program's convention.
 
-    Returns list of J (str, str), ``"left"``, ``"right"`` or ``""``, and the remaining word in lower
-    case.
+    Returns a list of J (str, str), ``"left"``, ``"right"`` or ``""``, and the remaining word in
+    lower case.
 
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
