@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -323,3 +326,10 @@ def test_fit_leaves_the_requested_margin(orthographic):
     wide = tall[:, [1, 0, 2]]
     fit(camera, wide, 1.0, 0.7)
     np.testing.assert_allclose(np.abs(project(camera, wide)[:, 0]), 1 / 1.08, atol=1e-9)
+
+
+def test_import_prints_no_warning_when_pyrr_is_compiled(tmp_path):
+    environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(tmp_path)}  # nothing is compiled yet
+    command = [sys.executable, "-W", "error", "-c", "import viewer.rendering.camera"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from pyrr import matrix44
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
+
+with warnings.catch_warnings():
+    # pyrr's docstrings have invalid escapes: compiling it warns, or fails if warnings are errors.
+    warnings.simplefilter("ignore")
+    from pyrr import matrix44
 
 if TYPE_CHECKING:
     from viewer.rig.captures.cameras import CameraView
