@@ -152,6 +152,14 @@ def ctx(gl_framebuffer: moderngl.Framebuffer) -> Iterator[moderngl.Context]:
 
 
 @pytest.fixture
+def mesa(ctx: moderngl.Context) -> None:
+    """Skip unless Mesa draws: other drivers ignore its environment variables."""
+    version = ctx.info["GL_VERSION"]
+    if "Mesa" not in version:
+        pytest.skip(f"needs Mesa; OpenGL {version} draws")
+
+
+@pytest.fixture
 def ctrl_c():
     """A function that interrupts a test, also if the tests were started with SIGINT ignored."""
     kept = signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -193,18 +193,23 @@ scene = Scene([Actor(figure)])
 
 @LINUX
 def test_repeated_rendering_does_not_leak_memory():
-    """Poses, sizes, actors and options change in every round."""
+    """Poses, sizes, actors and options change in every round.
+
+    Drivers of graphics cards fill caches of some MB once; a leak grows in both halves.
+    """
     code = """
-for i in range(180):
+sizes = []
+for i in range(181):
     if i % 10 == 0:
         scene = Scene([Actor(figure), Actor(arm(2))])
     scene.actors[0].pose.dofs[4] = 0.01 * i
     viewer.render(scene, (64 + i % 2, 48), options=DisplayOptions(show=('skin', 'both')[i % 2]))
-    if i == 29:
-        before = resident()
-print(resident() - before)
+    if i % 75 == 30:
+        sizes.append(resident())
+first, second, third = sizes
+print(min(second - first, third - second))
 """
-    assert float(run_alone(MEMORY + code)) < 4.0  # MB; a leaked mesh or target is 0.1 MB
+    assert float(run_alone(MEMORY + code)) < 2.0  # MB; a leaked mesh or target is 0.1 MB a round
 
 
 @LINUX

@@ -73,6 +73,7 @@ def test_missing_egl_device_is_reported_with_remedies(tmp_path):
 
 
 @LINUX
+@pytest.mark.usefixtures("mesa")
 def test_missing_driver_files_are_reported_in_one_line(tmp_path):
     """Warnings printed by Mesa must not precede the message."""
     result = viewer_render(tmp_path, LIBGL_DRIVERS_PATH="/nonexistent")
@@ -85,6 +86,7 @@ def test_missing_driver_files_are_reported_in_one_line(tmp_path):
 
 
 @LINUX
+@pytest.mark.usefixtures("mesa")
 def test_old_opengl_is_reported_with_its_version_and_renderer(tmp_path):
     result, output = viewer_render(tmp_path, MESA_GL_VERSION_OVERRIDE="3.1")
     assert result.returncode == 4
@@ -97,6 +99,7 @@ def test_old_opengl_is_reported_with_its_version_and_renderer(tmp_path):
 
 
 @LINUX
+@pytest.mark.usefixtures("mesa")
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
@@ -129,7 +132,9 @@ def test_old_shading_language_is_distinguished_from_old_opengl(tmp_path, name, v
         ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
     ],
 )
-def test_doctor_reports_the_same_message(environment, code, words):
+def test_doctor_reports_the_same_message(request, environment, code, words):
+    if any(name.startswith("MESA_") for name in environment):
+        request.getfixturevalue("mesa")
     variables = {**os.environ, "WAYLAND_DISPLAY": "", **environment}
     done = subprocess.run(
         [sys.executable, "-m", "viewer", "doctor"],
@@ -207,6 +212,7 @@ def test_too_many_samples_are_reduced_to_the_maximum(tmp_path):
 
 
 @LINUX
+@pytest.mark.usefixtures("mesa")
 def test_different_rasteriser_draws_without_warnings(tmp_path):
     result, output = viewer_render(
         tmp_path, "--quality", "normal", "--samples", "1", GALLIUM_DRIVER="softpipe"

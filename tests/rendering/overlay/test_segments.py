@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.program import Programs
@@ -75,8 +75,9 @@ def test_slanted_line_covers_the_same_area(picture):
 def test_segment_of_zero_length_is_a_round_dot(picture):
     opacity = picture(dots(np.zeros((1, 3)), np.array(RED), 20.0))[..., 3]
     assert_allclose(opacity.sum(), np.pi * 100.0, rtol=0.01)
-    assert_array_equal(opacity, opacity.T)
-    assert_array_equal(opacity, opacity[::-1])
+    # Graphics cards round the distances to the centre differently on its two sides.
+    assert_allclose(opacity, opacity.T, atol=1e-5)
+    assert_allclose(opacity, opacity[::-1], atol=1e-5)
 
 
 def test_colours_are_multiplied_by_opacity(picture):
