@@ -184,11 +184,7 @@ def exporters_at(path: str | Path) -> list[Exporter]:
 
 
 def exporters_of(path: str | Path, content: Content) -> list[str]:
-    """Return the keys in ``EXPORTERS`` that write this content to files of this suffix.
-
-    Raises ``UnsupportedFormatError`` if there is none, with the known suffixes; ``RigError`` if
-    there is none for captured points.
-    """
+    """Return the keys in ``EXPORTERS`` that write this content to such files, or raise."""
     suffix = Path(path).suffix.lower()
     kinds = {key: kind for key, kind in EXPORTERS.items() if content in kind.stores}
     found = [key for key, kind in kinds.items() if (suffix or FOLDER) in kind.suffixes]
@@ -205,19 +201,12 @@ def exporters_of(path: str | Path, content: Content) -> list[str]:
 
 
 def exporter_for(path: str | Path) -> str:
-    """Return the key in ``EXPORTERS`` that writes poses to files of this suffix.
-
-    Raises ``UnsupportedFormatError`` if there is none.
-    """
+    """Return the key in ``EXPORTERS`` that writes poses to files of this suffix, or raise."""
     return exporters_of(path, "pose")[0]
 
 
 def suited_exporter(path: str | Path, figure: Figure) -> str:
-    """Return the exporter that writes a figure's motion to a file of this suffix.
-
-    Arrays of bodies of the SMPL family are written in AMASS's layout. Raises
-    ``UnsupportedFormatError`` if no exporter writes motions with this suffix.
-    """
+    """Return the exporter of a figure's motion; AMASS for arrays of bodies of the SMPL family."""
     found = exporters_of(path, "frames")
     skeleton = figure.skeleton
     is_member = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
@@ -292,18 +281,12 @@ def output_files(selection: Actor | Selection, path: Path, options: ExportOption
 
 
 def files_written(path: str | Path) -> list[Path]:
-    """Return all files that an export of a pose writes, such as two for a rig or a ``.gltf``.
-
-    Raises ``UnsupportedFormatError`` if no exporter writes this suffix.
-    """
+    """Return all files that an export of a pose writes, such as two for a rig or a ``.gltf``."""
     return files_at(EXPORTERS[exporter_for(path)], Path(path))
 
 
 def check_figure(key: str, figure: Figure) -> None:
-    """Raise RigError if an exporter cannot write a figure, before any work is done for it.
-
-    ``key``: a key of ``EXPORTERS``. ``figure``: only its joints, their names and its unit matter.
-    """
+    """Raise RigError if an exporter cannot write a figure's joints, names or unit."""
     if EXPORTERS[key].joints:
         import_module(f"{__name__}.{key}").require(figure)
 
@@ -317,15 +300,7 @@ def sampled(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
 ) -> Part:
-    """Sample an actor's motion for an exporter that can write its figure.
-
-    Captures are written back in their own world, unless another up axis is requested; other
-    formats expect upright people.
-
-    ``key``: a key of ``EXPORTERS``. ``options``: states whether an up axis is requested. ``scene``,
-    ``actor``, ``rate``, ``frames``, ``interpolate``: as for
-    ``viewer.rig.motion.sampled_animation.upright_animation``.
-    """
+    """Sample an actor's motion; captures keep their own world unless an up axis is requested."""
     check_figure(key, actor.figure)
     if actor.moves_points:
         return Part(actor, None, *sample_upright_points(scene, actor, rate, frames, interpolate))

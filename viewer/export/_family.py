@@ -64,13 +64,7 @@ class FamilyFrames:
 
 
 def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Member:
-    """Return the member of the family that has the same joints as a figure.
-
-    ``figure``: figure with a skeleton.
-    ``what``: name of the output, for the message.
-    ``roots``: allowed names of the root: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
-    Raises RigError if no member has these joints, or if the figure's unit is unknown.
-    """
+    """Return the family's member with a figure's joints, its root named in ``roots``, or raise."""
     names = () if figure.skeleton is None else figure.skeleton.names
     member = FAMILY.get(len(names))
     if member is None or set(member.names) != set(names) or member.names[0] not in roots:
@@ -88,19 +82,13 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
 
 
 def check_unit(options: ExportOptions, title: str) -> None:
-    """Check the requested unit.
-
-    Raises RigError for units other than metres.
-    """
+    """Raise RigError for units other than metres."""
     if options.unit not in ("", "m"):
         raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
 
 
 def up_axis(options: ExportOptions) -> str:
-    """Return the up axis of the file, by default that of the scene.
-
-    Raises RigError if the requested axis is neither y nor z; the scene's axis may be negative.
-    """
+    """Return the up axis of the file, y or z: the requested one, else that of the scene."""
     if options.up not in ("", "y", "z"):
         raise RigError(f'up axis: expected y or z, found "{options.up}"')
     up = options.up or options.world_up
@@ -116,36 +104,25 @@ def family_frames(
     options: ExportOptions,
     model: str = "",
 ) -> tuple[FamilyFrames, list[Diagnostic]]:
-    """Return an animation as parameters of the family.
-
-    The root joint is at t + J0, so t is its displacement from the rest position. For a different up
-    axis, the world is rotated by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
-
-    ``animation``: an animation of a figure whose unit is known.
-    ``frames``: its frames; rows of missing frames are undefined.
-    ``member``: from ``member_of_figure``.
-    ``options``: only the up axes are used.
-    ``model``: title of the model in whose space coefficients are written; the member's if empty.
-    Returns ``frames``: one row per frame.
-    Returns ``notes``: notes about data without a parameter in the family, with its size.
-    Raises RigError if a value of a present frame is not finite.
-    """
+    """Return an animation as parameters of the family, and notes about what it cannot hold."""
     figure, skeleton = animation.figure, animation.figure.require_skeleton()
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
     order = [numbers[name] for name in member.names]
     rotations = frames.rotations[:, order]
     metres = METRES[figure.unit]
     moved = metres * frames.translations[:, order]
+    # The family's root is at t + J0, so t is its displacement from the rest position J0.
     translations = metres * frames.figure_translations + moved[:, 0]
     roots = metres * root_positions(figure, frames.shape_weights)
     if up_axis(options) != options.world_up:
+        # For another up axis the world is rotated by Q about x: R' = Q R, and as the root moves
+        # from t + J0 to Q (t + J0) while J0 stays, t' = Q (t + J0) - J0.
         angle = np.pi / 2 if up_axis(options) == "z" else -np.pi / 2
         rotation = np.array([angle, 0.0, 0.0])
         rotations = rotations.copy()
         rotations[:, 0] = multiply(rotation_vector_to_quaternion(rotation), rotations[:, 0])
-        matrix = np.round(
-            rotation_vector_to_matrix(rotation)
-        )  # a rotation by 90 degrees has integer entries
+        # A rotation by 90 degrees has integer entries.
+        matrix = np.round(rotation_vector_to_matrix(rotation))
         translations = (translations + roots) @ matrix.T - roots
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     columns = {
@@ -264,12 +241,7 @@ def _losses(frames: Frames, skeleton: Skeleton, moved: Floats) -> list[Diagnosti
 
 
 def read_frames(motion: BodyMotion, animation: SampledAnimation, options: ExportOptions) -> Frames:
-    """Return the poses in a file for an animation's figure, in the animation's world and unit.
-
-    ``motion``: the read motion, in metres.
-    ``animation``: the written animation.
-    ``options``: options with the up axes of the animation and the file.
-    """
+    """Return the poses of a file (metres) for an animation's figure, in its world and unit."""
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
     moved = motion.translations / METRES[figure.unit]

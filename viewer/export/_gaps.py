@@ -26,13 +26,7 @@ _CLOSED = {
 
 
 def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> list[Diagnostic]:
-    """Return a note about missing frames and their replacements, if there are any.
-
-    ``present`` (F,): whether each frame is present.
-    ``first_frame``: number of the first frame.
-    ``closing``: a key of ``GAPS``.
-    ``how``: phrases by key of ``GAPS``, if they differ from the usual ones.
-    """
+    """Return a note about missing frames and how they were closed; ``how`` may rephrase it."""
     if present.all():
         return []
     is_early, is_late = not present[0], not present[int(present.argmax()) :].all()
@@ -83,13 +77,7 @@ def _gaps(present: Bools, first_frame: int) -> dict[str, object]:
 
 
 def filled(frames: Frames, interpolate: bool) -> Frames:
-    """Return frames without gaps.
-
-    ``frames``: frames, at least one of them present.
-    ``interpolate``: if true, interpolate between the frames around a gap, rotations along the
-      shorter arc and everything else linearly; if false, hold the frame before it. Gaps at the ends
-      hold the first or last frame.
-    """
+    """Return frames whose gaps are interpolated, or hold the frame before; ends are held."""
     if frames.present.all():
         return frames
     there = np.flatnonzero(frames.present)
@@ -120,16 +108,7 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
 
 
 def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, list[Diagnostic]]:
-    """Return the frames for formats that allow gaps: interpolated or held only on request.
-
-    ``frames``: frames with or without gaps.
-    ``gaps``: a key of ``GAPS``, or empty. If every frame has its own file, ``split`` keeps the
-      gaps.
-    ``first_frame``: number of the first frame.
-    Returns ``frames``: unchanged if the gaps are kept.
-    Returns ``notes``: a note about closed gaps, if there are any.
-    Raises RigError if ``gaps`` is not a key of ``GAPS``.
-    """
+    """Return frames with gaps unless ``gaps`` asks to close them, and a note about closed ones."""
     if gaps not in ("", *GAPS):
         raise RigError(f'handling of gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
     present = frames.present

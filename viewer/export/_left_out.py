@@ -32,10 +32,7 @@ def extra_parts(figure: Figure) -> list[Phrase]:
 
 
 def surface_parts(mesh: Mesh, has_colors: bool = False, has_parts: bool = False) -> list[Phrase]:
-    """Return the data of a mesh that formats with one set of texture coordinates cannot hold.
-
-    ``has_colors``, ``has_parts``: whether the format holds vertex colours, and names of parts.
-    """
+    """Return the data of a mesh that formats with one set of texture coordinates cannot hold."""
     extras = {
         "second texture coordinates": bool(mesh.other_uvs),
         "vertex colours": mesh.colors is not None and not has_colors,
@@ -45,12 +42,7 @@ def surface_parts(mesh: Mesh, has_colors: bool = False, has_parts: bool = False)
 
 
 def joint_scales_note(frames: Frames, skeleton: Skeleton, key: str) -> list[Diagnostic]:
-    """Return a note with the range of joint scales that differ from those at rest, if any.
-
-    ``frames``: the motion.
-    ``skeleton``: its skeleton.
-    ``key``: key and sentence of the message.
-    """
+    """Return a note with the range of joint scales that differ from those at rest, if any."""
     scales = frames.scales if len(frames.scales) == 1 else frames.scales[frames.present]
     changed = scales[np.abs(scales - skeleton.rest_scales) > _NEGLIGIBLE]
     if not len(changed):
@@ -69,10 +61,7 @@ def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:
 
 
 def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnostic]:
-    """Return a note that lists a figure's animations other than the one that is written as frames.
-
-    A clip with edited keys is another object than the one read, with the same name.
-    """
+    """Return a note that lists a figure's animations other than the one written as frames."""
     played = [each.plays(motion) for each in figure.animations]
     if not any(played):
         played = [each.name == motion.name != "" for each in figure.animations]

@@ -20,13 +20,7 @@ PERSON = "{person}"
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
-    """Return the file of each actor: people by number, other actors numbered from the second.
-
-    ``output``: the requested file; its suffix is kept. A single actor gets this file. ``{person}``
-      in the name is replaced by the person's number, or the number of the actor from 1.
-    ``actors``: actors in the order of the scene.
-    Returns: one path per actor, all different.
-    """
+    """Return each actor's file: its number for ``{person}``, else numbered from the second."""
     persons = [actor.person for actor in actors]
     known = [person_name(person).replace(" ", "-") for person in persons if person is not None]
     has_numbers = len(set(known)) == len(persons)
@@ -43,11 +37,7 @@ def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
 
 
 def is_together(kind: Exporter, output: Path, options: ExportOptions) -> bool:
-    """Return whether all actors are written to one file, or folder.
-
-    They have separate files if the format holds only one, if the name has ``{person}``, or if
-    motions are split at their gaps.
-    """
+    """Return whether all actors are written to one file, or folder."""
     is_apart = PERSON in output.name or options.closing == "split"
     return bool(kind.folder) or (kind.stores_many and not is_apart)
 
@@ -70,21 +60,14 @@ def files_at(kind: Exporter, path: Path) -> list[Path]:
 
 
 def split_paths(path: Path, count: int) -> list[Path]:
-    """Return the files of a motion that is split at its gaps: ``name-1.bvh``, ``name-2.bvh`` ….
-
-    >>> [file.name for file in split_paths(Path("walk.bvh"), 2)]
-    ['walk-1.bvh', 'walk-2.bvh']
-    """
+    """Return the files of a motion that is split at gaps: ``name-1.bvh``, ``name-2.bvh`` …."""
     if count == 1:
         return [path]
     return [path.with_name(f"{path.stem}-{number}{path.suffix}") for number in range(1, count + 1)]
 
 
 def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
-    """Return the file of each frame; its number replaces ``{frame}`` in the name.
-
-    Raises OutputError if two frames would have the same file.
-    """
+    """Return the file of each frame; its number replaces ``{frame}`` in the name."""
     files = [path.with_name(path.name.format(frame=int(frame))) for frame in frames]
     if len(set(files)) < len(files):
         raise OutputError(f"{printable(path, 300)}: expected a name with {{frame}}")
@@ -92,10 +75,7 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
 
 
 def part_files(kind: Exporter, part: Part, path: Path, options: ExportOptions) -> list[Path]:
-    """Return all files that are written for a part: several if it is split, or one per frame.
-
-    ``path``: its file, with ``{frame}`` for numbered files.
-    """
+    """Return all files that are written for a part: several if it is split, or one per frame."""
     if part.content == "frames" and kind.is_numbered:
         present, first = part.present, part.animation.first_frame
         is_whole = options.gaps in ("hold", "interpolate")

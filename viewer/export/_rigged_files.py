@@ -32,10 +32,7 @@ _NODES = (".glb", ".gltf", ".vrm")
 
 
 def files_of(output: Path) -> list[Path]:
-    """Return all files that belong to one output.
-
-    Raises UnsupportedFormatError if the suffix is not supported.
-    """
+    """Return all files that belong to one output, or raise UnsupportedFormatError."""
     suffix = output.suffix.lower()
     if suffix == ".npz":
         return [output]
@@ -50,19 +47,7 @@ def files_of(output: Path) -> list[Path]:
 
 
 def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> list[Diagnostic]:
-    """Write all files of a rigged mesh, or none.
-
-    ``rigged``: the result of the rig transfer.
-    ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
-      coordinates as ``.obj``, the target's pose as ``.json``; they contain no pose correctives, see
-      ``without_correctives``. ``.npz``: everything in one file. ``.glb``, ``.gltf``, ``.vrm``: the
-      figure at rest.
-    ``meta``: name, authors and licence of a VRM character.
-    Returns: notes about the written files, and about data that the format cannot store.
-    Raises RigError if ``.skel`` cannot store the skeleton.
-    Raises UnsupportedFormatError as ``files_of`` does.
-    Raises OutputError if a file cannot be written.
-    """
+    """Write all files of a rigged mesh, or none; return notes about them and what they omit."""
     files = files_of(output)
     if output.suffix.lower() == ".npz":
         from viewer.formats.rigged import read, save
@@ -112,10 +97,7 @@ def _posed_skeleton(figure: Figure, pose: Pose) -> tuple[Figure, Pose]:
 
 
 def without_correctives(rigged: Rigged) -> Figure:
-    """Return the figure without pose correctives, adjusted to match the target in its pose.
-
-    Their offsets in that pose are added to the rest mesh: V + B(pose).
-    """
+    """Return the figure with its correctives of the target's pose added to the rest mesh."""
     figure = rigged.figure
     correctives, mesh, skeleton = figure.correctives, figure.mesh, figure.skeleton
     if correctives is None or mesh is None or skeleton is None:

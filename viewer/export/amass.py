@@ -82,11 +82,7 @@ def require(figure: Figure) -> None:
 def write_layout(
     animation: SampledAnimation, path: Path, options: ExportOptions, title: str, layout: Layout
 ) -> list[Diagnostic]:
-    """Write a motion as arrays in the layout of a format; see ``export``.
-
-    ``title``: name of the format, for messages.
-    ``layout``: returns the arrays of a range of rows.
-    """
+    """Write a motion as the arrays that ``layout`` returns for ranges of rows."""
     check_unit(options, title)
     member = member_of_figure(animation.figure, f"an {title} motion", ("pelvis",))
     present = animation.frames.present

@@ -173,12 +173,7 @@ def _read(archive: Archive, key: str) -> Floats | None:
 def _export_points(
     animation: SampledPoints, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
-    """Write captured points of all frames as float64 arrays.
-
-    ``path``: the file to write, replaced if it exists. ``options``: options; ``world_up`` is
-    written to the file. Raises ``RigError`` if another unit or up axis is requested, or no frame is
-    present. Raises ``OutputError`` if the file cannot be written.
-    """
+    """Write captured points of all frames as float64 arrays, with their up axis."""
     _check("", options)
     up, points = options.up or options.world_up, animation.points
     if up != options.world_up:

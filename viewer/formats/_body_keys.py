@@ -42,10 +42,7 @@ def model_in(values: Iterable[Value]) -> str:
 
 
 def scale_in(archive: Archive, key: str) -> float:
-    """Return the scale of a body, by which AIST++ multiplies positions in metres.
-
-    Raises ``FormatError`` if it is not a single positive number of a plausible size.
-    """
+    """Return a plausible scale of a body, by which AIST++ multiplies positions in metres."""
     values = archive.array(key).values().ravel()
     if len(values) != 1:
         raise archive.fault(wording.MOTION_SINGLE, item=key, found=len(values))

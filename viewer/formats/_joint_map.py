@@ -32,10 +32,7 @@ _LONGEST = 4096  # maximum characters of a line; matching takes quadratic time
 
 
 def read_joint_map(source: Source) -> JointMap:
-    """Read a joint map.
-
-    Raises ``FormatError``: at a line that is not a pair of joints, or at the end if there is none.
-    """
+    """Read a joint map; errors name the line that is not a pair of joints."""
     pairs: list[tuple[str, str]] = []
     lines: list[int] = []
     text = source.data.decode("utf-8", "surrogateescape")
@@ -69,10 +66,7 @@ def read_joint_map(source: Source) -> JointMap:
 
 
 def write_joint_map(joint_map: JointMap, path: str | Path, titles: tuple[str, str]) -> None:
-    """Write a joint map.
-
-    Raises ``OutputError`` if it cannot be written.
-    """
+    """Write a joint map, with the titles of both figures as a comment."""
     save_text(path, joint_map_text(joint_map, titles))
 
 

@@ -9,12 +9,7 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 
 def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
-    """Return positions with each NaN vertex moved to the mean of its valid neighbours.
-
-    ``positions``: (V, 3), positions; NaN if invalid. ``triangles``: (T, 3), triangles, whose edges
-    connect neighbours. A vertex without valid neighbours is moved to the mean of all valid
-    vertices.
-    """
+    """Return positions (V, 3) with NaN vertices at the mean of their valid neighbours."""
     if not np.isnan(positions.sum()):
         # Most files have no invalid positions, so this test must be cheap.
         return positions
@@ -35,11 +30,7 @@ def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
 
 
 def held_rows(rows: Floats, bad: Bools) -> Floats:
-    """Return rows with each invalid row replaced by the last valid row before it.
-
-    ``rows``: (N, ...), rows of a motion, in time order. ``bad``: (N,), true for invalid rows.
-    Invalid rows before the first valid row become copies of it; if all are invalid, all become 0.
-    """
+    """Return rows (N, ...) of a motion; ``bad`` ones repeat the valid one before, or the first."""
     if not bad.any():
         return rows
     if bad.all():
@@ -49,11 +40,7 @@ def held_rows(rows: Floats, bad: Bools) -> Floats:
 
 
 def neutral_corners(corners: NDArray[np.integer], fits: Bools) -> Ints:
-    """Return triangles with invalid corners replaced by valid ones, which gives them zero area.
-
-    ``corners``: (T, 3), vertex indices. ``fits``: (T, 3), true for indices of existing vertices. If
-    a triangle has no valid corner, its corners become vertex 0.
-    """
+    """Return triangles (T, 3) of zero area where a corner does not fit: a valid one repeated."""
     first = corners[np.arange(len(corners)), fits.argmax(axis=1)]
     usable = np.where(fits.any(axis=1), first, 0)
     return np.where(fits, corners, usable[:, None]).astype(np.int32)

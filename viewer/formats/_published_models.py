@@ -51,10 +51,7 @@ def published_name(path: Path) -> str:
 
 
 def published_names(folder: Path) -> list[str]:
-    """Return the names of the models in a folder and its subfolders, without their contents.
-
-    Folders of models often have a subfolder ``smpl``, as recordings of EasyMocap do.
-    """
+    """Return the names of the models in a folder and its subfolders, found without opening them."""
     names: set[str] = set()
     try:
         places = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]

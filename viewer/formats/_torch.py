@@ -145,11 +145,7 @@ def read_bytes(outer: Machine, data: Span) -> object:
 
 
 def read_stream(machine: Machine) -> object:
-    """Return the value of a legacy stream, with its storages in place.
-
-    Raises ``FormatError`` if the stream is damaged, or a storage is missing or does not have the
-    declared size.
-    """
+    """Return the value of a legacy stream, with its storages in place."""
     if machine.run() != _NUMBER:
         raise machine.fail(Phrase("expected a torch file, found a pickle of a different kind"))
     if machine.run() != _PROTOCOL:

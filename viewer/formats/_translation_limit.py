@@ -20,11 +20,7 @@ FARTHEST = 1e9
 
 
 def is_beyond(translations: NDArray[np.floating]) -> Bools:
-    """Return a mask of rows of (N, …) translations beyond the limit; NaN is not beyond it.
-
-    >>> is_beyond(np.array([[0.0, 1e9], [0.0, -2e9]])).tolist()
-    [False, True]
-    """
+    """Return a mask of rows of (N, …) translations beyond the limit; NaN is not beyond it."""
     rows = translations.reshape(len(translations), -1)
     low, high = rows.min(initial=0.0), rows.max(initial=0.0)
     if low >= -FARTHEST and high <= FARTHEST:  # this is true for nearly all motions
@@ -33,11 +29,7 @@ def is_beyond(translations: NDArray[np.floating]) -> Bools:
 
 
 def within_text(found: float, limit: float = FARTHEST) -> Phrase:
-    """Return the phrase "expected …, found …" for a number that is too large or not finite.
-
-    >>> str(within_text(1e20)), str(within_text(float("inf")))
-    ('expected numbers within ±1e+09, found 1e+20', 'expected finite numbers, found inf')
-    """
+    """Return the phrase "expected …, found …" for a number that is too large or not finite."""
     if not np.isfinite(found):
         return Phrase("expected finite numbers, found {found:g}", found=float(found))
     return Phrase(

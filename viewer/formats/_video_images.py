@@ -11,12 +11,7 @@ from viewer.rig.captures.cameras import CameraImage
 
 
 class VideoImages:
-    """Frames of a video as the images of one camera; the last one shown is cached.
-
-    ``rate``: frames per second of the video. ``size``: width and height of its pictures, pixels.
-    Raises ``ViewerError`` if PyAV is not installed. Raises ``FormatError`` if the file is not a
-    readable video.
-    """
+    """Frames of a video as the images of one camera; the last one shown is cached."""
 
     def __init__(self, path: Path, first: float, end: float, cameras: tuple[str, ...] = ()) -> None:
         self.cameras, self._video = cameras, VideoFrames(path)

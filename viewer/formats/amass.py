@@ -74,10 +74,7 @@ _SAME = 1e-5  # tolerance in radians or metres: the precision of float32 for num
 
 
 def has_frames(archive: Archive) -> bool:
-    """Return whether an archive is a motion rather than a single pose, which may be J x 3 numbers.
-
-    A motion has several frames, or none, or one frame in an array with a frame rate.
-    """
+    """Return whether poses are a motion: not one frame, unless it is an array with a rate."""
     is_timed = any(archive.has(key) for key in _OF_MOTIONS)
     for key in (*_POSES, "body_pose", "pose_body", *_ROOTS):
         shape = archive.shape(key)
@@ -89,11 +86,7 @@ def has_frames(archive: Archive) -> bool:
 
 
 def read(source: Source) -> BodyMotion:
-    """Read a motion of one person.
-
-    Raises ``FormatError`` if there are no poses, arrays differ in their number of frames, or a
-    translation exceeds the limit.
-    """
+    """Read a motion of one person."""
     archive = archive_of(source)
     found = _first_key(source, archive, _POSES)
     hands: dict[str, Floats] = {}

@@ -62,12 +62,7 @@ _ROWS = 8  # number of correctives per block, 1.8 MB at the default level of det
 
 
 def read(source: Source) -> Figure:
-    """Read the rig with the level of detail that ``source.options`` names.
-
-    ``source``: the folder, its ``rig.npz`` or a ``lodN.npz``. The result is in centimetres, y up;
-    its DOFs are the joint parameters that model parameters drive. Raises ``FormatError`` if a file
-    or array is missing or invalid.
-    """
+    """Read the rig in the level of detail that the options name (cm, y up) from folder or file."""
     rig_source, lod_source = _files(source)
     rig, lod = _opened(rig_source, _RIG_KEYS), _opened(lod_source, _LOD_KEYS)
     n_shapes = lod.array("shape_vectors", (None, None, 3)).shape[0]

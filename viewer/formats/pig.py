@@ -159,12 +159,7 @@ class _PigFiles:
 
 
 def read(source: Source) -> Figure:
-    """Read the model.
-
-    ``source``: the folder, pickle or ``.npz``; recoverable errors are added to its warnings. The
-    figure has z up and is in metres. Raises ``FormatError`` if the model is invalid or a required
-    array is missing; the error has the file, and the line in text files.
-    """
+    """Read the model (z up, metres) from its folder, pickle or ``.npz``."""
     files = _from_folder(source) if source.is_folder else _from_archive(source)
     parts = files.parts
     positions = _neutral_mesh(parts)
@@ -477,10 +472,7 @@ def _column(parts: dict[str, _Part], name: str, rows: int, end: int, noun: str) 
 
 
 def _indices(part: _Part, column: int, end: int, noun: str, rows_of: _Part | None = None) -> Ints:
-    """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part.
-
-    ``noun`` names the indexed elements: ``"vertex"``.
-    """
+    """Return a column of indices from 0 to ``end - 1`` of a ``noun``, such as a vertex."""
     return _columns(part, slice(column, column + 1), end, noun, rows_of)[:, 0]
 
 

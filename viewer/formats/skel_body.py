@@ -51,11 +51,7 @@ _ROUNDED = 1e-3  # maximum error of a rotation's entries, which files store in s
 
 
 def read(source: Source) -> Figure:
-    """Read the skin of a SKEL model.
-
-    The result is in metres, y up. Raises ``FormatError`` if an array is missing, or has a wrong
-    shape or invalid values.
-    """
+    """Read the skin of a SKEL model (y up, metres)."""
     archive = archive_of(source)
     missing = [key for key in _KEYS.split() if not archive.has(key)]
     if missing:

@@ -73,11 +73,7 @@ _STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STA
 
 
 def read(source: Source) -> Figure:
-    """Read a body model.
-
-    Returns a figure with mesh, skeleton and skin; blend shapes and correctives are read on first
-    use. Raises ``FormatError`` if an array is missing, or has a wrong shape or invalid values.
-    """
+    """Read a body model; blend shapes and correctives are read on first use."""
     archive = archive_of(source)
     missing = [key for key in KEYS if not archive.has(key)]
     if missing:
@@ -314,11 +310,9 @@ def _correctives(
 def _quaternion_correctives(
     archive: Archive, n_vertices: int, n_joints: int
 ) -> tuple[Correctives, str] | None:
-    """Return correctives that quaternions drive, and the model's title; None for SMPL's.
-
-    STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR has
-    four for each joint.
-    """
+    """Return correctives that quaternions drive, and the model's title; None for SMPL's."""
+    # STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR
+    # has four for each joint.
     array = archive.array("posedirs")
     kinds = {
         4 * (n_joints - 1) + 1: (QuaternionFeature(n_joints, False, _STAR_SHAPE), "STAR"),

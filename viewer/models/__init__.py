@@ -48,11 +48,7 @@ def _folder_in(data: bytes) -> Path | None:
 
 
 def save_model_folder(folder: str | Path) -> Path:
-    """Remember a folder of body models.
-
-    Raises ``ViewerError`` if the path is not a folder. Raises ``OutputError`` if the setting cannot
-    be saved.
-    """
+    """Remember a folder of body models."""
     import json
 
     from viewer.formats import save_bytes
@@ -73,10 +69,7 @@ def save_model_folder(folder: str | Path) -> Path:
 
 
 def use_model_folder(folder: str | Path) -> str:
-    """Use a folder of body models, and remember it if possible; return a message if it is not.
-
-    Raises ``ViewerError`` if the path is not a folder.
-    """
+    """Use a folder of body models, and remember it if possible; return a message if it is not."""
     global _in_use
     _in_use = None
     try:
@@ -88,10 +81,7 @@ def use_model_folder(folder: str | Path) -> str:
 
 
 def known_models(folder: Path) -> dict[str, Path]:
-    """Return the models in a folder and its subfolders, by the names that select them.
-
-    Returns ``"smplx:neutral"`` to its file; an ``.npz`` takes precedence over a ``.pkl``.
-    """
+    """Return files by name (``smplx:neutral``) in a folder and below; ``.npz`` before ``.pkl``."""
     return _named(_files(folder))
 
 
@@ -126,10 +116,9 @@ def _is_npz(path: Path) -> bool:
 
 
 def find_model(name: str, folder: Path | None, gender: str = "") -> Path | None:
-    """Return a model's file by its name: ``smplx:neutral``, ``smplx`` or ``SMPLX_NEUTRAL.npz``.
+    """Return a model's file by its name, in any case, or by its kind alone and the gender.
 
-    ``name``: case-insensitive name; a kind alone refers to its model of the gender, or its neutral
-    or only model. ``gender``: ``"female"``, ``"male"``, ``"neutral"`` or empty.
+    A kind without a model of the gender has its neutral or only model.
     """
     if folder is None:
         return None
@@ -148,12 +137,7 @@ def find_model(name: str, folder: Path | None, gender: str = "") -> Path | None:
 
 
 def named_files(file: str | Path, gender: str = "") -> tuple[Path, ...]:
-    """Return the files that a name selects: an existing path, a model, or a bundled figure.
-
-    ``file``: a path, a name as for ``find_model``, ``"body"`` or ``"fox"``. Other names are
-    returned as a path that does not exist. ``gender``: gender of a model that is selected by its
-    kind alone, see ``find_model``.
-    """
+    """Return the files of a path, a model or a bundled figure; the path itself if there is none."""
     path = Path(file)
     # Path.exists() would raise for a name that is too long.
     if os.path.exists(path) or len(path.parts) != 1:  # noqa: PTH110
@@ -215,11 +199,6 @@ def models_of_kind(member: str) -> list[str]:
 
 
 def family_model(member: str, gender: str = "") -> Path | None:
-    """Return MHR, or the model of a member of the SMPL family, in the remembered folder.
-
-    ``member``: ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; for other names, None is
-    returned. ``gender``: the preferred gender; if it is missing, the neutral or only model is
-    returned.
-    """
+    """Return MHR or an SMPL member's model of the gender, or its neutral or only one; or None."""
     kind = _KINDS.get(member)
     return None if kind is None else find_model(kind, load_model_folder(), gender)

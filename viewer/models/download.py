@@ -32,12 +32,7 @@ def pip_command(name: str, folder: str | Path) -> list[str]:
 
 
 def add_model(name: str) -> Path:
-    """Download a model into the data folder and return its file.
-
-    Raises ``ViewerError`` if it cannot be downloaded; the message contains pip's last line and the
-    command. Raises ``OutputError`` if the data folder cannot be written. Raises ``FormatError`` if
-    the downloaded file is not the model.
-    """
+    """Download a model into the data folder and return its file; errors contain the command."""
     folder = data_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)

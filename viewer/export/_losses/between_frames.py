@@ -53,15 +53,7 @@ _Sampler = Callable[[Floats], Frames]
 
 
 def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[Diagnostic]:
-    """Return a note about the error of sampling a motion at a fixed rate, if there is one.
-
-    Between written frames, rotations are interpolated along the shorter arc and everything else
-    linearly.
-
-    ``path``: the written file.
-    ``animation``: contents of the file.
-    ``how``: skinning of the mesh.
-    """
+    """Return a note about the error of interpolating between the written frames, if there is one."""
     motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
     written = SampledClip(
         motion.name,
@@ -85,17 +77,7 @@ def between_losses(
     how: Skinning,
     also: Floats | None = None,
 ) -> list[Diagnostic]:
-    """Return a note with the largest errors between an animation's frames, if there are any.
-
-    Keys are searched for the times of the largest error. A capture is defined only at
-    its own frames, and is compared there.
-
-    ``path``: the written file.
-    ``animation``: contents of the file.
-    ``found``: function from seconds (T,) to the poses in the file.
-    ``how``: skinning of the mesh.
-    ``also`` (T,): additional times at which captures are compared, seconds.
-    """
+    """Return a note with the largest errors of a file between an animation's frames, if any."""
     estimate: Phrase | str = ""
     if animation.motion.timing is None:
         edges = np.union1d(
@@ -175,17 +157,7 @@ def _repeated(channel: Channel, start: float, stop: float) -> Floats:
 def _worst_times(
     figure: Figure, one: _Sampler, other: _Sampler, edges: Floats, rate: float, how: Skinning
 ) -> _WorstTimes:
-    """Return candidate times of the largest distance between two motions.
-
-    Curves are smooth between their keys, so the distance is sampled there, and the highest samples
-    are refined.
-
-    ``figure``: figure without its shape applied.
-    ``one``, ``other``: functions from seconds (T,) to poses of the figure, none of them missing.
-    ``edges`` (E,): ascending times between which both are smooth, seconds.
-    ``rate``: frames per second; defines the shortest relevant span.
-    ``how``: skinning of the mesh; LBS replaces its method.
-    """
+    """Return times of the largest distance of motions that are smooth between ``edges`` (E,), s."""
     spans = _spans(edges, _SHORT / rate)
     if len(spans) == 0:
         return _WorstTimes(np.zeros(0), 0, False)

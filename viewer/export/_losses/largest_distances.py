@@ -65,14 +65,7 @@ class Apart:
 
 
 def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
-    """Return the distance, in figure units, up to which rounding errors are not reported.
-
-    ``figure``: figure that defines the size.
-    ``frames``: frames that define the distance of the joints from the origin. The tolerance grows
-    with this
-      distance, since numbers have larger rounding errors there, up to five times the usual one.
-    ``rows`` (F,): the frames to use.
-    """
+    """Return the distance in figure units that rounding explains; it grows far from the origin."""
     some = frames_between(frames, rows[:: sampling(len(rows))])
     return tolerance(figure, reach_of(figure, some))
 
@@ -100,13 +93,7 @@ def tolerance(figure: Figure, reach: float) -> float:
 
 
 def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | None = None) -> Apart:
-    """Return the largest distances between joints and vertices of two sides over all poses.
-
-    ``first``, ``second``: sides with the same joints and vertices, in the same space.
-    ``rows`` (F,): frames of the first side.
-    ``least``: threshold below which distances are ignored.
-    ``frames`` (F,): frames of the second side; the same if omitted.
-    """
+    """Return the largest distances above ``least``; ``frames`` are the second side's rows."""
     others = rows if frames is None else frames
     if first.body is None or second.body is None:
         far = heights(first, second, rows, others)

@@ -34,11 +34,7 @@ def shape_changes(frames: Frames) -> bool:
 
 
 class PartLosses:
-    """Largest errors of a file without a mesh, found part by part.
-
-    ``how``: skinning of the mesh; LBS replaces its method. ``n_frames``: number of all frames that
-    are compared: those in which the figure is present.
-    """
+    """Largest errors of a file without a mesh, found part by part; ``n_frames`` are compared."""
 
     def __init__(self, how: Skinning, n_frames: int) -> None:
         self._how, self._n_frames = linear_as_opened(how), n_frames
@@ -47,10 +43,7 @@ class PartLosses:
         self._vertices: Farthest | None = None
 
     def look(self, part: SampledAnimation, written: Side, shape: Floats) -> None:
-        """Compare the next part with the contents of the file, indexed by the part's frames.
-
-        ``shape`` (S,): shape weights of the file's skeleton.
-        """
+        """Compare the next part with the file's poses of its frames, for shape weights (S,)."""
         figure, frames = part.figure, part.frames
         rows = np.flatnonzero(frames.present)
         found = apart(figure_side(figure, frames, self._how, shape), written, rows, 0.0)

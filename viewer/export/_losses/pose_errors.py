@@ -46,11 +46,7 @@ def requested_causes(figure: Figure, how: Skinning) -> list[Phrase]:
 
 
 class PoseLosses:
-    """The largest errors of the poses of a figure that a file, or several, contain.
-
-    ``figure``: the original, without its shape applied.
-    ``how``: the requested skinning.
-    """
+    """The largest errors of the poses of a figure, unshaped, that one or several files contain."""
 
     def __init__(self, figure: Figure, how: Skinning) -> None:
         self._figure, self._how, self._looked = figure, how, 0
@@ -65,12 +61,9 @@ class PoseLosses:
         sources: Ints | None = None,
         frame: int = 0,
     ) -> None:
-        """Compare a pose that was read back with the figure in the original pose.
+        """Compare a file's vertices (N, 3) and joints (J, 3) with the figure in the original pose.
 
-        ``pose``: the original.
-        ``vertices`` (N, 3), ``joints`` (J, 3): positions in the file, in the figure's space.
         ``sources`` (N,): vertex of the figure for each vertex of the file; the same if omitted.
-        ``frame``: index of the frame.
         """
         self._looked += 1
         figure = self._figure
@@ -90,11 +83,7 @@ class PoseLosses:
     def notes(
         self, path: Path, first_frame: int | None = None, causes: list[Phrase] | None = None
     ) -> list[Diagnostic]:
-        """Return a note with the largest errors, if there are any.
-
-        ``first_frame``: number of the first frame; None for a single pose.
-        ``causes``: causes of errors of vertices, besides requested changes.
-        """
+        """Return a note with the largest errors, and ``causes`` of those of vertices, if any."""
         found = Apart(self._joints, self._vertices, self._looked, self._looked)
         notes = apart_notes(path, self._figure, found, first_frame)
         if self._vertices is None:

@@ -85,14 +85,7 @@ def figure_side(
     reference: Floats,
     columns: Rows | None = None,
 ) -> Side:
-    """Return an animated figure as a comparable side.
-
-    ``figure``: figure without its shape applied.
-    ``frames``: its poses.
-    ``how``: skinning of the mesh.
-    ``reference`` (S,): weights of the reference shape.
-    ``columns`` (M,): changing blend shapes; determined from these frames if omitted.
-    """
+    """Return an animated, unshaped figure as a side; ``columns`` are its changing blend shapes."""
     chosen = changing(frames, reference) if columns is None else columns
     body = None if figure.mesh is None else _body(figure, how, reference, chosen)
     corrects = body is not None and body.correctives is not None

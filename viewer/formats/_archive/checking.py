@@ -39,13 +39,10 @@ def finite(
     part: Part = "",
     places: NDArray[np.integer] | None = None,
 ) -> Floats:
-    """Return numbers as float64, all finite in double and single precision.
+    """Return numbers (N, ...) as float64, all finite in single precision, or refuse the file.
 
-    ``values``: (N, ...), numbers to check. ``part``: part of the figure or motion, see
-    ``Diagnostic``. ``places``: (N,), vertex or joint of each row; the index of the row if omitted.
-    Returns (N, ...), neutral values in place of invalid ones, unless the file is refused: NaN for
-    positions, the identity for bind matrices, otherwise 0. Raises ``FormatError`` if a number is
-    not finite; the message states the key and the number.
+    If it is read nevertheless, invalid ones become NaN for positions, the identity for bind
+    matrices, otherwise 0. ``places`` (N,): vertex or joint of each row.
     """
     numbers, bad = _invalid(values)
     if bad is None:
@@ -86,10 +83,7 @@ def last_axis_first(archive: Archive, key: str, array: Deferred) -> Deferred:
 
 
 def finite_or_nan(archive: Archive, key: str, values: NDArray[Any]) -> Floats:
-    """Return numbers of frames as float64, NaN for those that ``finite`` would refuse.
-
-    The reader turns such frames into gaps, see ``_frame_gaps.py``.
-    """
+    """Return numbers of frames as float64, NaN (later a gap) for those that ``finite`` refuses."""
     numbers, bad = _invalid(values)
     if bad is None:
         return numbers
@@ -142,11 +136,7 @@ def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
 
 
 def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int) -> Ints:
-    """Return triangles with valid vertex indices: (T, 3) int32.
-
-    ``values``: (T, 3), vertex indices. Raises ``FormatError`` if an index is not between 0 and V -
-    1; if the file is not refused, another corner of the triangle replaces it.
-    """
+    """Return vertex indices of triangles (T, 3) as int32; invalid ones are refused or replaced."""
     if are_indices(values, n_vertices):
         return values.astype(np.int32)
     fits = (values >= 0) & (values < n_vertices) & (values == np.floor(values))
@@ -163,9 +153,5 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
 
 
 def are_indices(values: NDArray[Any], end: int) -> bool:
-    """Return whether all numbers are integers from 0 to ``end - 1``.
-
-    >>> are_indices(np.array([0.0, 2.0]), 3), are_indices(np.array([np.nan]), 3)
-    (True, False)
-    """
+    """Return whether all numbers are integers from 0 to ``end - 1``."""
     return bool(((values >= 0) & (values < end) & (values == np.floor(values))).all())

@@ -71,12 +71,7 @@ def open_npz(
     opened: Callable[[str, bytes], Archive | None] | None = None,
     listed: Callable[[str, bytes], Value] | None = None,
 ) -> Archive:
-    """Open an ``.npz`` file; errors as of ``open_archive``.
-
-    ``opened``: opens an array of objects, given its key and its pickle, as a nested archive; None
-    if the objects have no names. It is called only for arrays whose contents are requested.
-    ``listed``: returns the objects as a list, given the same; None if there is only one.
-    """
+    """Open an ``.npz`` file; ``opened`` and ``listed`` read a key's objects from their pickle."""
     directory.check(_key)
     members, storage = {_key(member): member for member in directory.members}, directory.storage
     values = {key: _open_member(directory, member) for key, member in members.items()}
@@ -99,11 +94,7 @@ def open_npz(
 def open_npy(
     source: Source, opened: Callable[[Source, int], Archive | None] | None = None
 ) -> Archive:
-    """Open an ``.npy`` file as an archive with the single key "arr_0".
-
-    ``opened``: opens an array of objects, given the offset of its pickle; None if the objects have
-    no names.
-    """
+    """Open an ``.npy`` file as an archive with the single key "arr_0"."""
     key = "arr_0"
     storage = StoredFile(source)
     with storage.open() as stream:

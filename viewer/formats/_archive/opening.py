@@ -55,16 +55,12 @@ _UNPACKERS: dict[str, Callable[[], Any]] = {
 
 
 def is_archive(head: bytes) -> bool:
-    r"""Return whether a file that begins with these bytes is a pickle, an ``.npz`` or an ``.npy``.
-
-    >>> is_archive(b"\x80\x02}q\x01."), is_archive(b"positions 4 {")
-    (True, False)
-    """
+    """Return whether these first bytes are those of a pickle, an ``.npz`` or an ``.npy``."""
     return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None or _is_compressed(head)
 
 
 def _is_compressed(head: bytes) -> bool:
-    r"""Return whether a file that begins with these bytes may be a compressed pickle.
+    """Return whether a file that begins with these bytes may be a compressed pickle.
 
     >>> _is_compressed(zlib.compress(bytes([128, 4]) + b"}." * 20)), _is_compressed(b"x^2 + y^2")
     (True, False)
@@ -83,12 +79,7 @@ def _is_compressed(head: bytes) -> bool:
 
 
 def open_archive(source: Source) -> Archive:
-    """Open a pickle, ``.npz``, ``.npy``, torch or JSON file, detected by its first bytes.
-
-    ``source``: the file. Harmless errors are added to its warnings. Its ``max_size`` also limits
-    the total unpacked size of compressed files. Raises ``FormatError`` if the file is none of
-    these, is damaged, or contains anything other than data.
-    """
+    """Open a pickle, ``.npz``, ``.npy``, torch or JSON file, detected by its first bytes."""
     # Imported late, so that readers of other formats do not import them.
     from viewer.formats._archive.npz import open_npy, open_npz
     from viewer.formats._archive.zip import open_directory
@@ -191,11 +182,7 @@ def _machine(source: Source, data: Data, start: int = 0) -> Machine:
 
 
 def unpacked(source: Source) -> bytes:
-    """Return the pickle in a compressed file.
-
-    Raises ``FormatError`` if the data are damaged, not a pickle, packed by an unsupported method,
-    or too large.
-    """
+    """Return the pickle in a compressed file; ``max_size`` of the source limits it, too."""
     head = source.peek(64)
     for name, kind in _UNSUPPORTED.items():
         if kind.match(head):

@@ -13,11 +13,7 @@ from viewer.phrases import listed, optional, printable
 
 
 def archive_format(source: Source, formats: Mapping[str, Collection[str]]) -> str:
-    """Return the key of an archive's format, determined by its keys and the shapes of its arrays.
-
-    ``formats`` are the keys that identify an archive of each format. Raises FormatError with the
-    archive's keys if none matches.
-    """
+    """Return the key of an archive's format, found by its keys and the shapes of its arrays."""
     archive = archive_of(source)
     keys = archive.keys
     for kind, marks in formats.items():
@@ -67,12 +63,7 @@ _OF_EASYMOCAP = ("Rh", "Th", "keypoints3d", "annots")
 
 
 def json_format(source: Source, key: str, poses: Collection[str]) -> str:
-    """Return the key of the format of a JSON file: motion, people in frames, or ``key``.
-
-    ``key`` is the format of its first bytes: ``"easymocap"`` for a list of people, or ``"pose"``,
-    which is also the result for files that cannot be read, so that its reader reports the error.
-    ``poses`` are the keys of poses.
-    """
+    """Return a JSON file's format; ``key``, found by its first bytes, if it cannot be read."""
     try:
         archive = archive_of(source)
         first = archive.inside("0") if archive.is_list else archive

@@ -45,10 +45,7 @@ class Opaque:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sparse:
-    """A checked sparse matrix in compressed columns ("csc"), rows ("csr") or as entries ("coo").
-
-    Raises ``InvalidValueError`` if the parts are inconsistent.
-    """
+    """A checked sparse matrix in compressed columns ("csc"), rows ("csr") or as entries ("coo")."""
 
     shape: tuple[int, int]
     """(2,). Rows and columns as declared by the file, to be checked before a dense matrix is
@@ -138,15 +135,7 @@ class Sparse:
             )
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
-        """Return row, column and value of every stored entry.
-
-        Returns (N,), entries in the order of the file. A pair may occur twice; such entries are
-        summed.
-
-        >>> eye = Sparse((2, 2), np.ones(2), np.arange(2), np.arange(3), "csc")
-        >>> [part.tolist() for part in eye.entries()]
-        [[0, 1], [0, 1], [1.0, 1.0]]
-        """
+        """Return row, column and value (N,) of every entry in file order; repeated ones add up."""
         starts = self.indptr.astype(np.intp)
         if self.layout == "coo":
             return self.indices.astype(np.intp), starts, self.data
@@ -200,13 +189,7 @@ class Archive:
         return key in self.keys
 
     def get(self, key: str) -> Value:
-        """Return a value: an array is a ``Deferred``, a matrix may be ``Sparse``.
-
-        Containers are new lists, tuples and dicts. Values that would run code, or are nested
-        infinitely, are ``Opaque``. Arrays are read-only, in C order and native byte order.
-
-        Raises ``FormatError`` if there is no such key, or its value is inconsistent.
-        """
+        """Return a value: arrays as ``Deferred``, what would run code as ``Opaque``."""
         if key not in self._values:
             if key not in self.keys:
                 raise self.fault("F002.no-key: {item}: key not found", item=key)
@@ -214,10 +197,7 @@ class Archive:
         return self._values[key]
 
     def inside(self, key: str) -> Archive | None:
-        """Return a nested dict as a separate archive, without reading its values.
-
-        The items of a list of dicts are called "0", "1" …; None if the value is neither.
-        """
+        """Return a dict, or a list of dicts by index, as an archive without reading its values."""
         if key not in self._branches:
             found = self._branch(key) if self._branch is not None and key in self.keys else None
             self._branches[key] = found
@@ -233,13 +213,9 @@ class Archive:
         return found
 
     def array(self, key: str, shape: Axes | None = None, kinds: str = "biuf") -> Deferred:
-        """Return an array of the given shape and kinds of values.
+        """Return an array of the given shape and ``dtype.kind``, also from nested lists or objects.
 
-        ``key``: name in the file. Numbers or arrays in nested lists, or in an array of objects, are
-        treated as an array, with NaN in place of None and of empty items. ``shape``: for each axis
-        a size, None for any, or a letter: axes with the same letter are equal. ``kinds``: accepted
-        letters of ``numpy.dtype.kind``. Raises ``FormatError``: ``KEY: expected V x 3 numbers,
-        found 800 x 4 numbers``.
+        None and empty items of lists become NaN.
         """
         value = self.get(key)
         if not isinstance(value, Deferred):
@@ -263,11 +239,7 @@ class Archive:
         return self._arrays[key]
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
-        """Return a matrix in sparse form, whether it is stored sparse or dense.
-
-        ``shape``: as for ``array``; checked before memory of that size is allocated. Raises
-        ``FormatError`` if it is not a matrix of numbers of this shape, or is inconsistent.
-        """
+        """Return a sparse or dense matrix as sparse, its shape checked before it is allocated."""
         value = self.get(key)
         if isinstance(value, Sparse):
             if _fits(shape, value.shape):
@@ -281,10 +253,7 @@ class Archive:
         return Sparse(dense.shape, dense[rows, columns], columns, starts, "csr")
 
     def text(self, key: str) -> str:
-        """Return a single string, stored as a string, bytes, or an array of one of them.
-
-        Raises ``FormatError`` if the value is none of these.
-        """
+        """Return a single string, stored as a string, bytes, or an array of one of them."""
         found = texts_in(self.objects(key))
         if len(found) != 1:
             raise self.fault(
@@ -345,11 +314,7 @@ class Archive:
 
 
 def describe(value: Value) -> Phrase:
-    """Return a description of a value for messages.
-
-    >>> str(describe(Deferred((800, 3), "f4", lambda: np.zeros((800, 3)))))
-    '800 x 3 float32'
-    """
+    """Return a description of a value for messages, such as ``800 x 3 float32``."""
     if isinstance(value, Deferred):
         return _described_array(value)
     if isinstance(value, Sparse):
@@ -429,10 +394,7 @@ def _from_lists(value: Value) -> Deferred | None:
 
 
 def _plain(value: Value, is_item: bool = False) -> Any:
-    """Return nested lists of numbers and arrays; raise ValueError for other values.
-
-    Only numbers are passed to numpy: one long string would make all elements that long.
-    """
+    """Return nested lists of numbers and arrays; raise ValueError for other values."""
     if isinstance(value, list | tuple):
         return [_plain(item, not is_item) for item in value]
     if isinstance(value, Deferred) and value.dtype.kind in "biuf":
@@ -448,11 +410,7 @@ def _is_missing(item: Any) -> bool:
 
 
 def _widened(array: Deferred) -> Deferred:
-    """Return an array whose half floats become doubles before anything is computed with them.
-
-    A half overflows at 65504: comparing it with a larger Python number, or adding two halves,
-    already causes a warning.
-    """
+    """Return an array whose half floats become doubles before anything overflows at 65504."""
     if array.dtype != np.float16:
         return array
     return Deferred(array.shape, np.float64, lambda: _in_double(array.values()))
@@ -464,9 +422,7 @@ def _in_double(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def array_dtype(code: str) -> np.dtype[Any] | None:
-    """Return a numeric or string dtype by its numpy spelling, or None for other types.
-
-    Records, sub-arrays, objects, dates and platform-dependent types are not supported.
+    """Return a numeric or string dtype by its numpy spelling; None for all others.
 
     >>> array_dtype(">f4"), array_dtype("|O"), array_dtype("S0")
     (dtype('>f4'), None, None)

@@ -59,11 +59,7 @@ class ZipDirectory:
     """Its members, whose sizes have been checked by ``check``."""
 
     def check(self, key_of: Callable[[zipfile.ZipInfo], str]) -> None:
-        """Refuse unreadable or oversized members before anything is unpacked.
-
-        Raises ``FormatError`` if two members have the same key, or one is encrypted, packed by an
-        unsupported method, or too large.
-        """
+        """Refuse repeated, encrypted, unreadable or oversized members before unpacking any."""
         source, size = self.source, self.storage.size
         for name, count in Counter(map(key_of, self.members)).items():
             if count > 1:
@@ -114,10 +110,7 @@ class ZipDirectory:
 
 @contextmanager
 def open_directory(source: Source) -> Iterator[ZipDirectory]:
-    """Open a zip archive; damage found while it is open is an error of the source.
-
-    Raises ``FormatError`` if the archive is damaged.
-    """
+    """Open a zip archive; damage found while it is open is an error of the source."""
     storage = StoredFile(source)
     try:
         with storage.open() as file, zipfile.ZipFile(file) as archive:

@@ -79,10 +79,7 @@ class Machine(pickle._Unpickler):
         self._step_at = 0
 
     def run(self) -> object:
-        """Execute all opcodes up to STOP, and return the remaining value.
-
-        Raises ``FormatError`` at the first opcode that is damaged or refused.
-        """
+        """Execute all opcodes up to STOP, and return the remaining value."""
         self.memo: dict[int, object] = {}
         self.metastack: list[list[object]] = []
         self.stack = []
@@ -123,10 +120,7 @@ class Machine(pickle._Unpickler):
             )
 
     def nested(self, data: Data, start: int, end: int) -> Machine:
-        """Return a machine for a pickle inside this one; it continues with the same budget.
-
-        Raises ``FormatError`` if pickles are nested too deeply.
-        """
+        """Return a machine for a pickle inside this one; it continues with the same budget."""
         if self.depth >= _DEEPEST:
             raise self.fail(
                 Phrase("expected at most {most} nested pickles, found more", most=_DEEPEST)

@@ -78,10 +78,7 @@ _WRONG = object()  # returned for a call with unusual arguments
 
 
 def find(module: str, name: str) -> StandIn:
-    """Return a new stand-in for a name.
-
-    Raises ``InvalidValueError`` if the pair is not in the table.
-    """
+    """Return a new stand-in for a name, or raise if it is not in the table."""
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
     role = _ROLES.get((module, name))
     if module.startswith("joblib.numpy_pickle") and name in _OLD_WRAPPERS:
@@ -104,10 +101,7 @@ def find(module: str, name: str) -> StandIn:
 
 
 def call(function: object, arguments: object) -> tuple[object, int]:
-    """Return the result of a function call, and the number of copied items.
-
-    ``function``: a ``StandIn``; anything else is refused.
-    """
+    """Return the result of calling a ``StandIn``, and the number of copied items."""
     if not isinstance(function, StandIn) or function.role not in (*_CALLS, *TORCH_CALLS):
         raise InvalidValueError(
             Phrase(
@@ -164,12 +158,9 @@ def build(target: object, state: object) -> None:
 
 
 def as_key(value: object) -> str | bytes | int:
-    """Return a value as the key of a dict: a string, bytes, or a number that hashes to itself.
-
-    Raises ``InvalidValueError`` if it has another type. Objects are refused so that their hashes
-    are never computed; large numbers are refused because they could be chosen so that all hashes
-    collide.
-    """
+    """Return a string, bytes, or a number that hashes to itself, as the key of a dict."""
+    # Objects are refused so that their hashes are never computed, and large numbers because they
+    # could be chosen so that all hashes collide.
     if isinstance(value, str | bytes):
         return value
     if isinstance(value, Span) and len(value) <= _LONGEST_KEY:

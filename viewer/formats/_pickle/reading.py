@@ -47,12 +47,7 @@ def warn_of_rest(machine: Machine) -> None:
 
 
 def named_archive(source: Source, kind: str, size: int, whole: object) -> Archive:
-    """Return the values that a pickle builds, as an archive.
-
-    ``source``: its file, whose bytes stay in memory as long as any of the arrays exists. ``kind``:
-    as for ``Archive``. Raises ``FormatError`` if it is neither a dict with string keys, nor a list
-    or dict of dicts.
-    """
+    """Return the dict with string keys, or the dicts, that a pickle builds, as an archive."""
     found = _objects(whole)
     is_list = not isinstance(found, dict)
     return _archive(source, kind, size, _named(source, found), (), is_list)
@@ -61,10 +56,7 @@ def named_archive(source: Source, kind: str, size: int, whole: object) -> Archiv
 def nested_archive(
     source: Source, kind: str, size: int, whole: object, path: Keys
 ) -> Archive | None:
-    """Return the values that a pickle inside an archive builds; None if they have no names.
-
-    ``path`` has the keys and indices that lead to it; for the others, see ``named_archive``.
-    """
+    """Return the archive of a pickle at ``path`` in another one; None if it has no names."""
     found = _items(_objects(whole))
     if found is None:
         return None
@@ -121,10 +113,7 @@ def _archive(
 
 
 def _items(value: object) -> Mapping[str | bytes | int, object] | None:
-    """Return a dict, or by index the dicts of a list, or its lists of dicts; else None.
-
-    None and empty items of a list stand for missing frames.
-    """
+    """Return a dict, or by index the dicts of a list (None for missing frames); else None."""
     if isinstance(value, dict):
         return value
     if isinstance(value, list | tuple) and any(map(_has_dict, value)) and all(map(_is_nest, value)):
@@ -192,12 +181,7 @@ class _EndlessError(Exception):
 
 
 def resolve(path: Path, size: int, key: str, value: object) -> Value:
-    """Return a value of the pickle as specified by ``Archive.get``.
-
-    ``size``: length of the file in bytes; without shared values, no value can have more items.
-    Raises ``FormatError`` if an array, matrix or expression is inconsistent, or a string cannot be
-    decoded.
-    """
+    """Return a value of a pickle of ``size`` bytes as specified by ``Archive.get``."""
     try:
         return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)
     except _EndlessError:

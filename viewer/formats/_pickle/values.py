@@ -58,19 +58,13 @@ class Span:
         return memoryview(self.raw())
 
     def text(self) -> str:
-        """Return the string, which is decoded only once.
-
-        Raises ``ValueError`` if the bytes cannot be decoded.
-        """
+        """Return the string, which is decoded only once; ValueError if that is impossible."""
         if self._text is None:
             self._text = self._decoded()
         return self._text
 
     def packed(self) -> Span:
-        """Return the bytes of an array, which Python 3 may write as characters 0 to 255.
-
-        Raises ``ValueError`` if there are other characters.
-        """
+        """Return the bytes of an array, which Python 3 may write as characters 0 to 255."""
         if self.coding in (None, "latin-1"):
             return self
         if self._packed is None:
@@ -143,10 +137,7 @@ class Array:
     what: Phrase = field(default_factory=lambda: Phrase("uninitialised array"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
-        """Set shape and values, whose sizes in bytes must agree.
-
-        Raises ``InvalidValueError`` if the sizes differ.
-        """
+        """Set shape and values, whose sizes in bytes must agree."""
         found = dtype.dtype()
         if found is None:
             self.what = dtype.what()
@@ -176,10 +167,7 @@ class Array:
         return Deferred(shape, self.dtype.newbyteorder("="), partial(self._load, fail))
 
     def values(self) -> NDArray[Any]:
-        """Return the values, as a view of the file if byte and memory order allow it.
-
-        Raises ``InvalidValueError`` if a string contains invalid code points.
-        """
+        """Return the values, as a view of the file if byte and memory order allow it."""
         if self.payload is None or self.dtype is None:
             raise InvalidValueError(
                 Phrase("expected an array of numbers, found {found}", found=self.what)
@@ -212,11 +200,7 @@ def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
 
 
 def noun(value: object) -> Phrase:
-    """Return a description of a value on the stack for messages.
-
-    >>> str(noun([1, 2])), str(noun(StandIn("numpy.ndarray", "ndarray")))
-    ('a list', 'numpy.ndarray')
-    """
+    """Return a description of a value on the stack for messages: ``a list``, ``numpy.ndarray``."""
     if isinstance(value, StandIn):
         return Phrase("{name}", name=value.name)
     if isinstance(value, Instance):

@@ -88,11 +88,7 @@ _Target = tuple[str, tuple[str, ...]]
 
 
 def read(source: Source) -> Figure:
-    """Read the model with the rig that ``source.options`` names.
-
-    Returns the mean body, z up, in metres; phenotypes, facial actions and local changes are its
-    shapes. Raises ``FormatError`` if a file is missing or damaged, or there is no such rig.
-    """
+    """Read the mean body (z up, metres) with all its shapes and the rig that the options name."""
     name = source.option("rig") or "default"
     if name not in RIGS:
         raise source.fault(
@@ -218,11 +214,7 @@ def _listed(about: object, key: str) -> list[dict[str, Any]]:
 
 
 def _read_row(package: Package, name: str, base: Floats, is_newborn: bool) -> tuple[Ints, Floats]:
-    """Read a target.
-
-    ``base``: (B, 3), the base mesh. Returns ``vertices``: (N,) int32, vertices of the base mesh;
-    ``offsets``: (N, 3), decimetres, y up.
-    """
+    """Read a target: vertices (N,) of the base mesh (B, 3), offsets (N, 3) in decimetres, y up."""
     data = _COMMENT.sub(b"", package.read(name))
     numbers, bad = parse_numbers(data, 0, len(data))
     if bad >= 0 or len(numbers) % 4:

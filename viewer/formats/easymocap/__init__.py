@@ -38,11 +38,7 @@ _LEVELS = 3  # number of folders that may contain the cameras, from the folder o
 
 
 def read(source: Source) -> Capture:
-    """Open a recording with default options.
-
-    Returns a recording of which only the first people have been read. Raises ``FormatError`` if
-    there are no frames, or no person in any frame.
-    """
+    """Open a recording with default options; only its first people have been read."""
     return open_capture(source)
 
 

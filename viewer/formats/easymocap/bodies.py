@@ -88,12 +88,7 @@ _LAYOUTS = {
 
 
 def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) -> BodyLayout:
-    """Return the layout of a record, as determined by the length of its ``poses``.
-
-    ``usual``: numbers of values in the recording, see ``usual_widths``. Raises ``RecordError`` if
-    no layout has this length, the length is unusual, or the record is invalid and therefore cannot
-    determine the layout of others.
-    """
+    """Return the layout of a valid record, found by the length of its ``poses``."""
     usual = usual or {}
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
@@ -141,12 +136,7 @@ def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) 
 def with_coefficients(
     layout: BodyLayout, record: dict[str, Any], usual: Mapping[str, int]
 ) -> BodyLayout:
-    """Return a layout extended by coefficients that occur in a record for the first time.
-
-    ``usual`` are the numbers of values in the recording, see ``usual_widths``.
-
-    Raises ``RecordError`` if the coefficients are not finite numbers.
-    """
+    """Return a layout extended by coefficients that occur in a record for the first time."""
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
     more = [(key, max(width_of(record, key), usual.get(key, 0))) for key in new]
@@ -154,14 +144,8 @@ def with_coefficients(
 
 
 def usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
-    """Return the most frequent number of ``poses``, and the largest numbers of coefficients.
-
-    They are those of a few frames spread over the recording. The first record alone must not decide
-    for all others, because it may be unusual.
-
-    ``max_size``: maximum size of a file in bytes. Returns the number of values of a record by key;
-    empty if there are no valid bodies.
-    """
+    """Return the most frequent number of ``poses``, and the largest numbers of coefficients."""
+    # The first record alone must not decide for all others, because it may be unusual.
     found = [dict(layout.widths) for layout in _layouts(files, max_size)]
     if not found:
         return {}
@@ -258,10 +242,7 @@ class BodyRows(Rows):
         self._plan = [(key, count, buffer.fromlist) for (key, count), buffer in self._buffers()]
 
     def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
-        """Add one record.
-
-        Raises ``RecordError`` if a value is missing, or its length has changed.
-        """
+        """Add one record, or raise ``RecordError`` if a value is missing or its length differs."""
         try:
             for key, count, put in self._plan:
                 if key not in record:
@@ -312,11 +293,7 @@ class BodyRows(Rows):
         return zip(self.layout.widths, self.buffers, strict=True)
 
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
-        """Return the values by key, a mask of valid rows, and the errors in invalid rows.
-
-        Returns ``values``: mapping of str to (N, C); ``keep``: true for valid rows; ``faults``:
-        error in each invalid row.
-        """
+        """Return values (N, C) by key, whether each row (N,) is valid, and the faults of others."""
         keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
         values: dict[str, Floats] = {}
         faults: list[RowFault] = []
@@ -424,13 +401,7 @@ def _constant(rows: Floats | None) -> Floats | None:
 
 
 def hold(rows: Floats, is_given: Bools, known: Floats | None) -> Floats:
-    """Return rows with each missing row replaced by the last valid row before it.
-
-    ``rows``: (N, C), rows in time order; the content of missing rows is ignored. ``is_given``: (N,)
-    bool, true for rows in the file. Non-finite rows are preserved, but not repeated. ``known``:
-    (C,) or None, the last valid row before all of these; None means 0. Returns (N, C), ``rows``
-    itself if no row is missing.
-    """
+    """Return rows (N, C) whose missing ones repeat the last finite given one, or ``known``."""
     if is_given.all():
         return rows
     last = _last_good(rows, is_given)

@@ -76,11 +76,7 @@ def _fault(source: Source, key: str, line: int, **values: Any) -> FormatError:
 def find_cameras(
     folders: Sequence[Path], max_size: int
 ) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
-    """Return the cameras of the first folder with calibration files.
-
-    ``max_size``: larger files, in bytes, are refused. Returns ``views``: cameras in the order of
-    the files; empty if there are no files or they are invalid; ``notes``: errors in the files.
-    """
+    """Return the cameras of the first folder with calibration files, and notes on their errors."""
     for folder in folders:
         there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]
         if len(there) == 2:
@@ -226,10 +222,7 @@ class _Matrix:
 
 
 def read_storage(source: Source) -> Storage:
-    """Return the content of a FileStorage file.
-
-    Raises ``FormatError`` if a line is not supported; the error has the line.
-    """
+    """Return the content of a FileStorage file; errors name the unsupported line."""
     file = Storage(source)
     values = file.values
     matrix: _Matrix | None = None

@@ -54,11 +54,7 @@ class FrameFiles:
 
 
 def find_frames(source: Source) -> FrameFiles:
-    """Find the frame files of an EasyMocap output folder, one of its subfolders, or a single file.
-
-    ``source``: the folder or file; ignored files are added to its warnings. Raises ``FormatError``
-    if there are no frame files, or a folder cannot be listed.
-    """
+    """Find the frame files of an EasyMocap output folder, one of its subfolders, or a file."""
     if not source.is_folder:
         folder = FrameFolder(source.path.parent)
         return _on_timeline(source, [folder], [[source.path.name]])
@@ -198,9 +194,7 @@ def _stem(name: str) -> str:
 
 
 def _numbered(names: list[str]) -> dict[str, int]:
-    """Return the numbers in the names of frame files, which are alike except for their number.
-
-    Other files are foreign if they are fewer; otherwise the names are not numbered.
+    """Return the numbers in the names of most files, which differ by them only; none if few do.
 
     >>> _numbered(["f01.json", "f02.json", "notes_2024.json"])
     {'f01.json': 1, 'f02.json': 2}

@@ -20,10 +20,7 @@ _MOST_NAMED = 5  # maximum number of missing frames listed in a message
 
 
 class ImageFolders:
-    """Images in folders; the last image shown for each camera is cached.
-
-    ``frame_rate``: frames per second.
-    """
+    """Images in folders; the last image shown for each camera is cached."""
 
     def __init__(self, folders: dict[str, Path], frame_rate: float, frames: range) -> None:
         self._rate, self._frames = frame_rate, frames
@@ -90,12 +87,7 @@ def find_images(
     frames: range,
     given: Path | None = None,
 ) -> ImageFolders | None:
-    """Return the images of calibrated cameras; None if there are none.
-
-    ``parents``: folders whose subfolder ``images`` is searched, in this order. ``frame_rate``:
-    frames per second. ``given``: folder to use instead; for a single camera, it may contain the
-    images themselves. Raises ``FormatError`` if the given folder has no images of any camera.
-    """
+    """Return calibrated cameras' images, in the given folder or an ``images`` nearby; or None."""
     for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
         folders = {view.name: parent / view.name for view in views if _is_name(view.name)}
         there = {name: folder for name, folder in folders.items() if folder.is_dir()}
@@ -133,9 +125,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 def _from_first(files: dict[int, Path], frames: range) -> dict[int, Path]:
-    """Return images with the numbers of a capture's frames.
-
-    Programs that save the frames of a video often count from 1, whereas captures count from 0.
-    """
+    """Return images by a capture's frames; images that count from 1 are moved to frame 0."""
+    # Programs that save the frames of a video often count from 1, whereas captures count from 0.
     is_shifted = files and min(files) == frames.start + 1 == 1 and max(files) == frames.stop
     return {number - 1: path for number, path in files.items()} if is_shifted else files

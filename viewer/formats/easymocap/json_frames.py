@@ -48,11 +48,7 @@ _decode = json.JSONDecoder(object_pairs_hook=unique).decode
 
 
 def load_people(path: str, max_size: int) -> list[Any]:
-    """Return the people in a frame file, unchecked; NaN and infinities are accepted.
-
-    ``max_size``: larger files, in bytes, are refused before they are read. Raises ``FormatError``
-    if the file cannot be read, or is not JSON with a list of people.
-    """
+    """Return the people in a frame file, unchecked; NaN and infinities are accepted."""
     text = _text(path, max_size)
 
     def fault(key: str, place: int | None, **values: Any) -> FormatError:
@@ -79,10 +75,7 @@ def _fault(key: str, path: str, line: int | None, **values: Any) -> FormatError:
 
 
 def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
-    """Return the line of a person's record, or of a key in it, in a frame file; for errors only.
-
-    ``path``, ``max_size``: as for ``load_people``, which has read the file.
-    """
+    """Return the line of a person's record, or of a key in it, in a frame file; for errors only."""
     try:
         text = _text(path, max_size)
     except FormatError:  # the file has changed since it was read
@@ -134,12 +127,7 @@ def _read(path: str, max_size: int) -> bytes:
 
 
 def person_of(record: Any, place: int) -> int | str:
-    """Return the person of a record: ``id``, ``personID``, or its index in the list.
-
-    A number as text is a number; other text is the name of a person.
-
-    Raises ``RecordError`` if the value is not a record, or its identity is invalid.
-    """
+    """Return a record's ``id`` or ``personID``, a name or a number, or its index in the list."""
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
     if not isinstance(record, dict):
@@ -175,10 +163,7 @@ def has_numbers(record: Record, key: str) -> bool:
 
 
 def row_of(record: Record, key: str) -> list[Any]:
-    """Return a key's numbers, which may be stored as a one-row matrix.
-
-    Raises ``RecordError`` if the value is not a list.
-    """
+    """Return a key's numbers, which may be stored as a one-row matrix."""
     values = record.get(key)
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
         values = values[0]
@@ -194,11 +179,7 @@ def limit_of(key: str) -> float:
 
 
 def width_of(record: Record, key: str, count: int | None = None) -> int:
-    """Return the number of values of a key, all finite, as the reference for other records.
-
-    ``count``: expected number of values; any number if omitted. Raises ``RecordError`` if the value
-    is not a list, has more or fewer values, or contains anything other than finite numbers.
-    """
+    """Return the number of a key's finite values, which other records must have, too."""
     count = len(row_of(record, key)) if count is None else count
     numbers = array("d")
     take_row(record, key, count, numbers.fromlist)
@@ -210,10 +191,7 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
 
 
 def take_row(record: Record, key: str, count: int, put: Any) -> None:
-    """Pass a key's numbers to ``put``, the ``fromlist`` of an ``array("d")``.
-
-    Raises ``RecordError`` if there are more or fewer values, or any is not a number.
-    """
+    """Pass a key's ``count`` numbers to ``put``, the ``fromlist`` of an ``array("d")``."""
     try:
         values = record[key]
         if len(values) == 1 and type(values[0]) is list:

@@ -453,10 +453,7 @@ def _is_odd(points: Floats) -> Bools:
 
 
 def _point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, _Parts]:
-    """Return the layout of a record's keypoints, and its keys with their numbers of points.
-
-    ``title``: name of the layout, used if ``keypoints3d`` has its number of points.
-    """
+    """Return the layout of a record's keypoints, and its keys with their numbers of points."""
     parts = [(key, _count(record, key)) for key in (_POINTS, *_BESIDE) if key in record]
     counts = [count for _, count in parts]
     body = keypoint_layout(counts[0], title if title in TITLES.get(counts[0], ()) else "")

@@ -98,11 +98,10 @@ def _size(intrinsics: Floats) -> tuple[int, int]:
 def _camera(
     world: Track, camera: Track, frames: Frames, intrinsics: Floats, rest_roots: RestRoots
 ) -> Cameras:
-    """Return the camera for which a figure in the world looks like its counterpart in camera space.
-
-    The pelvis is at J0 + t in either space, so R maps the roots' orientations and
-    T = (J0 + t) - R (J0 + t_world), with the rest pelvis J0 of the figure.
-    """
+    """Return the camera that sees a figure in the world as its counterpart in camera space."""
+    # A point x of the body at rest is at R_r (x - J0) + J0 + t in either space, J0 being the rest
+    # pelvis. The camera's R and T take one space to the other for all x: R = R_camera R_world^-1,
+    # and from x = J0, T = (J0 + t_camera) - R (J0 + t_world).
     roots = [rotation_vector_to_matrix(_root(track)) for track in (world, camera)]
     rotations = np.einsum("nij,nkj->nik", roots[1], roots[0])
     pelvis = rest_roots(world.shape)

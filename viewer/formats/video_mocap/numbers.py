@@ -42,10 +42,7 @@ class RowBudget:
         self._archive, self._most, self._left = archive, most, most
 
     def spend(self, count: int) -> None:
-        """Deduct a number of frames.
-
-        Raises ``FormatError`` if there are more than in any plausible recording.
-        """
+        """Deduct a number of frames; more than in any plausible recording are refused."""
         self._left -= max(count, 1)
         if self._left < 0:
             raise self._archive.source.fault(
@@ -74,11 +71,7 @@ def has(archive: Archive | None, *keys: str) -> bool:
 
 
 def person_number(key: str) -> int | None:
-    """Return the number of a person from a key, or None if the key is not a number.
-
-    >>> person_number("-1"), person_number("camera")
-    (-1, None)
-    """
+    """Return the number of a person from a key, or None if the key is not a number."""
     return int(key) if _PERSON.fullmatch(key) else None
 
 
@@ -187,11 +180,7 @@ def rotation_vectors(archive: Archive, key: str, form: Form) -> Floats:
 
 
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
-    """Return rotation vectors of rotation matrices (..., 3, 3); zeros become the identity.
-
-    Matrices in single precision are not exactly orthogonal; the nearest rotation is used, and NaN
-    in place of matrices that are neither near a rotation nor zero.
-    """
+    """Return rotation vectors of matrices (..., 3, 3) near a rotation; I for zero, else NaN."""
     return vectors_of(archive, key, rows(archive, key, shape))
 
 
@@ -219,11 +208,8 @@ def _rotations(archive: Archive, key: str, found: Floats) -> Floats:
 
 
 def six(archive: Archive, key: str, found: Floats) -> Floats:
-    """Return rotation vectors of 6D rotations (..., 6).
-
-    The numbers are the first two columns of a matrix, one after the other, which are made
-    orthonormal in this order (Zhou et al. 2019).
-    """
+    """Return rotation vectors of 6D rotations (..., 6): two columns (Zhou et al. 2019)."""
+    # Gram-Schmidt: the second column loses its part along the first one; the third one follows.
     first, second = found[..., :3], found[..., 3:]
     x = _unit(archive, key, first)
     y = _unit(archive, key, second - (x * second).sum(axis=-1, keepdims=True) * x)

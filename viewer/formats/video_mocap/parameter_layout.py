@@ -238,10 +238,7 @@ def _parts(archive: Archive) -> tuple[str, Archive] | None:
 
 
 def _along(archive: Archive, key: str, axis: int, count: int | None = None) -> Sequence[Value]:
-    """Return the items of a list, or those of an array along an axis; none of other values.
-
-    ``count``: the number of items; none if there are more or fewer.
-    """
+    """Return the items of a list, or of an array along an axis; none of other values or counts."""
     value = archive.objects(key)
     if axis == 0 and isinstance(value, list | tuple):
         return value if count in (None, len(value)) else ()
@@ -402,10 +399,7 @@ def _length(archive: Archive, key: str) -> int:
 
 
 def with_facts(found: list[ParameterDict]) -> list[ParameterDict]:
-    """Return dicts with the gender, model and rate that a dict beside them states.
-
-    Such a dict describes the parameters, as "meta" or "info", and has none itself.
-    """
+    """Return dicts with the gender, model and rate that a dict beside them, as "meta", states."""
     on_path = {id(scope) for one in found for scope in (one.archive, *one.around)}
     described: dict[int, list[tuple[str, Archive]]] = {}
 

@@ -192,10 +192,7 @@ def _number(value: Value) -> float | None:
 
 
 def _people(source: Source, found: list[ParameterDict]) -> tuple[dict[int, Track], tuple[int, ...]]:
-    """Return the tracks of people, and the first and last frame of a list of frames.
-
-    A dict has all frames of one or several people, or one frame of one or several people.
-    """
+    """Return the tracks of people, and the first and last frame of a list of frames."""
     tracks = [_track(one) for one in found]
     is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
     if is_alike and _are_frames(found):
@@ -292,11 +289,7 @@ def _rows_of_frames(
 def _on_timeline(
     source: Source, found: list[ParameterDict], tracks: list[Track]
 ) -> tuple[list[int], list[int | None], tuple[int, ...]]:
-    """Return the frame of each dict, its person if its place tells it, and the range of frames.
-
-    Frames have numbers in the dicts, or are the items of a list or dict. Of two of these, one in
-    the other, ``_level_of_people`` tells which.
-    """
+    """Return each dict's frame, its person if its place tells it, and the range of frames."""
     depth = min(len(one.path) for one in found)
     levels = [
         level
@@ -451,11 +444,7 @@ def _person_named(name: str) -> int | None:
 
 
 def _occurrences(values: Sequence[object]) -> Frames:
-    """Return how often each value has occurred before: (N,).
-
-    >>> _occurrences([5, 5, 6, 5]).tolist()
-    [0, 1, 0, 2]
-    """
+    """Return how often each value has occurred before (N,): 0, 1, 0, 2 for 5, 5, 6, 5."""
     seen: Counter[object] = Counter()
     found = []
     for value in values:

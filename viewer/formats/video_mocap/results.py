@@ -172,11 +172,7 @@ class Results:
 
 
 def capture_of(source: Source, results: Results, options: Options) -> Capture:
-    """Return the capture of results in the requested space.
-
-    Raises ``FormatError`` if no person is present in any frame, the frame numbers are implausible,
-    or the requested space is missing.
-    """
+    """Return the capture of results in the requested space."""
     if not any(
         len(track.frames) for people in results.people.values() for track in people.values()
     ):
@@ -225,10 +221,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
 def _without_invalid(
     source: Source, results: Results
 ) -> tuple[Results, dict[str, list[Diagnostic]]]:
-    """Return results without frames in which a number of a person is invalid, and notes by space.
-
-    Spaces without a valid frame are omitted.
-    """
+    """Return results without invalid frames and spaces that have no other, and notes by space."""
     if not source.frame_faults:
         return results, {}
     problem = replace(source.frame_faults[0], path=None, line=None)
@@ -444,11 +437,7 @@ class _Capture:
 
 
 def moved(track: Track, rotations: Floats, translations: Floats) -> Track:
-    """Return a person whose vertices v become R v + T, with an R and T for each row.
-
-    ``track``: bodies in the given space, N rows. ``rotations``, ``translations``: (N, 3, 3), (N,
-    3), R and T.
-    """
+    """Return a person whose vertices v become R v + T, with an R and T for each of N rows."""
     places = np.zeros((0, 3)) if track.translations is None else track.translations
     return replace(
         track,

@@ -89,15 +89,14 @@ def read(source: Source, archive: Archive) -> Results:
 
 
 def _camera(images: list[Archive]) -> Cameras | None:
-    """Return BEV's camera, found from the projections of the joints; None for other projections.
-
-    Least squares for f and c in u = f x / z + c, where c is the centre of the image.
-    """
+    """Return BEV's camera, found from the projections of the joints; None for other projections."""
     parts = [_projected(image) for image in images[:: -(-len(images) // _MOST_IMAGES) or 1]]
     found = [part for part in parts if part is not None and len(part)]
     if not found:
         return None
     points = np.concatenate(found)  # x / z, y / z, u, v
+    # Pinhole camera: u = f x / z + cx and v = f y / z + cy, two rows for each joint, are solved for
+    # f, cx and cy by least squares.
     table = np.zeros((len(points), 2, 3))
     table[:, :, 0] = points[:, :2]
     table[:, 0, 1] = table[:, 1, 2] = 1.0
@@ -149,10 +148,7 @@ def _images(whole: Archive) -> dict[int, Archive]:
 
 
 def _table(image: Archive, has_joints: bool) -> Floats:
-    """Return poses, places and shape coefficients of the people in an image: (P, 85).
-
-    Places are the positions of the pelvis if the file has joints, otherwise translations.
-    """
+    """Return poses, places of the pelvis (or translations) and shapes of P people: (P, 85)."""
     poses = rows(image, _POSES, (None, 72))
     count = len(poses)
     shape = np.zeros((count, _N_SHAPES))

@@ -68,11 +68,7 @@ class _Person:
 
 
 def read_person(archive: Archive, with_vertices: bool = True) -> _Person:
-    """Read the arrays of one person.
-
-    ``archive``: an ``.npz``, or a dict within a pickle. Raises ``FormatError`` if a shape differs
-    from the tool's.
-    """
+    """Read the arrays of one person from an ``.npz``, or a dict within a pickle."""
     place = archive.shape(_PLACE)
     lead, count = place[:1] if len(place) == 2 else (), _length(archive)
     found = {
@@ -285,10 +281,7 @@ def _rig(rows: list[_Row]) -> tuple[Floats, Floats, Floats, Floats] | None:
 
 
 def intrinsics_seen(archive: Archive, person: _Person) -> Floats | None:
-    """Return K (3, 3), from the keypoints in the picture; None if they do not determine it.
-
-    u = f x / z + cx and v = f y / z + cy are solved for f, cx and cy by least squares.
-    """
+    """Return K (3, 3), from the keypoints in the picture; None if they do not determine it."""
     shape = archive.shape(_SEEN)
     if shape != (*person.keypoints.shape[1:2], 2) or not shape[0]:
         return None
@@ -296,6 +289,7 @@ def intrinsics_seen(archive: Archive, person: _Person) -> Floats | None:
     x, y, z = ((person.keypoints[0] + person.translations[0]) * [1.0, -1.0, -1.0]).T
     if not (z > 0.0).all() or not np.isfinite([*x, *y, *seen.ravel()]).all():
         return None
+    # Pinhole camera: u = f x / z + cx and v = f y / z + cy, solved by least squares.
     nothing, one = np.zeros_like(x), np.ones_like(x)
     left = np.concatenate(
         [np.stack([x / z, one, nothing]), np.stack([y / z, nothing, one])], axis=1

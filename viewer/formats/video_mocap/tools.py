@@ -44,11 +44,7 @@ def module_of(tool: str) -> ModuleType:
 
 
 def tool_of(archive: Archive) -> str | None:
-    """Return the key in ``TOOLS`` of an archive's tool, or None.
-
-    Raises ``FormatError`` if no tool is recognised, and a nested pickle that was examined cannot be
-    read.
-    """
+    """Return the key in ``TOOLS`` of an archive's tool, or None."""
     problem: FormatError | None = None
     for tool in TOOLS:
         try:
