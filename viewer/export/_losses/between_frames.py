@@ -53,7 +53,7 @@ _Sampler = Callable[[Floats], Frames]
 
 
 def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[Diagnostic]:
-    """Return a note about the error of interpolating between the written frames, if there is one."""
+    """Return a note about the error of interpolating between the written frames, if any."""
     motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
     written = SampledClip(
         motion.name,
