@@ -206,10 +206,7 @@ def _losses(
     world_up: str,
     bones: dict[str, int],
 ) -> list[Diagnostic]:
-    """Read a file back, and return a note with the largest error of a human bone's position.
-
-    The file's bones have the lengths of the T-pose, and no joints between them.
-    """
+    """Read a file back, and return a note with the largest error of a human bone's position."""
     motion, figure = read(source), animation.figure
     assert isinstance(motion, SkeletonMotion)
     rate = motion.clip.timing.frame_rate
@@ -254,10 +251,7 @@ def _add_expressions(
 
 
 class _Keys:
-    """Samplers and channels of the animation, with a key per frame.
-
-    ``times`` (F,): seconds.
-    """
+    """Samplers and channels of the animation, with a key at each of the times (F,), seconds."""
 
     def __init__(self, document: Document, times: Floats) -> None:
         self._document = document

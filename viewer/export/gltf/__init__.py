@@ -78,11 +78,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
 def write_poses(
     selection: Selection, path: Path, options: ExportOptions, extend: _Extend | None = None
 ) -> list[Diagnostic]:
-    """Write figures in their poses, or at rest with their animations.
-
-    Several figures are placed as in their scene; the placement of a single figure is omitted.
-    ``extend`` adds the extensions of a VRM character, and returns notes about them.
-    """
+    """Write figures posed, or at rest with their animations; ``extend`` adds those of VRM."""
     scene, actors, skinning = selection.scene, selection.actors, options.skinning
     clips = [part.clips for part in selection.parts]
     document = Document(actors[0].figure.name)
@@ -157,10 +153,7 @@ def _of_figure(actor: Actor, note: Diagnostic) -> Diagnostic:
 
 
 def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write a figure at rest and its frames; gaps may be filled, or split into several files.
-
-    A changing shape that must be baked into the mesh is taken from the first present frame.
-    """
+    """Write a figure at rest and its frames; gaps may be filled, or split into several files."""
     animation = part.animation
     sampled = sampled_of(animation, options)
     present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
@@ -198,11 +191,7 @@ def _write_motion(part: Part, path: Path, options: ExportOptions) -> list[Diagno
 
 
 def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> list[Diagnostic]:
-    """Write figures placed as in their scene, with one animation that moves them all.
-
-    Frames of different figures keep their relative times; the earliest frame is at 0. Figures
-    without frames are in their current pose. Gaps may be filled, but not split.
-    """
+    """Write figures placed as in their scene, with one animation that moves them all."""
     parts = [part for part in selection.parts if part.frames is not None]
     others = [part.actor for part in selection.parts if part.frames is None]
     scene = selection.scene or Scene(selection.actors)
@@ -211,6 +200,7 @@ def _write_motions(selection: Selection, path: Path, options: ExportOptions) -> 
         sampled_of(each.animation, replace(options, world_up=each.up), each.actor.color)
         for each in parts
     ]
+    # Figures keep their relative times; the earliest frame of all is at 0.
     begin, name, index = min(map(start_of, parts)), common_name(parts, path.stem), -1
     built = []
     for part, sampled in zip(parts, found, strict=True):
@@ -397,15 +387,7 @@ def _add_cameras(
     clips: Sequence[Sequence[TransformClip] | None] = (),
     alone: Sequence[str] = (),
 ) -> list[Diagnostic]:
-    """Add the cameras of a scene; return notes about what glTF cannot store.
-
-    ``document``: modified in place; already has a scene.
-    ``views``: the cameras, in the space of the scene.
-    ``to_file`` (4, 4): scene space to the space of the file.
-    ``written``: the figures of the file, whose joints carry some of the cameras.
-    ``together``, ``clips``: the animations of the file, and those written for each figure.
-    ``alone``: names of cameras whose motion is not written.
-    """
+    """Add a scene's cameras, by ``to_file`` (4, 4); return notes about what glTF cannot store."""
     nodes, moving = document.root["nodes"], dict.fromkeys(alone)
     keyed = dict(zip([actor for actor, _ in written], clips, strict=False))
     built, actors = dict(written), [actor for actor, _ in written]
@@ -484,10 +466,7 @@ def _add_path(
     together: Clips,
     clips: Sequence[TransformClip],
 ) -> int:
-    """Add the nodes above a camera and their keys in some clips; return the topmost node.
-
-    ``item``: the members of the camera's node other than its transform.
-    """
+    """Add the nodes above a camera and their keys in some clips; return the topmost node."""
     rest, made = path.nodes, list[int]()
     for joint, parent in enumerate(rest.parents.tolist()):
         node: dict[str, Any] = {"name": text_of(rest.names[joint])} if rest.names[joint] else {}

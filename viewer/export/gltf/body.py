@@ -52,12 +52,7 @@ class Built:
 
 
 def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:
-    """Return a figure in the form that glTF can store.
-
-    ``figure``, ``shape``: the figure, and the written form of its shape.
-    ``skinning``: selects influences.
-    Raises RigError if it has neither mesh nor skeleton, or too many joints.
-    """
+    """Return a figure in the form that glTF can store, with ``shape`` as it is written."""
     if figure.mesh is None and figure.skeleton is None:
         raise RigError(f"figure {figure.name} has neither mesh nor skeleton to write as glTF")
     if not figure.is_attached or figure.skin is None:
@@ -75,11 +70,7 @@ def add_body(
     is_still: bool = True,
     optimizes: bool = False,
 ) -> Built:
-    """Add nodes, meshes and skin of a figure; return their indices and counts.
-
-    ``is_still``: whether the figure as a whole does not move.
-    ``optimizes``: whether to quantise vertex attributes.
-    """
+    """Add nodes, meshes and skin of a figure, which as a whole does not move if ``is_still``."""
     figure, influences = body.figure, body.influences
     fixes, record = influences is not None and influences.n_fixed > 0, figure.record
     # A mesh that is not bound is below the node that moves the whole figure.
@@ -184,13 +175,7 @@ def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Place
 
 
 def _add_record(document: Document, record: FileRecord, joints: list[int], name: str) -> None:
-    """Add the application data and copyright of a figure's file and of its joints.
-
-    ``document``: modified in place; already has the joints.
-    ``name``: name of the figure.
-    ``record``: the record of the figure.
-    ``joints`` (J,): their nodes.
-    """
+    """Add the application data and copyright of a file and of its nodes ``joints`` (J,)."""
     asset, holder = document.root["asset"], text_of(record.copyright)
     if holder and holder not in asset.get("copyright", ""):
         asset["copyright"] = "; ".join(filter(None, (asset.get("copyright"), holder)))
@@ -210,10 +195,6 @@ def _scene_members(record: FileRecord | None) -> dict[str, Any]:
 def _merged_extras(given: list[tuple[str, Any]]) -> Any:
     """Return the application data of a file: that of all figures, or a list if these differ.
 
-    ``given``: name and application data of each figure that has some.
-
-    >>> _merged_extras([("a", {"k": 1}), ("b", {"k": 1})])
-    {'k': 1}
     >>> _merged_extras([("a", 1), ("b", 2), ("c", 1)])["sources"]
     [{'figures': ['a', 'c'], 'extras': 1}, {'figures': ['b'], 'extras': 2}]
     """

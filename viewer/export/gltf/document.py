@@ -31,19 +31,14 @@ _HEADER = 28  # bytes of a .glb in addition to JSON and arrays
 
 
 class Document:
-    """Contents of a file; all objects are referred to by index.
-
-    ``name``: name in error messages.
-
-    ``extras``: list of (str, Any), name and application data of each figure whose file has some.
-    ``n_omitted``: number of infinite and NaN values of the original files that ``glb`` or ``pair``
-    omitted.
-    """
+    """Contents of a file; all objects are referred to by index."""
 
     def __init__(self, name: str) -> None:
         self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "viewer"}}
         self.extras: list[tuple[str, Any]] = []
+        """Name and application data of each figure whose file has some."""
         self.n_omitted = 0
+        """Infinite and NaN values of the original files that ``glb`` or ``pair`` omitted."""
         self._name = name
         self._parts: list[bytes] = []
         self._size = 0
@@ -57,27 +52,13 @@ class Document:
         return len(items) - 1
 
     def array(self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False) -> int:
-        """Add an array; return its accessor.
-
-        ``values`` (N, ...): one row per element, N > 0; unsigned integers are stored unchanged,
-          floating-point numbers in single precision.
-        ``kind``: ``"SCALAR"``, ``"VEC3"`` and so on.
-        ``target``: ``VERTICES``, ``INDICES``, or 0 for data that are not drawn.
-        ``bounds``: store the minimum and maximum of each component.
-        Raises RigError if a number is not finite or too large for single precision.
-        """
+        """Add values (N, ...), N > 0, of which floats become float32; return the accessor."""
         return self.arrays(values[None], kind, target, bounds)[0]
 
     def arrays(
         self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False
     ) -> list[int]:
-        """Add several consecutive arrays of equal size; return their accessors.
-
-        Equal arrays are written once, so figures with the same mesh share it.
-
-        ``values`` (A, N, ...): as for ``array``, A times.
-        ``kind``, ``target``, ``bounds``: as for ``array``.
-        """
+        """Add arrays (A, N, ...) as ``array`` does, equal ones once; return their accessors."""
         stored = self._stored(values)
         rows = stored.reshape(len(stored), -1, _SIZES[kind])
         data = stored.tobytes()
@@ -102,12 +83,7 @@ class Document:
         return list(accessors)
 
     def integers(self, values: NDArray[np.integer], kind: str, bounds: bool = False) -> int:
-        """Add a vertex attribute of normalised integers; return its accessor.
-
-        ``values`` (N, C): rows are padded to a multiple of four bytes, as vertices must be.
-        ``kind``: ``"VEC3"`` and so on.
-        ``bounds``: store the minimum and maximum of each component.
-        """
+        """Add normalised integers (N, C), padded to rows of 4 bytes; return the accessor."""
         stored = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
         size = stored.itemsize * stored.shape[1]
         stride = size + -size % _PADDING
@@ -142,10 +118,7 @@ class Document:
         return self._pictures[data]
 
     def glb(self) -> bytes:
-        """Return everything as one binary file.
-
-        Raises RigError if it exceeds the size limit of such files.
-        """
+        """Return everything as one binary file; raise RigError if that is too large."""
         content = self._json({"byteLength": self._size})
         content += b" " * (-len(content) % _PADDING)
         length = _HEADER + len(content) + self._size
@@ -192,10 +165,7 @@ class Document:
 
 
 def _text(value: Any) -> bytes:
-    """Return JSON; raise ValueError if a number is infinite or NaN.
-
-    Text that is copied from a file may have surrogates without a partner, which become ``?``.
-    """
+    """Return JSON, with ``?`` for half a surrogate; infinite and NaN numbers raise ValueError."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", "replace")
 

@@ -78,14 +78,7 @@ def add_figure(
     together: Clips,
     optimizes: bool,
 ) -> Added:
-    """Add a figure to a file.
-
-    ``document``: modified in place.
-    ``clips``: its motions, which are written at rest; None to write its current pose.
-    ``together``: the animations of the file.
-    ``optimizes``: whether to quantise vertex attributes.
-    Raises RigError if a number exceeds single precision.
-    """
+    """Add a figure at rest with its clips, or in its current pose where ``clips`` is None."""
     figure = actor.figure
     pose = actor.pose if clips is None else still_pose(actor)
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
@@ -104,12 +97,7 @@ def add_figure(
 def place_figures(
     document: Document, actors: Sequence[Actor], built: Sequence[Built], to_file: Floats
 ) -> list[int]:
-    """Place several figures as in their scene; return the nodes that move them.
-
-    ``actors``: the figures, each upright in its own space.
-    ``built``: their contents in the file.
-    ``to_file`` (4, 4): scene space to the space of the file.
-    """
+    """Place upright figures as in their scene, by ``to_file`` (4, 4); return those nodes."""
     roots, placing = document.root["scenes"][0]["nodes"], list[int]()
     for actor, each in zip(actors, built, strict=True):
         own = to_metres(actor.figure.up, actor.figure.unit)
@@ -134,10 +122,7 @@ def place_figures(
 def figure_losses(
     added: Added, path: Path, file: GltfFile, skinning: Skinning, is_vrm: bool = False
 ) -> list[Diagnostic]:
-    """Return notes with the largest errors of a figure, and about data that is not written.
-
-    ``is_vrm``: whether its extensions contain the data that only VRM supports.
-    """
+    """Return notes with the largest errors of a figure, and about data that is not written."""
     kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
     place = path, file, added.built.tree, added.built.meshes
     if added.clips is None:
@@ -251,14 +236,7 @@ def _clip_losses(
     how: Skinning,
     body: Body,
 ) -> list[Diagnostic]:
-    """Return notes with the largest distance of a vertex, or of a joint if there is no mesh.
-
-    ``written``: the file.
-    ``figure``, ``pose``: the original, and its pose where no animation moves it.
-    ``clips``: its motions, all of which are in the file.
-    ``how``: the requested skinning.
-    ``body``: the written shape and skin.
-    """
+    """Return notes with the largest distance of a vertex, or of a joint if there is no mesh."""
     count = sum(len(placed.part.sources) for placed in written.meshes)
     each = _MOST_VERTICES // max(1, count * len(clips))
     found = _sampled(written, figure, pose, clips, min(_MOST, max(_FEWEST, each)))

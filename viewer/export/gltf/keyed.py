@@ -32,14 +32,7 @@ _NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
 
 
 class Clips:
-    """The animations of a file: clips of several figures are merged if they are one animation.
-
-    Its name, its range, and its number in the file that was read are then equal.
-
-    Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
-
-    ``document``: modified in place.
-    """
+    """Animations of a file; clips of several figures with one name, range and number are merged."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -54,13 +47,7 @@ class Clips:
         shapes: _Targets,
         weights: Floats,
     ) -> dict[int, TransformClip]:
-        """Add the clips of a figure; return those with an effect, by animation of the file.
-
-        ``clips``: motions with at least one channel each.
-        ``tree``, ``meshes``: the nodes of joints and parts.
-        ``shapes`` (M,): blend shapes that are morph targets.
-        ``weights`` (S,): weights of all blend shapes at rest.
-        """
+        """Add a figure's clips; return those with an effect, by animation of the file."""
         added: dict[int, TransformClip] = {}
         for clip in clips:
             keys = _Keys(self._document, self._times, first_time(clip))
@@ -90,6 +77,7 @@ class Clips:
 
 def first_time(clip: TransformClip) -> float:
     """Return the time of the earliest key if it is below 0, else 0."""
+    # Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
     return min((0.0, *(float(channel.times[0]) for channel in clip.channels)))
 
 
@@ -168,10 +156,7 @@ def _shapes(channel: TransformChannel) -> Ints:
 
 
 def _merged(channels: list[TransformChannel], rows: _Targets, weights: Floats) -> TransformChannel:
-    """Merge several channels into one, with keys at all of their times.
-
-    This is exact if all are linear or all are steps; other combinations are sampled.
-    """
+    """Merge channels into one at all of their times; only linear ones or only steps stay exact."""
     times = np.unique(np.concatenate([channel.times for channel in channels]))
     modes = {channel.interpolation for channel in channels}
     is_exact = modes in ({"linear"}, {"step"})
@@ -216,22 +201,7 @@ def add_animation(
     morphs: list[tuple[int, Floats]],
     into: int = -1,
 ) -> int:
-    """Add rotations of all joints, other properties that change, and the figure's placement.
-
-    Quaternions have the sign nearest to the previous frame, because some programs interpolate
-    components.
-
-    ``document``: modified in place.
-    ``name``: name of the motion.
-    ``times`` (F,): increasing times of the frames in seconds, from 0.
-    ``skeleton``: skeleton in the written shape.
-    ``frames``: frames without gaps.
-    ``tree``: the nodes.
-    ``morphs``: nodes of meshes, and the changing weights of their targets.
-    ``into``: animation to which the keys are added; -1 for a new one.
-    Returns: index of the animation.
-    Raises RigError if a number exceeds single precision.
-    """
+    """Add frames at times (F,) in seconds from 0 to an animation, -1 for a new one; return it."""
     # Single precision distinguishes the times of eight million frames at any rate.
     keys = _AnimationParts(
         document, document.array(times.astype(np.float32), "SCALAR", bounds=True)
@@ -267,12 +237,7 @@ def _put_animation(
     channels: list[dict[str, Any]],
     into: int = -1,
 ) -> int:
-    """Add samplers and channels to an animation of a file; return its index.
-
-    ``item``: the other members of a new animation.
-    ``samplers``, ``channels``: channels refer to these samplers; modified in place.
-    ``into``: the animation that is extended; -1 for a new one.
-    """
+    """Add samplers and their channels to an animation, -1 for a new one; return its index."""
     if into < 0:
         return document.add("animations", {**item, "samplers": samplers, "channels": channels})
     known = document.root["animations"][into]
@@ -301,6 +266,7 @@ class _AnimationParts:
 
 def _continuous(rotations: Floats) -> Floats:
     """Return unit quaternions, each with the sign nearest to the previous one: (F, J, 4)."""
+    # Some programs interpolate components, which are far apart if the signs differ.
     units = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
     align_signs(units)
     return units

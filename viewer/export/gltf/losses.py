@@ -67,16 +67,7 @@ def gltf_losses(
     influences: Influences | None,
     first_frame: int | None,
 ) -> list[Diagnostic]:
-    """Return notes with the largest distances between a file and the posed figure.
-
-    ``written``: the file.
-    ``figure``: the original, without its shape applied.
-    ``frames``: its poses.
-    ``rows`` (F,): frames to compare.
-    ``how``: the requested skinning.
-    ``shape``, ``influences``: the written shape and skin.
-    ``first_frame``: number of the first frame; None for a single pose.
-    """
+    """Return notes with the largest distances between a file and the posed figure."""
     expected, read = sides(written, figure, frames, how, shape)
     sources = written.sources if written.meshes else None
     least = negligible(figure, frames, rows)
@@ -92,11 +83,7 @@ def gltf_losses(
 def sides(
     written: Written, figure: Figure, frames: Frames, how: Skinning, shape: Shape
 ) -> tuple[Side, Callable[[int | None], Side]]:
-    """Return the poses of a figure, and a function that returns those of a file for comparison.
-
-    Parameters as for ``gltf_losses``; the function takes a number of influence sets, or None for
-    all.
-    """
+    """Return a figure's poses, and a function that reads the file's by n influence sets or all."""
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
     columns = changing(frames, still)
@@ -129,10 +116,7 @@ def first_set_note(
     least: float,
     influences: Influences | None,
 ) -> list[Diagnostic]:
-    """Return a note about the error in programs that read only four influences per vertex.
-
-    The list is empty if no vertex has more. ``expected``, ``read``: from ``sides``.
-    """
+    """Return a note about the error of programs that read only four influences, if it matters."""
     if influences is None or influences.most <= PER_SET or expected.body is None:
         return []
     found = apart(expected, read(1), rows, least)
@@ -209,10 +193,7 @@ def _weights_phrase(influences: Influences) -> Phrase:
 
 
 def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnostic]:
-    """Return a note that lists the parts of a figure that the file does not contain.
-
-    ``is_vrm``: whether its extensions contain the data that only VRM supports.
-    """
+    """Return a note that lists the parts of a figure that the file does not contain."""
     shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
     rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())
     mixed = 0 if shapes is None else sum(shapes.is_expression(row) for row in rows)

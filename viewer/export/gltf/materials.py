@@ -27,13 +27,7 @@ _SHEAR = 1e-6  # larger shears of texture transforms are reported, because glTF 
 
 
 class Materials:
-    """Writer of the materials of one mesh.
-
-    ``document``: modified in place.
-    ``mesh``: mesh with the materials.
-    ``color`` (r, g, b): linear colour of surfaces without their own colour.
-    ``is_own``: whether the mesh is from a glTF or FBX file, where materials may be unnamed.
-    """
+    """Writer of a mesh's materials; ``color`` is for surfaces that have none."""
 
     def __init__(
         self, document: Document, mesh: Mesh, color: Color | None, is_own: bool = False
@@ -190,11 +184,9 @@ def _same_place(one: Texture, other: Texture) -> bool:
 
 
 def _placement(matrix: Floats) -> tuple[dict[str, Any], float]:
-    """Return offset, rotation and scale of KHR_texture_transform, and the omitted shear.
-
-    In glTF, v = 0 at the first image row, also for the extension's matrices T(offset) R(-rotation)
-    S(scale).
-    """
+    """Return the members of KHR_texture_transform for a transform (2, 3), and the omitted shear."""
+    # In glTF, v = 0 at the first image row, so v is flipped before and after the extension's
+    # T(offset) R(-rotation) S(scale).
     (a, b, u), (c, d, v) = matrix.tolist()
     scale_u = math.hypot(a, c)
     angle = math.atan2(c, a)

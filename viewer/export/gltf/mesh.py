@@ -37,15 +37,7 @@ def add_mesh(
     influences: Influences | None,
     tangents: Floats | None = None,
 ) -> int:
-    """Add a part of a figure's mesh; return its index.
-
-    ``encoding``: writer of vertex attributes.
-    ``materials``: writer of the figure's materials.
-    ``part``: part with at least one vertex.
-    ``shape``: shape of the figure.
-    ``influences``: influences of the mesh; None if it is not skinned.
-    ``tangents`` (V, 4): see ``FileRecord.tangents``.
-    """
+    """Add a part of a figure's mesh with at least one vertex; return its index."""
     mesh, surface = shape.figure.require_mesh(), _surface(part, shape)
     document = encoding.document
     attributes = {
@@ -97,17 +89,15 @@ def add_mesh(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """Vertices of a part in the space of its node.
-
-    ``positions``, ``normals`` (R, 3): positions and unit normals of the written vertices.
-    ``lengths`` (R, 1): lengths of the figure's own normals.
-    ``linear`` (3, 3): from binding space to the space of the node.
-    """
+    """Vertices of a part in the space of its node."""
 
     positions: Floats
     normals: Floats
+    """Unit normals: (R, 3), like the positions."""
     lengths: Floats
+    """Lengths of the figure's own normals: (R, 1)."""
     linear: Floats
+    """From binding space to the space of the node: (3, 3)."""
 
 
 def _surface(part: Part, shape: Shape) -> _Surface:
@@ -185,15 +175,7 @@ class Part:
 
 
 def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Part]:
-    """Return the parts of a figure; a mesh without parts is a single part.
-
-    A part whose vertices all follow the joint of its name is attached to that joint's node, as in
-    its original file; others are skinned.
-
-    ``name``: name of the mesh and its node if there are no parts.
-    ``shape``: shape of a figure with a mesh.
-    ``influences``: influences of the mesh; None if it is not skinned.
-    """
+    """Return the parts of a figure; a mesh without parts is one part, named ``name``."""
     figure, mesh = shape.figure, shape.figure.require_mesh()
     sources, uv_indices, triangles = split_seams(mesh)
     parts, taken = list[Part](), set[int]()
@@ -201,6 +183,7 @@ def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Par
         places = np.full(len(sources), -1, dtype=np.int32)
         places[rows] = np.arange(len(rows), dtype=np.int32)
         chosen = mesh.part_indices == index
+        # A part that follows the joint of its name only is on that joint's node, as in its file.
         joint = -1
         if influences is not None and index >= 0:
             joint = _joint_of(figure, influences, index, sources[rows])
@@ -226,10 +209,7 @@ def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Par
 
 
 def _rows(mesh: Mesh, triangles: Ints, count: int) -> dict[int, Ints]:
-    """Return the written vertices of each part; parts may share vertices.
-
-    Vertices without triangles belong to the part of the preceding vertex.
-    """
+    """Return each part's vertices; a vertex without triangles goes with the preceding one."""
     owners = np.full(count, -2, dtype=np.int32)
     owners[triangles] = mesh.part_indices[:, None]
     is_free = owners == -2

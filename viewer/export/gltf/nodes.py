@@ -60,11 +60,7 @@ class Tree:
 
 
 def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
-    """Return the local joint transforms of a pose.
-
-    ``skeleton``: skeleton with its shape applied.
-    ``pose``: pose with DOFs in lengths and radians.
-    """
+    """Return the local joint transforms of a pose of a skeleton with its shape applied."""
     places = local_matrices(skeleton, pose)[:, :3, 3]
     rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
     return Locals(places, constrained(skeleton, rotations, places, pose.scales), pose.scales)
@@ -81,19 +77,7 @@ def add_nodes(
     fixes: bool,
     bare: bool = False,
 ) -> Tree:
-    """Add all nodes except the mesh's.
-
-    ``document``: modified in place.
-    ``name``: name of the figure.
-    ``up``: up axis of the figure's world.
-    ``unit``: as in ``Figure.unit``.
-    ``skeleton``, ``still``: the skeleton, and transforms of its joints at rest.
-    ``pose``: pose with the figure's placement.
-    ``fixes``: whether vertices need a node that never moves.
-    ``bare``: whether a single root joint may be the topmost node, if the figure is neither moved
-    nor converted.
-    Raises RigError if a number is not finite.
-    """
+    """Add all nodes except meshes; ``bare`` lets a lone root joint be the topmost node."""
     if bare and skeleton is not None and still is not None and not fixes:
         moved = pose is not None and (pose.figure_translation.any() or pose.figure_scale != 1.0)
         if np.sum(skeleton.parents < 0) == 1 and not moved and not _above(up, unit):

@@ -91,17 +91,7 @@ def read_back(
     start: int = 0,
     sets: int | None = None,
 ) -> Side:
-    """Return the contents of a file in a form that can be compared with the figure.
-
-    ``file``: the written file.
-    ``tree``: indices of the nodes.
-    ``meshes``: its meshes, in the order of the compared vertices.
-    ``figure``: the figure as written, with the bindings of joints that have their own meshes.
-    ``targets`` (M,): indices of the figure's morph targets that change over time.
-    ``keys``: animated values of each frame, by node and path.
-    ``start``: frame of the figure that is the first in the file.
-    ``sets``: number of influence sets to use, normalised to a sum of 1; all if omitted.
-    """
+    """Return the contents of a file in a form that can be compared with the figure."""
     nodes, parents = file.root["nodes"], file.tree.parents
     n_joints = len(tree.joints)
     bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))

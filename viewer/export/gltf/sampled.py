@@ -64,10 +64,7 @@ def common_name(parts: Sequence[Part], stem: str) -> str:
 def sampled_of(
     animation: SampledAnimation, options: ExportOptions, color: Color | None = None
 ) -> Sampled:
-    """Return a motion in the form that glTF can store.
-
-    Raises RigError if no frame is present or an option is unknown.
-    """
+    """Return a motion in the form that glTF can store."""
     _check(options)
     frames = filled(animation.frames, options.closing == "interpolate")
     reference = int(animation.frames.present.argmax())
@@ -98,15 +95,7 @@ def add_sampled(
     name: str = "",
     into: int = -1,
 ) -> tuple[Built, int]:
-    """Add a figure at rest, and its frames as an animation; return both.
-
-    ``document``: modified in place.
-    ``options``: states whether to quantise vertex attributes.
-    ``span``: range of the frames; all if omitted.
-    ``delay``: time of the first frame, seconds.
-    ``name``: name of the animation; that of the motion if empty.
-    ``into``: index of the animation to which the keys are added; -1 for a new one.
-    """
+    """Add a figure at rest, and the frames in ``span`` as an animation after a delay."""
     animation, body = sampled.animation, sampled.body
     skeleton = body.figure.require_skeleton()
     rows = slice(*(span or (0, sampled.frames.n_frames)))

@@ -52,11 +52,7 @@ class Influences:
 
 
 def influences_of(skin: Skin) -> Influences:
-    """Return a skin in the form that glTF can store.
-
-    ``skin``: a skin with arbitrary weights.
-    Raises RigError if there are more joints than a file can index.
-    """
+    """Return a skin in the form that glTF can store."""
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
     owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
     positive = np.maximum(merged.weights, 0.0)
@@ -83,14 +79,7 @@ def influences_of(skin: Skin) -> Influences:
 def influence_sets(
     influences: Influences, sources: Ints
 ) -> Iterator[tuple[NDArray[np.unsignedinteger], Floats]]:
-    """Yield JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, and so on.
-
-    ``influences``: influences of V vertices.
-    ``sources`` (R,): the vertices, or copies of them, that are written.
-    Yields ``joints`` (R, 4) uint8 or uint16: indices into the skin's list of joints; the last joint
-      is the node of fixed vertices. Unused slots are 0, as the specification requires.
-    Yields ``weights`` (R, 4): 0 in unused slots.
-    """
+    """Yield JOINTS_n and WEIGHTS_n (R, 4) of vertices ``sources`` (R,); unused slots are 0."""
     skin = influences.skin
     counts, starts = influence_counts(skin)[sources], skin.starts[sources]
     dtype = np.uint8 if influences.n_joints <= 256 else np.uint16
@@ -101,18 +90,14 @@ def influence_sets(
         joints, weights = np.zeros(used.shape, dtype), np.zeros(used.shape)
         joints[used], weights[used] = skin.joints[place], skin.weights[place]
         if first == 0:
+            # The last joint of the list is the node of vertices without influence.
             fixed = counts == 0
             joints[fixed, 0], weights[fixed, 0] = influences.n_joints - 1, 1.0
         yield joints, weights
 
 
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats, decoding: Floats) -> Floats:
-    """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
-
-    ``influences``: determines whether any vertices are fixed; their node is bound at the
-    origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
-    ``decoding`` (4, 4): from stored positions to the figure's.
-    """
+    """Return the matrices of all joints that the skin lists, in column-major order (N, 16)."""
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
     if not np.array_equal(decoding, np.eye(4)):
         matrices = matrices @ decoding
@@ -135,16 +120,7 @@ class Shape:
 
 
 def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
-    """Return the written form of a figure's shape.
-
-    Morph targets do not move joints, so a shape that affects joints or has too many targets is
-    baked into the mesh. Morph targets of the figure's own file are always written; expressions,
-    which combine them, only if they are used.
-
-    ``figure``: figure without its shape applied.
-    ``weights`` (F, S) or (1, S): weights of its blend shapes over time.
-    ``reference``: index of the row to bake in.
-    """
+    """Return the written form of a figure's shape; row ``reference`` of weights can be baked."""
     shapes, is_used = figure.blend_shapes, np.asarray(weights.any(axis=0))
     is_own = np.zeros(len(is_used), dtype=np.bool_)
     if shapes is not None and figure.record is not None:

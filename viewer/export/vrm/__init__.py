@@ -119,11 +119,7 @@ def require(figure: Figure) -> None:
 
 
 def _repaired(record: VrmRecord, bones: Mapping[str, int]) -> tuple[VrmRecord, list[str]]:
-    """Return a record without invalid values, and the names of what was corrected.
-
-    ``record``: record of the figure's file.
-    ``bones``: joint of each human bone that may be written.
-    """
+    """Return a record without invalid values, and the names of what was corrected."""
     key = "VRM" if record.version == 0 else "VRMC_vrm"
     told, names = copy.deepcopy(record.extensions[key]), list[str]()
     if record.version == 1 and told.get("specVersion") != "1.0":
@@ -366,11 +362,7 @@ def _lost(lost: Counter[str]) -> list[Diagnostic]:
 def _constraint_items(
     constraints: tuple[Constraint, ...], joints: list[int]
 ) -> dict[int, dict[str, Any]]:
-    """Return the extension of each constrained node.
-
-    ``constraints``: those of a skeleton.
-    ``joints`` (J,): nodes of its joints.
-    """
+    """Return the extension of each constrained node; ``joints`` (J,) are those of the joints."""
     return {
         joints[each.joint]: {"specVersion": "1.0", "constraint": {each.kind: _item(each, joints)}}
         for each in constraints

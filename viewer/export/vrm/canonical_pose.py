@@ -33,14 +33,7 @@ _BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "L
 
 
 def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
-    """Return a figure in VRM's axes and unit, whose skeleton has the same joints without DOFs.
-
-    Its shape is baked in unless it has only morph targets; pose correctives are dropped. VRM
-    characters keep their height above the ground.
-
-    ``figure``, ``pose``: the figure, and its rest pose with its shape.
-    ``bones``: joint of each human bone.
-    """
+    """Return a figure in metres, y up, on the ground, with its shape baked in and without DOFs."""
     shapes = figure.blend_shapes
     if figure.joint_regressor is not None and shapes is not None:
         figure, shapes = shaped(figure, pose.shape_weights), None
@@ -51,17 +44,14 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
     scale = METRES.get(figure.unit, 1.0)
     matrix = np.eye(4)
     matrix[:3, :3] = scale * turn
+    # A VRM character keeps its height above the ground.
     if figure.record is None or figure.record.vrm is None:
         matrix[1, 3] = _lift(figure, joints, scale * turn[1])
     return _transformed(figure, shapes, pose, local, matrix, scale, bones)
 
 
 def facing_front(figure: Figure, bones: Mapping[str, int]) -> Figure:
-    """Return a character of VRM 0.x, which faces -z, rotated by 180 degrees about y.
-
-    ``figure``: at rest, in metres with y up.
-    ``bones``: joint of each human bone.
-    """
+    """Return a VRM 0.x character, which faces -z, rotated by 180 degrees about y."""
     skeleton = figure.require_skeleton()
     pose = rest_pose(skeleton)
     matrix = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -78,12 +68,7 @@ def _transformed(
     scale: float,
     bones: Mapping[str, int],
 ) -> Figure:
-    """Return a figure whose roots, mesh and bindings are transformed, with joints without DOFs.
-
-    ``shapes``: blend shapes that are kept.
-    ``pose``, ``local``: its rest pose, and the local matrices of the joints.
-    ``matrix`` (4, 4), ``scale``: the whole transform, and the scale that it contains.
-    """
+    """Return a figure whose roots, mesh and bindings are moved by (4, 4), without DOFs."""
     skeleton, turn = figure.require_skeleton(), matrix[:3, :3] / scale
     roots = skeleton.parents < 0
     places = scale * local[:, :3, 3]
@@ -135,11 +120,7 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
 
 
 def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
-    """Return the height by which a figure is raised onto the ground; 0 if it is nearly there.
-
-    ``joints`` (J, 3): their positions.
-    ``up`` (3,): vector whose dot product with a position is its height.
-    """
+    """Return the height by which a figure is raised onto the ground; 0 if it is nearly there."""
     points = joints if figure.mesh is None else np.concatenate([joints, figure.mesh.positions])
     heights = points @ up
     low = float(heights.min())
@@ -163,12 +144,7 @@ def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
 
 
 def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
-    """Return a figure whose rest pose has straight horizontal arms and vertical legs.
-
-    ``figure``: from ``standing``; its mesh follows the skeleton.
-    ``bones``: joint of each human bone.
-    Also returns the largest rotation of a joint in radians.
-    """
+    """Return a figure with horizontal arms and vertical legs, and the largest rotation, radians."""
     skeleton = figure.require_skeleton()
     rotations, largest = skeleton.rest_rotations.copy(), 0.0
     for bone, sign in ((b, s) for s in (1.0, -1.0) for b in _BELOW):

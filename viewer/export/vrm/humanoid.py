@@ -26,13 +26,7 @@ _PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Interme
 
 
 def human_bones(figure: Figure) -> dict[str, int]:
-    """Return the joint of each human bone, by its name in VRM 1.0.
-
-    Optional bones whose hierarchy VRM does not allow are omitted.
-
-    ``figure``: figure with a skeleton, whose humanoid or joint names identify the bones.
-    Raises RigError if a required bone is missing.
-    """
+    """Return each human bone's joint, without optional bones in places that VRM does not allow."""
     skeleton = figure.require_skeleton()
     found = dict(skeleton.humanoid.joints) if skeleton.humanoid is not None else _named(skeleton)
     # Bones below an omitted bone are omitted, too, in whatever order the file lists them.

@@ -264,11 +264,7 @@ def _materials(data: list[Any], maps: Maps, names: list[str]) -> list[Any]:
 
 
 class Maps:
-    """Translation of the indices of a VRM file, and counts of references that are lost.
-
-    ``record``: extensions of the original file.
-    ``document``, ``built``: the written file, to which textures are added on demand.
-    """
+    """Indices of a VRM file in the written one, to which it adds textures, and what is lost."""
 
     def __init__(self, record: VrmRecord, document: Document, built: Built) -> None:
         self.record, self._document = record, document

@@ -15,15 +15,7 @@ LICENCE = "https://vrm.dev/licenses/1.0/"
 
 
 def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
-    """Return the meta data of a new VRM 1.0 character.
-
-    Permissions are not stated, so the defaults of the specification apply, which are the most
-    restrictive.
-
-    ``meta``: as requested.
-    ``figure``: name of the figure, the default name.
-    Raises RigError if the authors or the licence are missing.
-    """
+    """Return meta data for a new VRM 1.0; without authors or a licence it raises RigError."""
     if not any(meta.authors) or not meta.licence:
         raise RigError(
             Diagnostic(
@@ -48,12 +40,7 @@ def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
 
 
 def changed_meta(data: dict[str, Any], meta: VrmMeta, version: int) -> dict[str, Any]:
-    """Return the meta data of a file with the requested changes.
-
-    ``data``: meta data of the file.
-    ``meta``: requested values; empty ones keep those of the file.
-    ``version``: 0 or 1; the names of the fields differ.
-    """
+    """Return a file's meta data with the requested changes; empty ones keep those of the file."""
     names = ("title", "author") if version == 0 else ("name", "authors")
     changed = dict(data)
     if meta.name:

@@ -27,14 +27,7 @@ _VIEWS: dict[PartView, str] = {
 def made_character(
     body: Body, built: Built, bones: Mapping[str, int], meta: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return the extension: human bones, meta data, views of parts, and expressions.
-
-    Morph targets with the name of a preset expression become that expression.
-
-    ``body``, ``built``: the written figure.
-    ``bones``: joint of each human bone.
-    ``meta``: from ``checked_meta``.
-    """
+    """Return the extension: human bones, meta data, views of parts, and preset expressions."""
     data: dict[str, Any] = {
         "specVersion": "1.0",
         "meta": meta,

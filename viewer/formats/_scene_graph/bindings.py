@@ -49,11 +49,7 @@ class Bindings:
 
 
 def bind_skins(joints: Joints, worlds: Floats, skins: dict[int, NodeSkin]) -> Bindings:
-    """Bind the skins of a figure; the first one determines the binding space.
-
-    ``joints``: auxiliary joints are appended if skins disagree. ``worlds``: (J, 4, 4), from
-    ``rest_worlds``.
-    """
+    """Bind skins in the space of the first; joints are added where the skins disagree."""
     bindings = Bindings(joints, worlds)
     for index, skin in skins.items():
         slots = np.array([joints.carrier[node] for node in skin.joints.tolist()], dtype=np.int32)
@@ -95,12 +91,9 @@ def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
 
 
 def _rest_space(rests: Floats) -> Floats:
-    """Return the matrix with which the topmost joints of the first skin place its meshes at rest.
-
-    ``rests``: (M, 4, 4), skinning matrices in the rest pose, of parents before those of their
-    children. They are all the same if the rest pose is the bind pose; otherwise the first that is
-    equal to another one is returned, as helpers above the hips may have any matrix.
-    """
+    """Return the matrix (4, 4) with which the first skin places its meshes at rest."""
+    # The skinning matrices (M, 4, 4) are equal if the rest pose is the bind pose. Otherwise the
+    # first that equals another one is the space, as helpers above the hips may have any matrix.
     regular = rests[_is_regular(rests)]
     if not len(regular):
         return np.eye(4)
@@ -146,13 +139,11 @@ def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
 
 
 def _rigid_matrix(bindings: Bindings, joint: int, above: int) -> Floats | None:
-    """Return A of a mesh on a joint, and bind the joint; None if a matrix is singular.
-
-    In the rest pose, the mesh is placed by its nearest bound ancestor.
-    """
+    """Bind the joint of a rigid mesh and return its A; None if a matrix is singular."""
     known = bindings.matrices.get(joint)
     if known is not None:
         return _inverse_or_none(known)
+    # In the rest pose, the nearest bound ancestor places the mesh.
     baked = bindings.worlds[joint]
     if above >= 0:
         space = _inverse_or_none(bindings.worlds[above] @ bindings.matrices[above])
@@ -175,10 +166,7 @@ def _bound_ancestors(bindings: Bindings) -> list[int]:
 
 
 def inverse_binds(bindings: Bindings) -> Floats:
-    """Return the inverse bind matrix of every joint: (J, 4, 4).
-
-    Joints without influence are bound in the rest pose, or by the identity if that is singular.
-    """
+    """Return every inverse bind matrix (J, 4, 4); joints without influence are bound at rest."""
     worlds = _all_worlds(bindings)
     above = np.array(_bound_ancestors(bindings))
     result = np.tile(np.eye(4), (len(worlds), 1, 1))
@@ -187,6 +175,7 @@ def inverse_binds(bindings: Bindings) -> Floats:
     spaces = np.where(above[:, None, None] >= 0, worlds[above] @ result[above], np.eye(4))
     free = np.ones(len(worlds), dtype=np.bool_)
     free[list(bindings.matrices)] = False
+    # A joint whose rest matrix is singular keeps the identity.
     free &= _is_regular(worlds)
     result[free] = _inverse(worlds[free]) @ spaces[free]
     return result

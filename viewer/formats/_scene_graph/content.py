@@ -173,11 +173,10 @@ Moved: TypeAlias = tuple[NDArray[np.intp], Floats]
 
 
 class MorphTargets:
-    """Offsets of the positions or normals of V vertices for each of S morph targets.
+    """Offsets of V positions or normals for S morph targets, converted when first used.
 
-    ``offsets``: iterable of S (V, 3) or None, as in the file, of any floating-point type, possibly
-    parts of the file's bytes; None for a target that moves nothing. They are converted when they
-    are first used. ``rows``: (V,) int, vertices of the offsets that are used; all if omitted.
+    ``offsets``: S of (V, 3) as in the file, of any float type; None if a target moves nothing.
+    ``rows``: vertices of the offsets that are used; all if omitted.
     """
 
     __slots__ = ("_parts", "_rows", "n_vertices")
@@ -318,11 +317,7 @@ class NodeExpression:
 
 
 def path_to_root(parents: Sequence[int] | Ints, node: int) -> list[int]:
-    """Return a node and its ancestors, ending with its root.
-
-    >>> path_to_root([-1, 0, 1, 0], 2)
-    [2, 1, 0]
-    """
+    """Return a node and its ancestors, ending with its root."""
     path = [node]
     while (above := int(parents[path[-1]])) >= 0:
         path.append(above)
@@ -330,11 +325,7 @@ def path_to_root(parents: Sequence[int] | Ints, node: int) -> list[int]:
 
 
 def roots_of(parents: Ints) -> Ints:
-    """Return the root of each node (N,), by pointer doubling, in O(N log N) for any depth.
-
-    >>> roots_of(np.array([-1, 0, 1, -1], dtype=np.int32)).tolist()
-    [0, 0, 0, 3]
-    """
+    """Return the root of each node (N,), by pointer doubling, in O(N log N) for any depth."""
     above: Ints = np.where(parents < 0, np.arange(len(parents), dtype=np.int32), parents)
     while True:
         next_above = above[above]
@@ -344,11 +335,7 @@ def roots_of(parents: Ints) -> Ints:
 
 
 def descendants(parents: Ints, node: int) -> Bools:
-    """Return whether each node is a given one or below it: (N,), by pointer doubling.
-
-    >>> descendants(np.array([-1, 0, 1, 0], dtype=np.int32), 1).tolist()
-    [False, True, True, False]
-    """
+    """Return whether each node is a given one or below it (N,), by pointer doubling."""
     above: Ints = np.where(parents < 0, np.arange(len(parents), dtype=np.int32), parents)
     found: Bools = np.arange(len(parents)) == node
     while True:

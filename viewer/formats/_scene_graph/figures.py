@@ -54,13 +54,7 @@ class _Made:
 
 
 def figure_group(file: NodeFile, source: Source) -> FigureGroup:
-    """Return the figures and cameras of a file of nodes.
-
-    Figure space is the space of the file's scene. Every relevant node is a ball joint about its
-    rest pose; see ``group_nodes`` for the division into figures.
-
-    Raises ``FormatError`` if the file has nothing to show, or more vertices than fit into memory.
-    """
+    """Return figures and cameras in scene space; nodes become ball joints about their rest pose."""
     groups = group_nodes(file)
     if not groups:
         contents = file.contents()
@@ -123,10 +117,7 @@ def _above(file: NodeFile, cameras: set[int]) -> set[int]:
 
 
 def _lost_nodes(file: NodeFile, groups: list[Members], written: set[int]) -> tuple[str, ...]:
-    """Return the names of the nodes that are neither joints, meshes, cameras nor above these.
-
-    ``written``: nodes above cameras that they move.
-    """
+    """Return the names of nodes that are neither joints, meshes, cameras nor above these."""
     kept = written | {node for members in groups for node in (*members.nodes, *members.meshes)}
     lost = [n for n in scene_order(file) if n not in kept and file.tree.cameras[n] < 0]
     extras = file.tree.extras
@@ -369,10 +360,7 @@ def _weights_of(piece: Piece) -> str | None:
 
 
 def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
-    """Report animated nodes that belong to no figure, such as those of cameras.
-
-    The transform of a node with a skinned mesh has no effect.
-    """
+    """Report animated nodes of no figure, such as those of cameras."""
     moved = set[int]().union(*(each.nodes for each in file.animations))
     others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
     if others:

@@ -232,11 +232,7 @@ class _Grouping:
         return nodes[first:]
 
     def _name(self, figures: list[Members]) -> None:
-        """Name each of several figures after its topmost node that is not in another figure.
-
-        If this node is a joint of a skin, the skin's name is used instead: exporters store the
-        figure's name there, and joints have names such as ``root``.
-        """
+        """Name each of several figures after its topmost node that is not in another figure."""
         if len(figures) < 2:
             return
         counts: dict[int, int] = {}
@@ -246,6 +242,7 @@ class _Grouping:
         for figure in figures:
             own = (n for n in self._with_ancestors(figure.nodes) if counts[n] == 1)
             top = next((node for node in own if self.tree.names[node]), -1)
+            # Exporters store a figure's name in its skin; its topmost joint may be called ``root``.
             skins = (self.file.skins[number] for number in figure.skins)
             of_skins = (skin.name for skin in skins if skin.name and top in skin.joints)
             figure.name = next(of_skins, self.tree.names[top] if top >= 0 else "")

@@ -63,18 +63,14 @@ class Joints:
 
 
 def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
-    """Return joints for some nodes.
-
-    A matrix that shears, M = U S V^T, becomes two joints: T R(U) S(S), and R(V^T) below it.
-
-    Returns one joint per node, and auxiliary joints of nodes that shear.
-    """
+    """Return a joint for each node, and auxiliary joints for nodes that shear."""
     joints = Joints()
     parents = tree.parents.tolist()
     for node in nodes:
         parent = joints.carrier.get(parents[node], -1)
         if node in tree.matrices:
             matrix = tree.matrices[node]
+            # M = U S V^T shears, so it becomes T R(U) S(S) and, below it, R(V^T).
             left, scales, right = sheared(matrix[:3, :3])
             rotation, below = matrix_to_quaternion(np.stack([left, right]))
             own = joints.add(node, tree.names[node], parent, matrix[:3, 3], rotation, scales)
@@ -94,11 +90,7 @@ def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
 
 
 def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return rotations U, V^T and factors S with U S V^T = M; reflections have a negative factor.
-
-    ``linear``: (3, 3), m. Returns (3, 3), (3,), (3, 3), the matrix U, the diagonal of S, and the
-    matrix V^T.
-    """
+    """Return rotations U, V^T and S (3,), U diag(S) V^T = M (3, 3); S has a minus if M reflects."""
     left, scales, right = np.linalg.svd(linear)
     if np.linalg.det(left) < 0.0:
         left[:, 2] *= -1.0
@@ -123,14 +115,7 @@ def skeleton_of(
     constraints: Iterable[Constraint] = (),
     springs: Springs | None = None,
 ) -> Skeleton:
-    """Return the skeleton: every joint of the file is a ball joint about its rest pose.
-
-    ``humanoid``: node of each human bone; nodes that are not joints of this figure are ignored.
-    ``constraints``: constraints between nodes; constraints of other figures are ignored.
-    ``springs``: spring nodes; those of other figures are ignored. Returns a skeleton of J joints.
-    Auxiliary joints have no DOFs, constrained joints have locked DOFs, and all other DOFs have no
-    limits.
-    """
+    """Return the skeleton; auxiliary joints have no DOFs, constrained joints locked ones."""
     is_auxiliary = np.array(joints.nodes) < 0
     balls = np.flatnonzero(~is_auxiliary).astype(np.int32)
     count = 3 * len(balls)

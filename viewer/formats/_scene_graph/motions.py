@@ -45,12 +45,7 @@ def animations_of(
     columns: Mapping[int, Ints],
     beside: AbstractSet[int] = frozenset(),
 ) -> tuple[Animation, ...]:
-    """Return the animations that move a joint or blend shape of a figure, in file order.
-
-    ``readers``: from ``read_once``; shared by all figures. ``columns``: mapping of (S,) int32,
-    blend shapes of each node's morph targets. ``beside``: nodes of cameras that move while the
-    figure plays an animation, even one without channels.
-    """
+    """Return the animations that move a joint, a blend shape, or a camera node in ``beside``."""
     return tuple(
         Animation(
             animation.name,

@@ -25,14 +25,9 @@ from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules, Mater
 
 
 def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> dict[int, Ints]:
-    """Return the blend shapes that correspond to each node's morph targets.
-
-    Nodes are parts of one face and share their blend shapes if they have the same target names, the
-    same default weights, and the same keys in all animations. Only animations of such nodes
-    are read.
-
-    Returns a dict of (S,) int32.
-    """
+    """Return each node's blend shapes (S,), the same ones for the parts of one face."""
+    # Nodes are parts of one face if their targets have the same names and default weights, and the
+    # same keys in all animations; only animations of such nodes are read.
     shaped = [node for node in nodes if _mesh(file, node).target_names]
     looks = {
         node: (_mesh(file, node).target_names, tuple(_defaults(file, node).tolist()))
@@ -86,11 +81,7 @@ def _defaults(file: NodeFile, node: int) -> Floats:
 def blend_shapes_of(
     file: NodeFile, columns: dict[int, Ints], pieces: list[Piece]
 ) -> BlendShapes | None:
-    """Return the blend shapes of a figure; offsets are assembled on first use.
-
-    ``columns``: dict of (S,) int32, from ``shape_columns``. ``pieces``: the primitives, whose
-    targets are transformed to binding space.
-    """
+    """Return the blend shapes in binding space; their offsets are assembled on first use."""
     slots = {material: slot for slot, material in enumerate(used_materials(pieces))}
     if not columns and not any(_binds_of(each, slots) for each in file.expressions):
         return None
@@ -198,10 +189,7 @@ class _Target:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Offsets:
-    """Offsets of the positions or normals of a figure, in binding space.
-
-    S morph targets come first; E expressions follow, which are sums of them.
-    """
+    """Offsets of S morph targets, then of E expressions, which are sums of them."""
 
     columns: dict[int, Ints]
     pieces: list[Piece]

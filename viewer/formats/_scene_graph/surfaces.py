@@ -120,14 +120,11 @@ def _on_joint(n_vertices: int, joint: int) -> Influences:
 
 
 def _divided(primitive: Primitive, slots: Ints) -> Influences:
-    """Return a skinned primitive's influences, normalised to sums of 1 (glTF 2.0, 3.7.3.1).
-
-    A vertex without weights follows the joint of its first slot, as in Blender and three.js.
-    ``slots`` (M,): joint of the figure for each joint of the skin.
-    """
+    """Return influences with sums of 1 (glTF 2.0, 3.7.3.1) of the skin's joints (M,)."""
     assert primitive.joints is not None and primitive.weights is not None
     weights = primitive.weights.astype(np.float64)
     sums = weights.sum(axis=1)
+    # A vertex without weights follows its first slot, as in Blender and three.js.
     unbound = np.abs(sums) < _NO_SUM
     weights[unbound] = 0.0
     weights[unbound, :1] = 1.0
@@ -155,11 +152,8 @@ def _shading(primitive: Primitive) -> _Shading:
 
 
 def flat_shaded(positions: Floats, triangles: Ints) -> _Shading:
-    """Split vertices between faces with different normals.
-
-    Coplanar faces keep a common vertex, so a cube has 24 vertices. Large primitives are shaded
-    smoothly instead, because they could become six times as large.
-    """
+    """Split vertices between faces that are not coplanar, so that a cube has 24."""
+    # A large mesh is shaded smoothly, as splitting could make it six times as large.
     if len(triangles) > _MOST_TRIANGLES:
         sources = np.arange(len(positions), dtype=np.int32)
         return sources, triangles, vertex_normals(positions, triangles), False

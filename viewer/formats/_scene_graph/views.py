@@ -38,11 +38,7 @@ class Carrier:
 def moved_cameras(
     file: NodeFile, groups: Sequence[Members], order: Sequence[int]
 ) -> list[set[int]]:
-    """Return the cameras that animated nodes move, other than joints, as a set per figure.
-
-    Each belongs to one of the figures with the nearest joint above it, or of all figures: to that
-    which plays most of the animations.
-    """
+    """Return for each figure the cameras that animated nodes move, other than joints."""
     found = [set[int]() for _ in groups]
     joints = [set(each.nodes) for each in groups]
     plays = [
@@ -57,6 +53,8 @@ def moved_cameras(
         own = path if above is None else path[: path.index(above)]
         moving = {at for at, each in enumerate(file.animations) if not each.nodes.isdisjoint(own)}
         if moving:
+            # Of the figures with the nearest joint above, or of all, it belongs to the one that
+            # plays most of the animations.
             owners = [at for at, each in enumerate(joints) if above is None or above in each]
             found[max(owners, key=lambda at: len(plays[at] & moving))].add(node)
     return found
@@ -69,11 +67,7 @@ def views_of(
     carriers: Sequence[Carrier] = (),
     animations: Callable[[Joints], tuple[Animation, ...]] = lambda _: (),
 ) -> tuple[tuple[CameraView, ...], list[str]]:
-    """Return the perspective cameras of a scene, with square pixels; scales of nodes are ignored.
-
-    Returns ``views``: cameras in the space of the scene; ``left_out``: names of the orthographic
-    cameras.
-    """
+    """Return perspective cameras in the space of the scene, and names of orthographic ones."""
     chosen = [node for node in order if tree.cameras[node] >= 0]
     if not chosen:
         return (), []
@@ -114,10 +108,7 @@ def _mount(
     carriers: Sequence[Carrier],
     animations: Callable[[Joints], tuple[Animation, ...]],
 ) -> CameraMount | None:
-    """Return what moves a camera: the nearest joint at or above it, or animated nodes below that.
-
-    None if neither exists.
-    """
+    """Return the joint at or above a camera, or animated nodes below that; None without either."""
     mover = next((carrier for carrier in carriers if node in carrier.cameras), None)
     choice = carriers if mover is None else (mover,)
     owner, joint, below = mover, -1, list[int]()

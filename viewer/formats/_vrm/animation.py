@@ -37,11 +37,7 @@ _MOST_FRAMES = 1_000_000
 
 
 def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
-    """Return the first animation of a file of motions, sampled at the rate of its keys.
-
-    Raises ``FormatError`` if no human bone is animated, or the animation has invalid keys or more
-    than a million frames.
-    """
+    """Return the first animation of human bones, sampled at the rate of its keys."""
     pointer = f"/extensions/{EXTENSION}"
     told = file.extensions[EXTENSION]
     humanoid = read_humanoid(source, file, told, 1, pointer)

@@ -17,10 +17,7 @@ _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbPro
 def read_humanoid(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> dict[str, int]:
-    """Return the node of each human bone, by its name in VRM 1.0.
-
-    ``source``: records messages about invalid bones, which are ignored.
-    """
+    """Return the node of each human bone, by its name in VRM 1.0; invalid bones are reported."""
     found: dict[str, int] = {}
     for _, bone, node in given_bones(told, version):
         if not is_index(node, file.tree.n_nodes):
@@ -53,11 +50,7 @@ def given_bones(told: Mapping[str, Any], version: int) -> list[tuple[str, str, A
 
 
 def modern_bone(bone: str) -> str:
-    """Return the name in VRM 1.0 of a human bone of VRM 0.x.
-
-    >>> modern_bone("leftThumbProximal"), modern_bone("hips")
-    ('leftThumbMetacarpal', 'hips')
-    """
+    """Return the name in VRM 1.0 of a human bone of VRM 0.x: thumbs begin at the metacarpal."""
     for old, new in _OLD_THUMB.items():
         if bone.endswith(old):
             return bone.removesuffix(old) + new

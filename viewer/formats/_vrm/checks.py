@@ -22,10 +22,7 @@ _REQUIRED_META = ("name", "authors", "licenseUrl")
 
 
 def check_character(source: Source, extensions: Mapping[str, Any], version: int) -> None:
-    """Report what a VRM character lacks or states twice; each place has a JSON pointer.
-
-    ``version``: 0 for the extension ``VRM``, 1 for ``VRMC_vrm``.
-    """
+    """Report what a VRM character lacks or states twice; each place has a JSON pointer."""
     key = "VRMC_vrm" if version == 1 else "VRM"
     told, at = extensions[key], f"/extensions/{key}"
     if isinstance(extensions.get("VRM"), dict) and version == 1:

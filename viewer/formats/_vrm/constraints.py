@@ -30,12 +30,7 @@ _AXES = {"roll": ("rollAxis", _POSITIVE), "aim": ("aimAxis", _AIM)}
 
 
 def read_constraints(tree: NodeTree, source: Source) -> tuple[Constraint, ...]:
-    """Return the constraints of all nodes in the order of evaluation; joints are node indices.
-
-    Invalid constraints are ignored with a warning.
-
-    Raises ``FormatError`` if constraints depend on each other.
-    """
+    """Return the valid constraints of all nodes in order of evaluation; joints are node indices."""
     found: dict[int, Constraint] = {}
     for node, extensions in tree.extensions.items():
         told = part(extensions, _EXTENSION, "constraint")

@@ -131,10 +131,7 @@ def _main_transform(told: Any) -> Floats:
 
 
 def modern_binds(told: Any, n_materials: int) -> tuple[list[_Bind], list[str]]:
-    """Return the changes by an expression of version 1.0, and labels of changes without effect.
-
-    ``told``: the expression, as parsed from JSON.
-    """
+    """Return the changes by an expression of version 1.0, and labels of changes without effect."""
     found: list[_Bind] = []
     lost: list[str] = []
     for each in list_in(told, "materialColorBinds"):
@@ -163,10 +160,7 @@ def _color(told: Any) -> Floats | None:
 
 
 def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
-    """Return the members of a core material with those that ``materialProperties`` replaces.
-
-    ``core``, ``told``: members of ``materials`` and ``materialProperties`` with the same index.
-    """
+    """Return a core material's members with those that its ``materialProperties`` replaces."""
     found = _opacity(told) | dict(core)
     surface = found.get(_SURFACE)
     if surface is not None and not isinstance(surface, dict):
@@ -237,10 +231,7 @@ def _emission(told: Any, extensions: Any) -> dict[str, Any]:
 
 
 def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return the members of ``VRMC_materials_mtoon``, and the properties without a counterpart.
-
-    ``told``: a member of ``materialProperties``, as parsed from JSON.
-    """
+    """Return the members of ``VRMC_materials_mtoon``, and the properties without a counterpart."""
 
     def number(name: str, default: float) -> float:
         value = value_of(part(told, "floatProperties", name), default)

@@ -10,11 +10,7 @@ from viewer.rig.arrays import Floats
 
 
 def part(told: Any, *names: str) -> Any:
-    """Return a nested property; None if it is missing or an outer value is not an object.
-
-    >>> part({"a": {"b": 1}}, "a", "b"), part({"a": []}, "a", "b")
-    (1, None)
-    """
+    """Return a nested property; None if it is missing or an outer value is not an object."""
     value = told
     for name in names:
         value = value.get(name) if isinstance(value, dict) else None
@@ -36,13 +32,7 @@ _LARGEST = 1e6
 
 
 def value_of(told: Any, default: float) -> float | None:
-    """Return a number; the default if it is missing, None if it is invalid.
-
-    >>> value_of(None, 2.0), value_of(1, 2.0), value_of("a", 2.0)
-    (2.0, 1.0, None)
-    >>> value_of(10**400, 2.0), value_of(float("nan"), 2.0)
-    (None, None)
-    """
+    """Return a number; the default if it is missing, None if it is not finite or no number."""
     if told is None:
         return default
     is_number = isinstance(told, int | float) and not isinstance(told, bool)

@@ -64,10 +64,7 @@ _LONGEST = 200  # maximum number of characters of a property
 
 
 def with_vrm(file: NodeFile, source: Source) -> NodeFile:
-    """Return a file with the humanoid, expressions and constraints of its VRM extensions, if any.
-
-    Raises ``FormatError`` if constraints of nodes depend on each other.
-    """
+    """Return a file with the humanoid, expressions, constraints and springs of its extensions."""
     file = replace(
         file,
         constraints=read_constraints(file.tree, source),

@@ -70,10 +70,7 @@ class _Shape:
 
 
 def read_springs(file: NodeFile, source: Source) -> Springs | None:
-    """Return the spring joints of a file as node indices; None if there are none.
-
-    ``source``: records messages about invalid chains and colliders, which are ignored.
-    """
+    """Return the spring joints as node indices, or None; invalid ones are reported."""
     told = file.extensions.get(_EXTENSION)
     old = part(file.extensions, "VRM", "secondaryAnimation")
     if isinstance(told, dict):

@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 
 def read(source: Source) -> FigureGroup:
-    """Read the figures of a file; the keys of its animations are read when they are first needed.
-
-    ``source``: the file; a warning lists elements without equivalent. Returns figures in the file's
-    unit and axes, unless converted as described above. Raises ``FormatError`` if ufbx is not
-    installed, cannot read the file, crashes, or takes too long.
-    """
+    """Read the figures of a file; the keys of animations are read when they are first needed."""
     # The child process imports this package, too, and needs neither module.
     from viewer.formats._scene_graph.figures import figure_group
     from viewer.formats.fbx.contents import node_file

@@ -338,10 +338,7 @@ def _say_reduced(source: Source, mesh: dict[str, Any]) -> None:
 
 
 def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera, ...], Ints]:
-    """Return the cameras, and the camera of each node, after adding a node for each.
-
-    A camera of an FBX looks along +x of its node instead of -z.
-    """
+    """Return the cameras and each node's camera, after adding a node that turns -z to FBX's +x."""
     made, parents, of_node = [], [], [-1] * len(told["names"])
     for number, camera in enumerate(told["cameras"]):
         angle, aspect = camera["angle"], camera["aspect"]
@@ -473,11 +470,7 @@ def _crossings(table: Floats, targets: list[float]) -> Floats:
 
 
 def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[Material, ...]:
-    """Return all materials of a message; textures may be inside the file or next to it.
-
-    A picture is searched for at the paths stated in the file, and by its file name next to the
-    file, in ``textures``, and in ``<file>.fbm``, where exporters unpack pictures.
-    """
+    """Return all materials; pictures are embedded, at stated paths, or near the file."""
     pictures: dict[int, Bytes | None] = {}
     sets: list[str] = next((mesh["uv_sets"] for mesh in told["meshes"] if mesh["uv_sets"]), [])
 

@@ -115,10 +115,7 @@ def _numbered(get: Any, names: list[str]) -> list[NDArray[np.intp]]:
 def _distinct(
     vertices: Ints, attributes: list[NDArray[np.intp]], corners: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Ints]:
-    """Return one corner per vertex, and the vertex of each given corner.
-
-    Corners become one vertex if their positions and all attributes are equal.
-    """
+    """Return a corner per vertex with its own position and attributes, and each corner's vertex."""
     keys = [vertices[corners].astype(np.intp), *(numbers[corners] for numbers in attributes)]
     _, first, inverse = np.unique(np.stack(keys), axis=1, return_index=True, return_inverse=True)
     return corners[first], inverse.reshape(-1).astype(np.int32)
@@ -205,10 +202,7 @@ def _without_weights(arrays: Arrays, prefix: str) -> Ints:
 
 
 def on_nodes(arrays: Arrays, prefix: str, skin: NodeSkin, nodes: list[int]) -> list[NodeSkin]:
-    """Return the skin of a mesh at each of its nodes: one for all if every vertex has weights.
-
-    Vertices without weights follow the node of their mesh, which becomes the last joint.
-    """
+    """Return a mesh's skin at each node; vertices without weights follow it as the last joint."""
     if not len(_without_weights(arrays, prefix)):
         return [skin]
     return [

@@ -406,11 +406,9 @@ class _Sampled:
                 self.animated.setdefault(element, []).append(row)
 
     def result(self) -> dict[str, Any]:
-        """Return the channels, ``"keys"``, and the number of curves that end early, ``"cut"``.
-
-        A channel states its node or element, its path, and the name of its array: times in seconds
-        and values, for linear interpolation, or slerp for rotations.
-        """
+        """Return the channels, ``"keys"``, and the number of curves that end early, ``"cut"``."""
+        # A channel states its node or element, its path, and the name of its array: times in
+        # seconds and values, for linear interpolation, or slerp for rotations.
         self._add_nodes()
         self._add_weights()
         return {"keys": self.told, "cut": self.cut}

@@ -56,13 +56,7 @@ _MOTION = "VRMC_vrm_animation"
 
 
 def read(source: Source) -> FigureGroup | SkeletonMotion:
-    """Read the figures and cameras of a file, or the motion of a ``.vrma`` file.
-
-    ``source``: a ``.gltf``, ``.glb``, ``.vrm`` or ``.vrma`` file. Returns figures with skeletons of
-    ball joints, blend shapes and animations, in metres; or a skeleton with its motion. Raises
-    ``FormatError`` if the file is invalid, requires an unsupported extension, or has nothing to
-    show.
-    """
+    """Read figures and cameras in metres, with ball joints, or the motion of a ``.vrma`` file."""
     file = read_nodes(source)
     if isinstance(file.extensions.get(_MOTION), dict):
         from viewer.formats._vrm.animation import read_motion
@@ -72,12 +66,7 @@ def read(source: Source) -> FigureGroup | SkeletonMotion:
 
 
 def read_nodes(source: Source) -> NodeFile:
-    """Return the contents of a glTF file; the keys of animations are read when they are played.
-
-    ``source``: a ``.gltf``, ``.glb`` or ``.vrm`` file. Raises ``FormatError`` if the file is
-    invalid, refers to data outside its folder, or requires an unsupported extension. Errors without
-    visible effect are warnings.
-    """
+    """Return the contents of a glTF file; the keys of animations are read when they are played."""
     document = open_document(source)
     check_extensions(document)
     with reading_materials(document) as finish_materials:

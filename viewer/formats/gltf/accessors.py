@@ -77,10 +77,7 @@ class _Layout:
 
 
 class Accessors:
-    """Arrays of a document.
-
-    ``spend``: counts bytes that are about to be decoded; see ``Document.spend``.
-    """
+    """Arrays of a document; ``spend`` counts the bytes that are about to be decoded."""
 
     def __init__(self, table: Table, buffers: Buffers, spend: Callable[[int, str], None]) -> None:
         self._table, self._buffers, self._spend = table, buffers, spend
@@ -104,13 +101,11 @@ class Accessors:
         rows: Ints | None = None,
         decoded: NDArray[Any] | None = None,
     ) -> Floats:
-        """Return an accessor as numbers; normalised integers become fractions.
+        """Return an accessor as numbers (N, C), possibly infinite or NaN, or its ``rows`` (M, C).
 
-        ``kinds``: expected element types, such as ``"VEC3"``. ``rows``: (M,) int32, elements to
-        return; all if omitted. ``decoded``: (N, C), components that are already decoded, used
-        instead of the buffer view. Returns (N, C) or (M, C), values, possibly infinite or NaN. The
-        components of a matrix are in column order. Raises ``FormatError`` if the accessor is
-        invalid or has a different type, or its data is missing.
+        Normalised integers become fractions; the components of a matrix are in column order.
+        ``kinds`` are the expected types, such as ``"VEC3"``; ``decoded`` (N, C), already decoded
+        components, replaces the buffer view.
         """
         layout = self._layout(index, kinds, user)
         values = self._picked(layout, rows, decoded)
@@ -121,11 +116,7 @@ class Accessors:
             return values.astype(np.float64)
 
     def stored(self, index: int, kinds: Sequence[str], user: str) -> NDArray[Any] | None:
-        """Return single-precision numbers as in the file, without copying them: (N, C).
-
-        None for other types, and for accessors that are sparse or without data. Parameters and
-        errors as for ``floats``.
-        """
+        """Return float32 numbers (N, C) as in the file, not copied; None for any other storage."""
         layout = self._layout(index, kinds, user)
         is_plain = layout.element.has("bufferView") and not layout.element.has("sparse")
         return self._values(layout) if is_plain and layout.dtype.kind == "f" else None
@@ -138,10 +129,7 @@ class Accessors:
         rows: Ints | None = None,
         decoded: NDArray[Any] | None = None,
     ) -> Floats:
-        """Return an accessor whose integers must be normalised, such as colours or weights.
-
-        Parameters, shape and errors as for ``floats``. A missing flag causes a warning.
-        """
+        """Return an accessor like ``floats``; integers must be normalised, or cause a warning."""
         values = self.floats(index, kinds, user, rows, decoded)
         layout = self._layout(index, kinds, user)
         if layout.is_normalized or layout.dtype.kind == "f":
@@ -160,10 +148,7 @@ class Accessors:
         rows: Ints | None = None,
         decoded: NDArray[Any] | None = None,
     ) -> NDArray[np.int64]:
-        """Return an accessor as whole numbers: (N, C) or (M, C) int64.
-
-        Parameters and errors as for ``floats``; floating-point components are also an error.
-        """
+        """Return an accessor like ``floats``, as whole numbers (N, C) or (M, C)."""
         layout = self._layout(index, kinds, user)
         if layout.dtype.kind == "f" or layout.is_normalized:
             found = "normalised integers" if layout.is_normalized else "floating-point numbers"
@@ -177,14 +162,7 @@ class Accessors:
         return self._picked(layout, rows, decoded).astype(np.int64)
 
     def components(self, index: int) -> Floats | None:
-        """Return the components of an accessor as stored, not normalised: (N, C).
-
-        None if the data is stored elsewhere, for instance compressed with Draco. As the caller does
-        not store them, they are not counted as decoded data, although they must fit within the
-        limit.
-
-        Raises ``FormatError`` if it is invalid, or its data is missing.
-        """
+        """Return components as stored (N, C), not normalised; None if compressed with Draco."""
         if not self._table[index].has("bufferView") and not self._table[index].has("sparse"):
             return None
         pointer = self._table[index].pointer
@@ -196,10 +174,7 @@ class Accessors:
             return values.astype(np.float64)
 
     def matrices(self, index: int, user: str) -> Floats:
-        """Return an accessor of MAT4 as matrices with the translation in the last column.
-
-        Returns (N, 4, 4). Raises ``FormatError``: as for ``floats``.
-        """
+        """Return MAT4 elements as matrices (N, 4, 4) with the translation in the last column."""
         columns = self.floats(index, ("MAT4",), user).reshape(-1, 4, 4)
         return np.ascontiguousarray(columns.transpose(0, 2, 1))
 

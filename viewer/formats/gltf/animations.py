@@ -80,21 +80,15 @@ class Targets:
         return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
 
     def moves_all(self, ends: list[Any]) -> bool:
-        """Return whether all channels with these targets, as in the file, have a visible effect.
-
-        Files have tens of thousands of them, most of which are transforms. A target that is not an
-        object, or lacks a member, raises a ``TypeError`` or ``KeyError``.
-        """
+        """Return whether all of tens of thousands of targets, as in the file, have an effect."""
+        # A target that is no object or lacks a member raises TypeError or KeyError.
         nodes, paths = {end["node"] for end in ends}, {end["path"] for end in ends}
         if set(map(type, nodes)) == {int} and paths.issubset(_OF_NODES):
             return min(nodes) >= 0 and max(nodes) < self._tree.n_nodes
         return all(self.moves(end["node"], end["path"]) for end in ends)
 
     def of(self, channel: Element) -> _Moved:
-        """Return the target of a channel.
-
-        Raises ``FormatError`` if the channel has no target, or refers to a missing node.
-        """
+        """Return the target of a channel."""
         target = channel.part("target")
         if target is None:
             raise channel.wrong("target", "an object")
@@ -130,11 +124,7 @@ class _Unused:
 
 
 def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation, ...]:
-    """Return the animations that are valid, except for keys that are read later.
-
-    An invalid animation is omitted with a warning. The keys of the first one are read, because it
-    is played by default; if errors are only recorded, all keys are read.
-    """
+    """Return the valid animations; only the keys of the first, which plays by default, are read."""
     table = document.table("animations")
     unused = _Unused()
     found: list[NodeAnimation] = []
@@ -187,11 +177,7 @@ def _checked(animation: NodeAnimation) -> NodeAnimation:
 def _plain_channels(
     channels: list[Any], samplers: list[Any], targets: Targets
 ) -> tuple[set[int], set[int]] | None:
-    """Return the nodes and the time accessors of channels; None if any is invalid or unusual.
-
-    Files may have tens of thousands of channels, nearly all in the form that is handled here.
-    This function takes less time than parsing the JSON.
-    """
+    """Return the nodes and time accessors of channels; None if any is invalid or unusual."""
     try:
         ends = [item["target"] for item in channels]
         if not targets.moves_all(ends):
@@ -244,11 +230,7 @@ def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[fl
 
 
 def _declared(accessors: Table, inputs: set[int]) -> tuple[float, float] | None:
-    """Return the least minimum and the largest maximum that accessors declare.
-
-    None if any is invalid. Each of thousands of channels may have its own accessor, so the check of
-    valid ones is short.
-    """
+    """Return the least minimum and the largest maximum of accessors; None if any is invalid."""
     try:
         if min(inputs) < 0 or set(map(type, inputs)) != {int}:
             return None
@@ -392,10 +374,7 @@ def _read_times(document: Document, sampler: Element) -> Floats:
 def _read_keys(
     document: Document, sampler: Element, times: Floats, path: TransformPath, n_shapes: int
 ) -> _Keys:
-    """Return the keys of a sampler at N times, with ``n_shapes`` weights per key.
-
-    Of several keys at one time, only the last is used.
-    """
+    """Return the keys at N times, with ``n_shapes`` weights each."""
     names = tuple(_INTERPOLATIONS)
     interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
     accessor = sampler.required_index("output", len(document.accessors), "accessors")

@@ -57,10 +57,7 @@ def _located(buffer: Element, length: int) -> bytes:
 
 
 class Buffers:
-    """Bytes of a document.
-
-    ``spend``: counts bytes that are about to be decoded; see ``Document.spend``.
-    """
+    """Bytes of a document; ``spend`` counts the bytes that are about to be decoded."""
 
     def __init__(
         self, root: Element, binary: memoryview | None, spend: Callable[[int, str], None]
@@ -84,20 +81,13 @@ class Buffers:
         return len(self._images)
 
     def data(self, index: int) -> Bytes:
-        """Return the bytes of a buffer: (N,) uint8, read-only; N may differ from ``byteLength``.
-
-        Raises ``FormatError`` if the buffer has no data, or the data cannot be read.
-        """
+        """Return the bytes of a buffer (N,), read-only; N may differ from ``byteLength``."""
         if index not in self._data:
             self._data[index] = self._read(index)
         return self._data[index]
 
     def view(self, index: int) -> View:
-        """Return a buffer view, decompressed if it is compressed.
-
-        Raises ``FormatError`` if the view is invalid or exceeds its data, or the data cannot be
-        read.
-        """
+        """Return a buffer view, decompressed if it is compressed."""
         view = self._views[index]
         compressed = meshopt_of(view)
         if compressed is None:
@@ -108,10 +98,7 @@ class Buffers:
         return self._decoded[index]
 
     def image(self, index: int) -> EncodedImage:
-        """Return an image, still encoded.
-
-        Raises ``FormatError`` if the image's data is missing, unreadable, or outside the folder.
-        """
+        """Return an image, still encoded."""
         image = self._images[index]
         name = image.text("name")
         place = image.index("bufferView", self.n_views, "bufferViews")
@@ -173,10 +160,7 @@ def _is_data_uri(uri: str) -> bool:
 
 
 def _uri_bytes(element: Element, most: int | None = None) -> bytes:
-    """Return the data to which the ``uri`` of a buffer or image refers.
-
-    ``most``: maximum number of bytes to decode from a data URI.
-    """
+    """Return what a buffer's or image's ``uri`` refers to; ``most``: bytes of a data URI."""
     uri = element.text("uri")
     if _is_data_uri(uri):
         return _data_uri_bytes(element, most)

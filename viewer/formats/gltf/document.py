@@ -49,10 +49,7 @@ _Content = TypeVar("_Content")
 
 
 class Document:
-    """An opened glTF file: its JSON, bytes and arrays.
-
-    ``binary``: contents of the binary chunk, with its padding; None if there is none.
-    """
+    """An opened glTF file: its JSON, bytes and arrays; ``binary`` is the binary chunk."""
 
     def __init__(self, source: Source, root: dict[str, Any], binary: memoryview | None) -> None:
         self.source = source
@@ -69,11 +66,7 @@ class Document:
         return self._tables[name]
 
     def spend(self, n_bytes: int, pointer: str) -> None:
-        """Count bytes that are about to be decoded; negative numbers are bytes that were released.
-
-        Raises ``FormatError`` if the decoded data are much larger than the file, which may declare
-        huge arrays.
-        """
+        """Count bytes to be decoded, or released if negative; refuse far more than the file has."""
         size = self._decoded + n_bytes
         most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
         if size > most:
@@ -87,10 +80,7 @@ class Document:
         self._decoded = size
 
     def kept(self, read: Callable[[], _Content], neutral: _Content) -> _Content:
-        """Return the result of a function, or a neutral value if its error is only recorded.
-
-        Raises ``FormatError``: the function's error, unless the source continues after errors.
-        """
+        """Return the result of a function, or a neutral value if its error is only recorded."""
         try:
             return read()
         except FormatError as problem:
@@ -101,10 +91,7 @@ class Document:
 
 
 def open_document(source: Source) -> Document:
-    """Open a ``.gltf``, ``.glb`` or ``.vrm`` file; its buffers are read on first use.
-
-    Raises ``FormatError`` if its container or its JSON is invalid, or it has another version.
-    """
+    """Open a ``.gltf``, ``.glb`` or ``.vrm`` file; its buffers are read on first use."""
     root, binary = _contents(source)
     # In glTF 1.0, the tables are objects instead of lists, so the version is checked first.
     _check_version(Element(source, root))
@@ -225,10 +212,7 @@ def _title(kind: bytes) -> str:
 
 
 def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
-    """Return the parsed root object.
-
-    Raises ``FormatError`` if the text is not a valid JSON object.
-    """
+    """Return the parsed root object."""
     if len(data) > _MOST_BYTES:
         raise source.fault(
             "F001.gltf-text: expected at most {most:,.0f} bytes of JSON, found {size:,.0f}: "
@@ -330,10 +314,7 @@ def _decoded_text(source: Source, data: bytes) -> str:
 
 @contextmanager
 def _collection_suspended() -> Iterator[None]:
-    """Suspend garbage collection, which takes a quarter of the time and cannot find anything.
-
-    Hundreds of thousands of new objects start it again and again, although JSON has no cycles.
-    """
+    """Suspend garbage collection: a quarter of the time, and parsed JSON has no cycles to find."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -344,10 +325,7 @@ def _collection_suspended() -> Iterator[None]:
 
 
 def _remove_nulls(root: dict[str, Any]) -> int:
-    """Remove null members, which some exporters write instead of omitting them.
-
-    Returns their number. Application data are left unchanged.
-    """
+    """Remove null members outside of application data, which some exporters write; count them."""
     count = 0
     left: list[Any] = [root]
     while left:

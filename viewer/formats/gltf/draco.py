@@ -30,13 +30,7 @@ class DecodedPrimitive:
 
 
 def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:
-    """Return a compressed primitive; None if the uncompressed form is to be read.
-
-    If a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
-
-    Raises ``FormatError`` if the extension or the data are malformed, or DracoPy is needed but not
-    installed.
-    """
+    """Return a decoded primitive; None if it is stored without Draco and DracoPy is missing."""
     extension = primitive.extension(_NAME) if primitive.has("extensions") else None
     if extension is None:
         return None

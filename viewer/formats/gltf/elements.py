@@ -27,11 +27,7 @@ _BEYOND = 1 << 64  # whole numbers from this value on are invalid in any file
 
 
 def _pointer_to(base: str, *keys: str | int) -> str:
-    """Return a JSON pointer to a member (RFC 6901).
-
-    >>> _pointer_to("/nodes/3", "extensions", "a/b")
-    '/nodes/3/extensions/a~1b'
-    """
+    """Return a JSON pointer to a member (RFC 6901): ``/nodes/3/extensions/a~1b``."""
     for key in keys:
         if type(key) is str and ("/" in key or "~" in key):
             key = key.replace("~", "~0").replace("/", "~1")
@@ -74,10 +70,7 @@ class Element:
         return self.fault(wording.GLTF_TYPE, name, wanted=wanted, found=describe(self.values[name]))
 
     def whole(self, name: str, default: int | None = None) -> int:
-        """Return a member that is a whole number of at least 0.
-
-        Raises ``FormatError`` if the member has any other value, or is missing and has no default.
-        """
+        """Return a member that is a whole number of at least 0."""
         value = self.values.get(name)
         if value is None and default is not None and name not in self.values:
             return default
@@ -88,11 +81,7 @@ class Element:
         return value
 
     def index(self, name: str, count: int, what: str) -> int:
-        """Return a member that is an index below ``count``; -1 if it is missing.
-
-        ``what``: name of these elements in the root: ``"nodes"``. Raises ``FormatError`` if the
-        member has any other value.
-        """
+        """Return a member that is an index into the list ``what``; -1 if it is missing."""
         if name not in self.values:
             return -1
         index = self.whole(name)
@@ -101,20 +90,14 @@ class Element:
         return index
 
     def required_index(self, name: str, count: int, what: str) -> int:
-        """Return a member that is an index below ``count``.
-
-        Parameters and errors as for ``index``; a missing member is also an error.
-        """
+        """Return a member that is an index; unlike ``index``, it must be there."""
         index = self.index(name, count, what)
         if index < 0:
             raise self.wrong(name, f"the index of {_ONE[what]}")
         return index
 
     def number(self, name: str, default: float | None = None) -> float:
-        """Return a member that is a finite number.
-
-        Raises ``FormatError`` if the member has any other value, or is missing and has no default.
-        """
+        """Return a member that is a finite number."""
         if name not in self.values and default is not None:
             return default
         value: Any = self.values.get(name)
@@ -123,10 +106,7 @@ class Element:
         return float(value)
 
     def numbers(self, name: str, count: int | None = None) -> Floats | None:
-        """Return a member that is a list of finite numbers, (N,); None if it is missing.
-
-        Raises ``FormatError`` if the member has any other value.
-        """
+        """Return a member that is a list of finite numbers (N,); None if it is missing."""
         if name not in self.values:
             return None
         items = self.values[name]
@@ -145,10 +125,7 @@ class Element:
     def choice(
         self, name: str, choices: Sequence[_Choice], default: _Choice | None = None
     ) -> _Choice:
-        """Return a member that is one of several values.
-
-        Raises ``FormatError`` if the member has any other value, or is missing and has no default.
-        """
+        """Return a member that is one of several values."""
         if name not in self.values and default is not None:
             return default
         value: Any = self.values.get(name)
@@ -157,30 +134,21 @@ class Element:
         return value
 
     def text(self, name: str, default: str = "") -> str:
-        """Return a member that is a string.
-
-        Raises ``FormatError`` if the member has any other value.
-        """
+        """Return a member that is a string."""
         value = self.values.get(name, default)
         if type(value) is not str:
             raise self.wrong(name, "a string")
         return value
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """Return a member that is true or false.
-
-        Raises ``FormatError`` if the member has any other value.
-        """
+        """Return a member that is true or false."""
         value = self.values.get(name, default)
         if type(value) is not bool:
             raise self.wrong(name, "true or false")
         return value
 
     def part(self, name: str) -> Element | None:
-        """Return a member that is an object; None if it is missing.
-
-        Raises ``FormatError`` if the member has any other value.
-        """
+        """Return a member that is an object; None if it is missing."""
         if name not in self.values:
             return None
         value = self.values[name]
@@ -189,21 +157,14 @@ class Element:
         return Element(self.source, value, self.at(name))
 
     def table(self, name: str) -> Table:
-        """Return a member that is a list of objects; an empty one if it is missing.
-
-        Raises ``FormatError`` if the member is not a list; its items are checked when they are
-        used.
-        """
+        """Return a member that is a list, or an empty one; its items are checked when used."""
         items = self.values.get(name, [])
         if type(items) is not list:
             raise self.wrong(name, "a list")
         return Table(self.source, items, self.at(name))
 
     def indices(self, name: str, count: int, what: str) -> list[int]:
-        """Return a member that is a list of indices below ``count``; empty if it is missing.
-
-        Raises ``FormatError`` if the member has any other value; see ``index``.
-        """
+        """Return a member that is a list of indices below ``count``; empty if it is missing."""
         items = self.values.get(name, [])
         if type(items) is not list:
             raise self.wrong(name, "a list")
@@ -219,10 +180,7 @@ class Element:
         return items
 
     def extension(self, name: str) -> Element | None:
-        """Return an extension of this object; None if there is none.
-
-        Raises ``FormatError`` if the extension or the member ``extensions`` is not an object.
-        """
+        """Return an extension of this object; None if there is none."""
         extensions = self.part("extensions")
         return None if extensions is None else extensions.part(name)
 
@@ -256,12 +214,7 @@ _NUMBERS = ({int}, {float}, {int, float})
 
 
 def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
-    """Return the objects that have a member, and the member's numbers.
-
-    ``table``: table that contains only objects. Returns ``places``: (N,) int32, indices of the
-    objects; ``rows``: (N, width), finite numbers. Raises ``FormatError`` if a member is anything
-    other than ``width`` finite numbers.
-    """
+    """Return which objects have a member (N,), and its finite numbers (N, width)."""
     places = [place for place, values in enumerate(table.items) if name in values]
     items = [table.items[place][name] for place in places]
     rows = _array(items, width)
@@ -286,10 +239,7 @@ def _array(items: list[Any], width: int) -> Floats | None:
 
 
 def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
-    """Return an index below ``count`` from a member of each object, -1 if it is missing: (N,).
-
-    Raises ``FormatError`` if a member is not such an index; see ``Element.index``.
-    """
+    """Return each object's index below ``count`` (N,), -1 where the member is missing."""
     result = np.full(len(table), -1, dtype=np.int32)
     for place, values in enumerate(table.items):
         if name in values:

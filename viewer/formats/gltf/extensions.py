@@ -57,10 +57,7 @@ _READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\
 
 
 def check_extensions(document: Document) -> None:
-    """Refuse a document that needs an unknown extension; report other unknown ones once.
-
-    Raises ``FormatError`` if an unknown extension is required that may change surfaces or motions.
-    """
+    """Refuse a document that needs an unknown extension; report other unknown ones once."""
     required = [name for name in _names(document, "extensionsRequired") if name not in _KNOWN]
     unknown = [name for name in required if not _changes_only_look(name)]
     pointer = document.root.at("extensionsRequired")

@@ -99,11 +99,7 @@ class Glossiness:
 
 @contextlib.contextmanager
 def reading_materials(document: Document) -> Iterator[Callable[[], tuple[Material, ...]]]:
-    """Read all materials; their images are decoded while the body of the ``with`` statement runs.
-
-    Yields waits for the images, and returns the materials in file order. Textures that share an
-    image share its pixels.
-    """
+    """Read all materials; images are decoded while the body of the ``with`` statement runs."""
     table = document.table("materials")
     neutral = Element(document.source, {})
     elements = [
@@ -282,10 +278,7 @@ def from_glossiness(stated: Glossiness, images: dict[int, DecodedImage]) -> dict
 
 
 def _converted(stated: Glossiness, diffuse: Bytes | None, specular: Bytes) -> tuple[Bytes, Bytes]:
-    """Return images of the base colour, and of roughness (green) and metallic (blue).
-
-    Both have the size of the diffuse image or, if there is none, of the specular image.
-    """
+    """Return images of the base colour, and of roughness (green) and metallic (blue)."""
     whole = specular if diffuse is None else diffuse
     height, width = whole.shape[:2]
     colors, packed = np.empty_like(whole), np.full_like(whole, 255)

@@ -48,11 +48,7 @@ class _Reading:
 
 
 def read_meshes(document: Document) -> tuple[NodeMesh, ...]:
-    """Return all meshes.
-
-    Raises ``FormatError`` if a mesh is malformed, refers to missing vertices or data, or has
-    non-finite positions.
-    """
+    """Return all meshes."""
     table = document.table("meshes")
     reading = _Reading(document, _users(table))
     empty = NodeMesh("", ())
@@ -196,11 +192,7 @@ class _Attributes:
         return self._values(self.document.accessors.floats, name, kinds)
 
     def stored(self, name: str, *kinds: str) -> NDArray[Any] | None:
-        """Return the finite numbers of all vertices as in the file, without copying them.
-
-        None if the attribute is missing, or if its data must be decoded or corrected; see
-        ``floats``.
-        """
+        """Return finite numbers as in the file, not copied; None if they need decoding."""
         index = self.accessor(name)
         if index < 0 or name in self.decoded:
             return None
@@ -303,27 +295,18 @@ def _existing(
 
 
 def _strip(corners: Ints) -> Ints:
-    """Return the triangles of a strip, every other one reversed (glTF 2.0, 3.7.2.1).
-
-    Degenerate triangles, which connect parts of a strip, are omitted.
-
-    >>> _strip(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
-    [[0, 1, 2], [1, 3, 2]]
-    """
+    """Return the triangles of a strip, every other one reversed, except for degenerate ones."""
     if len(corners) < 3:
         return np.zeros((0, 3), dtype=np.int32)
     triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
     triangles[1::2] = triangles[1::2][:, [0, 2, 1]]
+    # Degenerate triangles connect parts of a strip (glTF 2.0, 3.7.2.1).
     a, b, c = triangles.T
     return triangles[(a != b) & (b != c) & (c != a)]
 
 
 def _fan(corners: Ints) -> Ints:
-    """Return the triangles of a fan around its first corner (glTF 2.0, 3.7.2.1).
-
-    >>> _fan(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
-    [[1, 2, 0], [2, 3, 0]]
-    """
+    """Return the triangles of a fan: 0 1 2 3 are (1, 2, 0), (2, 3, 0) (glTF 2.0, 3.7.2.1)."""
     if len(corners) < 3:
         return np.zeros((0, 3), dtype=np.int32)
     center = np.full(len(corners) - 2, corners[0])
@@ -357,10 +340,7 @@ def _read_normals(attributes: _Attributes) -> Floats | None:
 
 
 def _tangents_of(attributes: _Attributes) -> Callable[[], Floats | None] | None:
-    """Return a function that reads the tangents, (V, 4); None if there are none.
-
-    They are not drawn, but written back. The function returns None if they are invalid.
-    """
+    """Return a reader of tangents (V, 4), which are only written back; None if there are none."""
     if not attributes.element.has("TANGENT"):
         return None
 
@@ -417,10 +397,7 @@ def _not_finite(values: Floats) -> Bools:
 
 
 def _read_influences(attributes: _Attributes) -> tuple[Ints, Floats] | tuple[None, None]:
-    """Return joints (V, K) int32 and weights (V, K), as stored; None if there are none.
-
-    Joint indices of weight 0 are set to 0, because files may contain any number in these slots.
-    """
+    """Return joints (V, K), 0 where the weight is 0, and weights (V, K); None if there are none."""
     numbers = attributes.sets("JOINTS")
     without = sorted(set(numbers) ^ set(attributes.sets("WEIGHTS")))
     if without:
@@ -512,10 +489,7 @@ def _offsets(attributes: _Attributes, targets: Table, name: str) -> MorphTargets
 
 
 def _target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
-    """Return the names of the morph targets; empty strings if there are none.
-
-    Names are application data of the mesh, of a primitive, or of the targets themselves.
-    """
+    """Return the names of the morph targets, stated in any of three places; empty without names."""
     candidates = [_named(mesh)]
     for place in range(len(primitives)):
         targets = primitives[place].table("targets")

@@ -73,12 +73,7 @@ def meshopt_of(view: Element) -> Element | None:
 
 
 def decoded_view(compressed: Element, data: Bytes, spend: Callable[[int, str], None]) -> Bytes:
-    """Return the contents of a compressed buffer view: (N,) uint8, read-only.
-
-    ``compressed``: the extension, as ``meshopt_of`` returns it. ``data``: (M,) uint8, the
-    compressed data. ``spend``: counts bytes that are about to be decoded; see ``Document.spend``.
-    Raises ``FormatError`` if the extension is malformed or the data are damaged.
-    """
+    """Return the contents of a compressed buffer view (N,), read-only."""
     mode = compressed.choice("mode", _MODES)
     kind = compressed.choice("filter", _FILTERS, "NONE")
     count, stride = compressed.whole("count"), compressed.whole("byteStride")
@@ -116,11 +111,7 @@ class _Groups:
 
 
 def decoded_attributes(data: Bytes, count: int, stride: int) -> Bytes | None:
-    """Return the decoded elements, stored consecutively: (count * stride,) uint8.
-
-    ``data``: (M,) uint8, the stream. ``count``, ``stride``: number of elements, and bytes per
-    element, a multiple of 4. Returns (count * stride,) or None, none if the stream is damaged.
-    """
+    """Return the consecutive elements (count * stride,); None if the stream is damaged."""
     version = int(data[0]) - 0xA0 if len(data) else -1
     tail = stride + (stride // 4 if version == 1 else 0)
     if version not in (0, 1) or len(data) < 1 + tail:
@@ -304,11 +295,7 @@ class _Numbers:
 
 
 def decoded_triangles(data: Bytes, count: int, stride: int) -> Bytes | None:
-    """Return the decoded vertex indices of triangles: (count * stride,) uint8.
-
-    ``data``: (M,) uint8, the stream. ``count``, ``stride``: number of indices, and bytes per index,
-    2 or 4. Returns (count * stride,) or None, none if the stream is damaged.
-    """
+    """Return vertex indices of 2 or 4 bytes (count * stride,); None if the stream is damaged."""
     n_triangles, rest = divmod(count, 3)
     if rest or len(data) < 1 + n_triangles + _TABLE or data[0] != _TRIANGLES:
         return None

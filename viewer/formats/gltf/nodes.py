@@ -51,10 +51,7 @@ _EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
 
 
 def read_tree(document: Document) -> NodeTree:
-    """Return all nodes of a document.
-
-    Raises ``FormatError`` if a node is invalid, has two parents, or is its own ancestor.
-    """
+    """Return all nodes of a document."""
     table = document.table("nodes")
     for place in range(len(table)):
         if type(table.items[place]) is not dict:
@@ -237,10 +234,7 @@ def _check_affine(table: Table, places: Ints, matrices: Floats) -> None:
 
 
 def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
-    """Return rotations (N, 4) and scales (N, 3) of linear parts, and whether they are exact.
-
-    A reflection becomes a negative scale along x.
-    """
+    """Return rotations (N, 4), scales (N, 3), x < 0 for a reflection, and which are exact."""
     scales = np.linalg.norm(linear, axis=1)
     scales[:, 0] *= np.where(np.linalg.det(linear) < 0.0, -1.0, 1.0)
     # Columns of length 0 are replaced so that the matrix is a rotation.
@@ -254,10 +248,7 @@ def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
 
 
 def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
-    """Return the root nodes of the default scene or the first one; all if there are no scenes.
-
-    Raises ``FormatError`` if the scene does not exist, or its list of nodes is malformed.
-    """
+    """Return the root nodes of the default scene or the first one; all if there are no scenes."""
     scenes = document.table("scenes")
     default = document.root.index("scene", len(scenes), "scenes")
     every = tuple(np.nonzero(tree.parents < 0)[0].tolist())
@@ -346,11 +337,7 @@ def _positive(lens: Element, name: str) -> float | None:
 
 
 def read_skins(document: Document) -> tuple[NodeSkin, ...]:
-    """Return all skins.
-
-    Raises ``FormatError`` if a skin is malformed, refers to missing nodes, or has too few or
-    invalid matrices.
-    """
+    """Return all skins."""
     table = document.table("skins")
     skins = (partial(_skin, document, table, index) for index in range(len(table)))
     return tuple(document.kept(skin, _EMPTY) for skin in skins)
@@ -432,11 +419,7 @@ def checked_bindings(
     meshes: tuple[NodeMesh, ...],
     skins: tuple[NodeSkin, ...],
 ) -> tuple[NodeMesh, ...]:
-    """Return the meshes after checking their joint indices against all skins in use.
-
-    Raises ``FormatError`` if a vertex refers to a joint that the skin does not have. If errors are
-    only recorded, the weight of such an influence is set to 0.
-    """
+    """Return the meshes; joints that a skin lacks are refused, or get weight 0 if only recorded."""
     limits: dict[int, tuple[int, int]] = {}
     for node in np.nonzero((tree.meshes >= 0) & (tree.skins >= 0))[0].tolist():
         mesh, skin = int(tree.meshes[node]), int(tree.skins[node])

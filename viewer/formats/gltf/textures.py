@@ -58,10 +58,7 @@ class Slot:
 
 
 def read_slot(document: Document, parent: Element, name: str) -> Slot | None:
-    """Return the texture to which a member of a material refers; None if there is none.
-
-    ``name``: name of the member, such as ``"normalTexture"``.
-    """
+    """Return the texture that a material's member, such as ``normalTexture``, names, or None."""
     source = document.source
     info = lenient(source, lambda: parent.part(name), None)
     if info is None:
@@ -145,17 +142,9 @@ def _pair(extension: Element, name: str, default: float) -> Floats:
 
 
 def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
-    """Return a texture transform with v = 0 at the bottom: F T(offset) R(-angle) S(scale) F.
-
-    F flips v: glTF puts v = 0 at the first row of the image. The transform follows
-    KHR_texture_transform, whose rotation is counter-clockwise as seen on the image.
-
-    ``offset``, ``scale``: (2,), offset and scale of texture coordinates from 0 to 1. Returns (2,
-    3), maps (u, v, 1) to texture coordinates of the image.
-
-    >>> transform_matrix(np.array([0.5, 0.0]), 0.0, np.array([1.0, 0.5])).tolist()
-    [[1.0, 0.0, 0.5], [0.0, 0.5, 0.5]]
-    """
+    """Return KHR_texture_transform (2, 3) with v = 0 at the bottom, of offset and scale (2,)."""
+    # The extension's T(offset) R(-angle) S(scale) is for v = 0 at the first row of the image, so it
+    # stands between two flips of v: (u, v) -> (u, 1 - v).
     cos, sin = math.cos(angle), math.sin(angle)
     (a, b), (c, d) = np.array([[cos, sin], [-sin, cos]]) * scale
     u, v = offset
@@ -183,10 +172,7 @@ class DecodedImage:
 def decoding_images(
     document: Document, indices: Iterable[int]
 ) -> Iterator[Callable[[], dict[int, DecodedImage]]]:
-    """Decode images of a document while the body of the ``with`` statement runs.
-
-    Yields waits, and returns the images by index; images that cannot be read cause a warning.
-    """
+    """Decode images while the body of the ``with`` statement runs; unreadable ones are reported."""
     found = {index: _encoded(document, index) for index in sorted(set(indices))}
     images = {index: image for index, image in found.items() if image is not None}
     path = document.source.path
