@@ -17,9 +17,9 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Phrase
 from viewer.errors import RigError
-from viewer.phrases import all_of, counted
+from viewer.phrases import all_of
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.memo import Memo
 from viewer.rig.motion.samples import Samples
@@ -166,7 +166,7 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
     clip : Clip
         The motion.
     skeleton : Skeleton
-        Provides the limits; the clip must fit the skeleton, see ``check_fit``.
+        Provides the limits; the clip must fit the skeleton, see ``suits``.
     time : float
         Seconds; before ``start`` and after ``end`` the curves extrapolate.
     out : Pose
@@ -308,7 +308,7 @@ def _spans(table: _Table, times: Floats) -> Ints:
 
 
 def suits(clip: Clip, skeleton: Skeleton) -> bool:
-    """Return whether a clip's channels are the DOFs of a skeleton; see ``check_fit``."""
+    """Return whether a clip's channels are the DOFs of a skeleton; see ``misfit``."""
     return not misfit(clip, skeleton)
 
 
@@ -325,25 +325,6 @@ def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
             "needs {n} (3 + 3 x {joints} joints)", n=skeleton.n_dofs, joints=skeleton.n_joints
         )
     return None
-
-
-def check_fit(clip: Clip, skeleton: Skeleton) -> None:
-    """Raise an error if a clip was made for a different skeleton.
-
-    Raises ``RigError`` if the number of channels or the DOFs do not match; see ``is_course_rig``.
-    """
-    found = misfit(clip, skeleton)
-    if found is None:
-        return
-    values = {"clip": clip.name, "n": counted(len(clip.channels), "channel"), "misfit": found}
-    raise RigError(
-        Diagnostic(
-            "C009.channels: clip {clip} has {n}, the skeleton {misfit}"
-            if is_course_rig(skeleton)
-            else "C009.rig: clip {clip}: the skeleton {misfit}",
-            values=values,
-        )
-    )
 
 
 def is_course_rig(skeleton: Skeleton) -> bool:
