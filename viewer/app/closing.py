@@ -240,14 +240,12 @@ def _poses(state: AppState) -> list[_Unsaved]:
 
 
 def _is_posed_by_hand(state: AppState, actor: Actor) -> bool:
-    """Return whether an actor's pose was edited, and is neither saved, reset nor that of its clip.
-
-    A clip overrides an edited pose when the time changes, but not the values that it does not
-    animate, such as the shape.
-    """
+    """Return whether an actor's pose is edited, and is neither saved, reset nor set by its clip."""
     first = state.history.first_poses.get(actor)
     if first is None or actor.pose is None:
         return False
+    # A clip overrides an edited pose when the time changes, but not the values that it does not
+    # animate, such as the shape.
     return not any(
         _is_same(actor, pose)
         or (actor.clip is not None and _is_same(actor, state.clock.posed(actor, pose)))

@@ -42,10 +42,7 @@ class ContextMenu:
 def answer_right_click(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float
 ) -> None:
-    """Find the item that a right click hit, and request its menu.
-
-    ``size``: width and height of the view, pixels.
-    """
+    """Find the item that a right click hit, and request its menu; ``size`` in pixels."""
     picking, menu = state.of(Picking), state.of(ContextMenu)
     place, picking.menu_at = picking.menu_at, None
     if place is None:

@@ -29,11 +29,9 @@ class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
 
 
 def import_glfw() -> Any:
-    """Return the module glfw, bound to the library shipped with imgui-bundle.
-
-    Two copies of GLFW in one process do not share windows. imgui-bundle tells glfw
-    which one to load, so imgui-bundle must be imported first.
-    """
+    """Return the module glfw, bound to the library shipped with imgui-bundle."""
+    # Two copies of GLFW in one process do not share windows. imgui-bundle tells glfw which one
+    # to load, so it is imported first.
     import imgui_bundle  # noqa: F401, I001
 
     import glfw
@@ -44,10 +42,7 @@ def import_glfw() -> Any:
 
 
 def window_error(message: str) -> RenderError:
-    """Return an error with the OpenGL version of a display on which no window can be created.
-
-    ``message``: GLFW's message, used if the display has no OpenGL at all.
-    """
+    """Return an error with the display's OpenGL version, or GLFW's message if it has none."""
     glfw = import_glfw()
     glfw.default_window_hints()
     glfw.window_hint(glfw.VISIBLE, False)
@@ -64,10 +59,7 @@ def window_error(message: str) -> RenderError:
 
 
 def find_display() -> None:
-    """Check that a window can be opened.
-
-    Raises ``NoDisplay`` if no window can be opened; the message gives the reason in one line.
-    """
+    """Raise ``NoDisplay``, with the reason in one line, if no window can be opened."""
     if sys.platform.startswith("linux"):
         names = ("DISPLAY", "WAYLAND_DISPLAY")
         if not any(os.environ.get(name) for name in names):
@@ -114,11 +106,7 @@ _TO_OTHERS = {2, 18, 20, 24, 25}
 
 
 def watch_display() -> None:
-    """Install the handlers of lost windows and of a lost connection.
-
-    Called before GLFW starts, because the connection may be lost while a window is created. Further
-    calls have no effect.
-    """
+    """Install the handlers of lost windows and of a lost connection, once, before GLFW starts."""
     global _library
     if _library is None:
         _library = _open_library()

@@ -52,10 +52,7 @@ _LAID_OUT = 2  # first frame in which the panels leave room for the view, counte
 
 
 class Frame:
-    """Runs and draws frames of one state in one context; the caller begins ImGui's frame.
-
-    ``wake``: called from other threads when a frame must be drawn.
-    """
+    """Runs and draws frames of one state in one context; the caller begins ImGui's frame."""
 
     def __init__(self, state: AppState, programs: Programs) -> None:
         self.state, self.context = state, programs.context
@@ -71,10 +68,7 @@ class Frame:
         state.stats.version = self.context.info["GL_VERSION"]
 
     def draw(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], scale: float) -> None:
-        """Run one frame between ``imgui.new_frame`` and the swap of buffers, and paint it.
-
-        ``size``: width and height of the framebuffer, pixels.
-        """
+        """Run one frame after ``imgui.new_frame`` and paint it; ``size`` in pixels."""
         started = time.perf_counter()
         self.run(scale)
         self.paint(framebuffer, size)

@@ -22,11 +22,7 @@ _SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to settle
 
 
 class HeadlessApp:
-    """Runs frames of the interface in an EGL context.
-
-    ``pixels_per_point``: framebuffer pixels per window coordinate, as on a HiDPI screen.
-    ``graphics``: an existing context to draw in, which ``release`` does not free.
-    """
+    """Runs frames of the interface in an EGL context, its own unless ``graphics`` is given."""
 
     def __init__(
         self,
@@ -60,11 +56,7 @@ class HeadlessApp:
         self._wording.enter_context(in_window())
 
     def step(self, frames: int = 1) -> None:
-        """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io.
-
-        Panels are painted only by ``pixels``, because with software rendering this takes longer
-        than all other steps of a frame.
-        """
+        """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io."""
         self._make_current()
         for _ in range(frames):
             imgui.get_io().delta_time = 1.0 / 60.0
@@ -85,10 +77,7 @@ class HeadlessApp:
         return self.screen.read()
 
     def picture(self, fits: bool = True) -> Bytes:
-        """Return the whole interface as pixels, (H, W, 4) uint8, with the camera fitted.
-
-        Messages do not time out, regardless of how long drawing takes.
-        """
+        """Return the interface (H, W, 4) with the camera fitted; messages do not time out."""
         for note in self.state.messages.notes:
             note.until = math.inf
         self.state.framing.is_fitting = fits

@@ -110,10 +110,7 @@ def _bound(shortcuts: Sequence[Shortcut], chosen: Mapping[str, str]) -> dict[int
 
 
 def _let_menus_have_keys(has_menu: bool) -> None:
-    """Let ImGui move through an open menu or list with the arrow keys, from the next frame on.
-
-    Without a menu, these keys step through frames, and ImGui must not move the focus with them.
-    """
+    """Let the arrow keys move through an open menu or list; without one, they step frames."""
     io, flag = imgui.get_io(), imgui.ConfigFlags_.nav_enable_keyboard
     io.config_flags = io.config_flags | flag if has_menu else io.config_flags & ~flag
 

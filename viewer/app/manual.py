@@ -164,11 +164,7 @@ def _draw_table(block: Block, number: int) -> None:
 
 
 def blocks_of(text: str) -> list[Block]:
-    r"""Return the blocks of a Markdown text.
-
-    >>> [(block.kind, block.text) for block in blocks_of("# Keys\n\nH or **?**\nlists `them`.\n")]
-    [('title', 'Keys'), ('text', 'H or ? lists them.')]
-    """
+    """Return the blocks of a Markdown text."""
     found: list[Block] = []
     # Every second part is code; its first line names the language.
     for number, part in enumerate(re.split(rf"^{_FENCE}", text, flags=re.MULTILINE)):

@@ -22,11 +22,8 @@ _BUTTONS = (_LEFT, _RIGHT, imgui.MouseButton_.middle)
 
 
 def drop_motion_before_press() -> None:
-    """Discard pointer motion that preceded a press in the same frame.
-
-    ImGui may report a motion and a subsequent press in one frame. Drags that use the motion of
-    the frame, as in plots, would begin with a jump. Called before anything is drawn.
-    """
+    """Discard pointer motion that preceded a press in the same frame; called before drawing."""
+    # Drags that use the motion of the frame, as in plots, would begin with a jump.
     io = imgui.get_io()
     clicked = [button for button in _BUTTONS if imgui.is_mouse_clicked(button)]
     held = [button for button in _BUTTONS if imgui.is_mouse_down(button)]
@@ -97,10 +94,8 @@ def is_held(state: AppState) -> bool:
 
 
 def _is_widget_held() -> bool:
-    """Return whether a widget is held. A text field changes nothing until it loses the focus.
-
-    Tab goes from field to field without a frame in between, and each number is a separate edit.
-    """
+    """Return whether a widget is held. A text field changes nothing until it loses the focus."""
+    # Tab goes from field to field without a frame in between: each number is a separate edit.
     active = imgui.internal.get_active_id()
     # This state persists after typing: the same slider may be dragged afterwards.
     is_text = imgui.internal.get_input_text_state(active) is not None
@@ -108,9 +103,7 @@ def _is_widget_held() -> bool:
 
 
 def stops_time(state: AppState) -> bool:
-    """Return whether time must stop: a handle is held but has not been dragged yet.
-
-    A click must not pause playback, and a drag must start from an unchanged pose.
-    """
+    """Return whether time must stop: a handle is held but has not been dragged yet."""
+    # A click must not pause playback, and a drag must start from an unchanged pose.
     drag = state.of(Posing).drag
     return drag is not None and not drag.has_moved

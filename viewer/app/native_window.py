@@ -49,11 +49,7 @@ _SEPARATOR = imgui.Key.gamepad_back
 
 
 class Shell:
-    """Window that shows the progress of opening files, and then the files.
-
-    ``scale``: scale of the interface; the preferred scale or the screen's if omitted. Raises
-    ``RenderError`` if there is no usable OpenGL.
-    """
+    """Window that shows the progress of opening files, and then the files."""
 
     def __init__(self, title: str, scale: float | None = None) -> None:
         self.problems: list[str] = []
@@ -230,12 +226,9 @@ def end_frame_before(queue: Any, key: int, action: int) -> None:
 
 
 def end_frame(queue: Any) -> None:
-    """Make ImGui process the queued events, if any, in a frame before later ones.
-
-    Mouse buttons require this: tabs and other widgets that may overlap react to a press only if
-    they were hovered in an earlier frame, and the last motion of a drag counts only before its
-    release.
-    """
+    """Make ImGui process the queued events, if any, in a frame before later ones."""
+    # Tabs and other widgets that may overlap react to a press only if they were hovered in an
+    # earlier frame, and the last motion of a drag counts only before its release.
     if len(queue):
         for is_down in (True, False):
             imgui.get_io().add_key_event(_SEPARATOR, is_down)

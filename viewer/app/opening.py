@@ -45,11 +45,9 @@ class Opening(ThreadJob, Generic[Found]):
 
 
 def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
-    """Wait for the files; if it takes more than a moment, open a window with the progress.
+    """Wait for the files; if it takes more than a moment, return a window with the progress.
 
-    ``scale``: scale of the interface; the scale of the screen if omitted. Returns the window, if
-    one was opened. Raises ``Cancelled`` if the user closed the window or pressed Cancel. Raises
-    ``RenderError`` if there is no usable OpenGL.
+    Raises ``Cancelled`` if the user closed the window or pressed Cancel.
     """
     if opening.wait(_PATIENCE):
         return None

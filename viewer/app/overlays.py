@@ -70,10 +70,7 @@ def draw_overlays(state: AppState) -> None:
 
 
 def draw_hints(state: AppState) -> None:
-    """Draw hints about the grid's spacing and the list of keys in a corner of the view.
-
-    Like the image of the scene, they are drawn behind the panels, so they must be drawn after it.
-    """
+    """Draw hints about grid and keys behind the panels, over the image of the scene."""
     text, place = _hint(state)
     draw_list = imgui.get_background_draw_list()
     shadow, color = imgui.get_color_u32((0, 0, 0, 0.5)), imgui.get_color_u32((1, 1, 1, 0.85))
@@ -197,11 +194,7 @@ def _notes_corner(state: AppState) -> tuple[float, float]:
 
 
 def n_newest(heights: Sequence[float], line: float, room: float) -> int:
-    """Return how many of the latest messages fit, leaving room for a line about hidden ones.
-
-    >>> n_newest([10, 10, 10], 10, 30), n_newest([10, 10, 10], 10, 29), n_newest([10] * 20, 10, 500)
-    (3, 1, 8)
-    """
+    """Return how many of the latest messages fit, leaving room for a line about hidden ones."""
     count, used = 0, 0.0
     for height in reversed(heights):
         used += height
@@ -258,11 +251,7 @@ def _flags(fits: bool) -> int:
 
 
 def column_layout(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
-    """Return the smallest number of columns that fit into the height, limited by the width.
-
-    >>> column_layout(50, (1000, 600), (400, 20)), column_layout(50, (1000, 400), (400, 20))
-    (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))
-    """
+    """Return the smallest number of columns that fit into the height, limited by the width."""
     wanted = -(-count // max(int(room[1] / line[1]), 1))
     number = max(min(wanted, int(room[0] / line[0])), 1)
     rows = -(-count // number)

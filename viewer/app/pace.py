@@ -28,26 +28,21 @@ class Step:
 
 
 class Pace:
-    """Redraws the image when it changes, and refines it while it stays the same.
-
-    If a frame with shadows takes too long, shadows fade out during movement and in again
-    afterwards, so that the brightness never jumps.
-    """
+    """Redraws the image when it changes, and refines it while it stays the same."""
 
     def __init__(self) -> None:
         self._key: object = None
         self._changed = self._now = float("-inf")
         self._is_moving = False
         self._done = 0  # completed passes of the image that is shown
+        # If a frame with shadows takes too long, shadows fade out during movement and in again
+        # afterwards, so that the brightness never jumps.
         self._strength = 1.0
         self._cost = 0.0  # frame time with shadows, once measured
         self.is_unfinished = False
 
     def step(self, key: object, options: DisplayOptions, now: float) -> Step | None:
-        """Return the drawing step of this frame; None if the image is finished.
-
-        ``now``: current time of any clock, seconds.
-        """
+        """Return the drawing step at a time in seconds; None if the image is finished."""
         is_changed = key != self._key
         faded = self._fade(is_changed, options, now)
         self._key = key
@@ -99,11 +94,7 @@ def picture_key(
     ghost: Ghost | None = None,
     annotations: Sequence[Annotation] = (),
 ) -> tuple[object, ...]:
-    """Return everything on which the image of the scene depends.
-
-    ``marks``, ``ghost``, ``annotations``: items drawn over the scene in this frame; compared by
-    identity.
-    """
+    """Return all that the image depends on; items drawn over it are compared by identity."""
     camera, version = state.camera, state.version
     place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
     lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))

@@ -195,13 +195,6 @@ def score(query: str, name: str) -> float:
 
     Every word of the query must match: best at the start of a word in the name, next best inside a
     word, otherwise as a sequence of letters. For ties, the shorter name comes first.
-
-    ``query``: words in any order and case; empty matches everything.
-
-    >>> score("wire", "Wireframe") > score("frame", "Wireframe") > score("wfm", "Wireframe") > 0
-    True
-    >>> score("wirex", "Wireframe")
-    -1.0
     """
     lower, total = name.lower(), 0.0
     for word in query.lower().split():

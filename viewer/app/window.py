@@ -188,11 +188,7 @@ class _Window:
         return True
 
     def _wait(self, is_settling: bool) -> bool:
-        """Process events; wait for one unless frames are left to draw.
-
-        Returns whether there was an event. ImGui spreads quick events over several frames, so
-        events left in its queue also count.
-        """
+        """Process events, waiting for one if no frames are left; return whether there was one."""
         shell, state = self.shell, self.state
         shell.is_dirty = False
         # Threads are polled at intervals only, because drawing frames would slow them down.
@@ -207,6 +203,7 @@ class _Window:
             # Redraw for messages that time out, progress bars and blinking text cursors.
             shell.is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
         shell.is_dirty |= state.clock.playing or state.job is not None or steps or improves
+        # ImGui spreads quick events over several frames, so those left in its queue also count.
         return shell.is_dirty or bool(shell.dropped) or len(shell.imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
@@ -254,13 +251,9 @@ class Rest:
         self._awaited = False
 
     def count(self, happened: bool, awaits: bool) -> None:
-        """Advance to the next frame, which is drawn if ``left`` is not negative.
-
-        An expected change may happen in the last frame after the panels were drawn, so its
-        completion counts as an event. A tooltip's window also needs some frames to get its size.
-
-        ``awaits``: whether a change is expected without an event.
-        """
+        """Advance to the next frame, which is drawn if ``left`` is not negative."""
+        # A change without an event, as of a job, may be complete only after the last frame's
+        # panels were drawn, so its end counts as an event. Tooltips need frames to get their size.
         is_over = self._awaited and not awaits
         self._awaited = awaits
         self.left = _SETTLE_FRAMES if happened or is_over else self.left - 1

@@ -230,10 +230,7 @@ def _draw_space(state: AppState) -> None:
 
 
 def switch_space(state: AppState, space: str) -> None:
-    """Show the people in another space; keep time, selection, appearance and calibrated camera.
-
-    The people are read again, so edits of their motions and the undo history are discarded.
-    """
+    """Read the people again in another space, which discards edits of their motions and undo."""
     old = state.scene
     if old.in_space is None:
         return

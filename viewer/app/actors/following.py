@@ -23,11 +23,7 @@ class Following:
 
 
 def follow_actor(state: AppState) -> None:
-    """Keep the camera's target on the followed actor or joint at the same distance.
-
-    The camera moves only with the clock: it stays still while a pose is edited by hand. A view
-    through a moving calibrated camera moves with that camera.
-    """
+    """Keep the target on the followed actor or joint at the same distance while the clock moves."""
     follow_calibrated(state)
     following, n_posed = state.of(Following), state.clock.n_posed
     if following.target is None or following.n_posed == n_posed:

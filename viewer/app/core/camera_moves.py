@@ -17,10 +17,7 @@ _NARROWEST = 40.0  # points: a smaller view is unusable
 
 
 def keep_fitting(state: AppState, grows: bool) -> None:
-    """Extend the known extent of the scene; fit the camera to it unless the user has moved it.
-
-    Called in each frame once the free part of the view is known.
-    """
+    """Extend the known extent of the scene; fit the camera to it unless the user has moved it."""
     framing = state.framing
     framing.watch(state.camera)
     if framing.extent.look(state.scene, state.clock, state.options.show, grows):
@@ -34,10 +31,7 @@ def keep_fitting(state: AppState, grows: bool) -> None:
 
 
 def fit_points(state: AppState, points: Floats) -> None:
-    """Aim the camera at some points, fill the view with them, and keep it fitted.
-
-    ``points``: (N, 3), scene space.
-    """
+    """Aim the camera at points (N, 3) of the scene, fill the view with them, and keep it fitted."""
     framing = state.framing
     framing.is_fitting, framing.points = True, points
     _fit(state, points)
@@ -72,11 +66,7 @@ def _fit(state: AppState, points: Floats) -> None:
 
 
 def _covered_height(state: AppState, points: Floats) -> float:
-    """Return the lower edge of the tools in the upper right corner if they cover any point.
-
-    The settings that some tools have below their buttons do not count: a user who selects a tool
-    wants to keep the current view.
-    """
+    """Return the lower edge of the toolbar without its settings, if that covers any point."""
     tools = state.item_rects.get("##tools")
     if tools is None:
         return 0.0
@@ -94,10 +84,7 @@ def _covered_height(state: AppState, points: Floats) -> float:
 
 
 def look_through_view(state: AppState, view: CameraView) -> None:
-    """Look through a calibrated camera of the scene.
-
-    Raises ``RigError`` if the size of the camera's images is unknown.
-    """
+    """Look through a calibrated camera; ``RigError`` if the size of its images is unknown."""
     scene = state.scene
     seen = camera_from_view(view, _size(state), scene.up, state.box, view_in(view, scene))
     seen.front = state.camera.front

@@ -37,10 +37,7 @@ class PosedFor(NamedTuple):
 
 @dataclass(slots=True)
 class Clock:
-    """Clock that advances the time of a scene, ``Scene.time``, and poses the actors for it.
-
-    Playback follows the wall clock: a slow machine drops frames but stays in sync.
-    """
+    """Advances the time of a scene by the wall clock, dropping frames, and poses its actors."""
 
     scene: Scene = field(default_factory=lambda: Scene([]))
     """Scene that the clock drives."""
@@ -100,11 +97,10 @@ class Clock:
         self.seek(self.start if scene.time is None else scene.time)
 
     def follow(self, chosen: Actor | None = None) -> None:
-        """Update the range for changed or longer clips; a range that covered all clips still does.
+        """Adapt range and frame to changed clips; the chosen actor's capture defines the frames.
 
-        If only the frame rate changes, time and range stay on their frames.
-
-        ``chosen``: actor whose capture defines the frames, if it has one.
+        A range that covered all clips still does. If only the frame rate changes, time and range
+        stay on their frames.
         """
         was_whole = (self.start, self.end) == self.whole
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
@@ -254,11 +250,7 @@ class Clock:
         self.time = self.start + (2.0 * length - place if self._is_returning else place)
 
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
-        """Pose all actors if the time or a clip has changed; return whether they were posed.
-
-        ``chosen``: as for ``follow``, which runs first if clips changed. ``again``: pose the actors
-        even if nothing has changed.
-        """
+        """Pose all actors if the time or a clip changed, or ``again``; return whether they were."""
         actors, before = self.scene.actors, self.posed_for
         clips = tuple((actor.clip, actor.offset) for actor in actors)
         if before is None or before.clips != clips:
@@ -272,10 +264,7 @@ class Clock:
         return True
 
     def posed(self, actor: Actor, pose: Pose) -> Pose:
-        """Return a copy of a pose, with the values that an actor's clip sets for the poses shown.
-
-        The springs of the actor do not move.
-        """
+        """Return a copy of a pose with the values that an actor's clip sets; no spring moves."""
         copied = actor.copy()
         copied.pose, copied.springs = pose.copy(), None
         time = self.time if self.posed_for is None else self.posed_for.time
@@ -283,10 +272,7 @@ class Clock:
         return copied.pose
 
     def go_back(self, time: float, chosen: Actor | None = None) -> None:
-        """Go to a time with restored actors and clips, and pose the actors for it.
-
-        ``chosen``: as for ``follow``.
-        """
+        """Go to a time with restored actors and clips, and pose the actors for it."""
         self.follow(chosen)
         self.seek(time)
         self.pose(chosen, again=True)

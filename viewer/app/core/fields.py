@@ -29,11 +29,10 @@ _CLAMP = imgui.SliderFlags_.always_clamp
 def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: float = 0.0) -> str:
     """Draw the label of the next widget, and return the widget's own label, which is hidden.
 
-    ``label``: text, and optionally an ID after ``##`` or ``###`` to distinguish equal labels, as in
-    ImGui. ``width``: width of the widget in font sizes; the widget then directly follows its label.
-    0 aligns it with the widgets above and below and lets it fill the line. ``column``: width of the
-    label in window coordinates, for rows of one line. By default, it depends on the panel's width,
-    and a longer label is placed above its widget.
+    ``label`` may end with an ID after ``##`` or ``###``, as in ImGui. A widget with a ``width``,
+    in font sizes, directly follows its label; with 0 it is aligned with those above and below and
+    fills the line. ``column``: width of the label, for rows of one line; by default, it depends on
+    the panel's width, and a longer label is placed above its widget.
     """
     text = label.partition("##")[0]
     hidden = label[label.index("###") :] if "###" in label else f"##{label}"
@@ -69,10 +68,7 @@ def slider_float(
     text: str = "%.2f",
     flags: int = 0,
 ) -> tuple[bool, float]:
-    """Draw a slider without a visible label; return whether it was moved, and its value.
-
-    ``label``: hidden label, as from ``begin_field``. ``flags``: ImGui's ``SliderFlags_``.
-    """
+    """Draw a slider with a hidden label; return whether it was moved, and its value."""
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, high), text, flags)
     with _Track(bool(flags and flags & imgui.SliderFlags_.logarithmic)) as track:
@@ -97,10 +93,7 @@ def slider_int(
 def drag_float(
     state: AppState, label: str, value: float, speed: float, text: str, low: float = -math.inf
 ) -> tuple[bool, float]:
-    """Draw a number that is changed by dragging it, or typed after a click; see ``slider_float``.
-
-    ``state``, ``label``, ``value``, ``text``: as for ``slider_float``. ``speed``: change per pixel.
-    """
+    """Draw a number that is dragged, by ``speed`` per pixel, or typed; see ``slider_float``."""
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, math.inf), text, _CLAMP)
     changed, moved = imgui.drag_float(label, value, speed, 0.0, 0.0, text)
@@ -121,10 +114,7 @@ def drag_int(
 
 
 def in_row(hidden: str, values: Sequence[Number], draw: Callable[[str, Number], None]) -> None:
-    """Draw several fields of equal widths in the space of one; they count as one item.
-
-    ``hidden``: hidden label, as from ``begin_field``.
-    """
+    """Draw several fields of equal widths in the space of one; they count as one item."""
     gap = imgui.get_style().item_inner_spacing.x
     room = imgui.calc_item_width() - (len(values) - 1) * gap
     imgui.begin_group()

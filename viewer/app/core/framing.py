@@ -28,16 +28,14 @@ _N_DIRECTIONS = (100, 1000)
 
 @dataclass(slots=True)
 class _MotionExtent:
-    """Outermost points of a scene in sampled frames of its motion, or in its initial pose.
-
-    A capture is sampled while it is being read: the step between sampled frames doubles whenever
-    there are too many. Once reading is complete, the same frames are sampled as for a recording.
-    """
+    """Outermost points of a scene in sampled frames of its motion, or in its initial pose."""
 
     is_done: bool = False
     """Whether all frames have been sampled."""
     was_edited: bool = False
     """Whether a shape or a motion has been edited since the scene was opened."""
+    # A capture is sampled while it is being read: the step between sampled frames doubles whenever
+    # there are too many. Once reading is complete, the same frames are sampled as for a recording.
     _clouds: dict[float, Floats] = field(default_factory=dict)  # points by time in seconds
     _kept: dict[float, Floats] = field(default_factory=dict)  # samples taken before an edit
     _shapes: tuple[bytes, ...] = ()
@@ -68,11 +66,7 @@ class _MotionExtent:
         return bounding_box(self.points)
 
     def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
-        """Sample a few more frames; return whether there were any left.
-
-        ``scene``: scene that is shown; it is not modified. ``show``: visible parts of the figures,
-        a key of ``SHOWN``.
-        """
+        """Sample a few more frames with these parts shown; return whether there were any left."""
         shapes = tuple(map(_own_shape, scene.actors))
         motions = tuple(map(_own_motion, scene.actors))
         is_edited = shapes[: len(self._shapes)] != self._shapes
@@ -161,10 +155,7 @@ class Framing:
         return self.extent.is_done
 
     def restart(self, fits: bool = True) -> None:
-        """Fit the camera to the current scene, and keep fitting it.
-
-        ``fits``: whether to fit the camera; False leaves it unchanged.
-        """
+        """Fit the camera to the current scene and keep fitting it, or leave it unchanged."""
         self.extent.restart()
         self.is_fitting, self.points = fits, None
         self._placed, self._fitted, self._is_stale = None, None, True

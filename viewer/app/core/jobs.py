@@ -13,14 +13,13 @@ from viewer.progress import Cancelled, receiving
 
 
 class Job:
-    """A job whose reports of progress it receives, and which ends at the next one if cancelled.
-
-    ``output``: the kind of files that are lost if the job does not end, such as ``"export"``; empty
-    if it writes none. ``names_steps``: whether the reported steps become the title.
-    """
+    """A job whose reports of progress it receives, and which ends at the next one if cancelled."""
 
     def __init__(self, title: str, output: str = "", names_steps: bool = True) -> None:
-        self.title, self.output, self._names_steps = title, output, names_steps
+        self.title = title
+        self.output = output
+        """The kind of files that are lost if it does not end, as ``"export"``; empty for none."""
+        self._names_steps = names_steps  # whether the reported steps become the title
         self.progress = (0, 0, "")
         """Completed steps, their total (0 if unknown), and their unit."""
         self.error = ""
@@ -60,12 +59,7 @@ class Job:
 
 
 class ThreadJob(Job):
-    """Job in its own thread.
-
-    ``act``: does the work and returns messages; it is cancelled between two reports of progress.
-    ``finish``: applies the result of a successful job; called in the frame loop. ``wake``: called
-    in the thread when it ends. ``is_daemon``: whether the program may end before the thread.
-    """
+    """Job that acts in its own thread; ``finish`` applies its result in the frame loop."""
 
     def __init__(
         self,
@@ -80,7 +74,7 @@ class ThreadJob(Job):
         super().__init__(title, output, names_steps)
         self._act, self._finish, self._wake = act, finish, wake
         self.is_change = finish is not None and not output
-        # The thread records diagnostics where its caller does.
+        # The thread records diagnostics where its caller does. The program may end before a daemon.
         run = copy_context().run
         self._thread = threading.Thread(target=run, args=(self._run,), daemon=is_daemon)
         self._thread.start()
@@ -110,10 +104,7 @@ class ThreadJob(Job):
 
     @property
     def is_done(self) -> bool:
-        """Whether its thread has ended, and its result has been applied unless it was cancelled.
-
-        A cancelled job may still restore the files that it was about to replace.
-        """
+        """Whether its thread has ended, and its result has been applied unless it was cancelled."""
         return not self._thread.is_alive() and (self.is_cancelled or self._finish is None)
 
     def step(self) -> None:
@@ -131,10 +122,7 @@ class ThreadJob(Job):
 
 
 class FrameJob(Job):
-    """Job that draws, one step after each frame of the window.
-
-    ``steps``: a generator that returns messages; closing it removes partial output.
-    """
+    """Job that draws, one step after each frame; closing the generator removes partial output."""
 
     def __init__(self, title: str, steps: Generator[object, None, list[str]], output: str) -> None:
         super().__init__(title, output)

@@ -34,10 +34,7 @@ class MessageLog:
     _messages: dict[tuple[str, str], Message] = field(default_factory=dict)
 
     def add(self, text: str, kind: str = "note") -> None:
-        """Add a message; a repeated message is counted and moves to the end.
-
-        ``kind``: one of ``KINDS``.
-        """
+        """Add a message of a kind in ``KINDS``; a repeated one is counted and moves to the end."""
         message = self._messages.pop((kind, text), None)
         if message is None:
             message = Message(text, kind, 0)
@@ -103,11 +100,7 @@ class Messages:
 
 
 def message_line(message: Message) -> str:
-    """Return a message as one line, with its number of repetitions.
-
-    >>> message_line(Message("no uvs", "note", 3)), message_line(Message("no uvs", "error"))
-    ('no uvs (3 times)', 'error: no uvs')
-    """
+    """Return a message as one line, with its number of repetitions."""
     start = "error: " if message.kind == "error" else ""
     end = f" ({message.count:,} times)" if message.count > 1 else ""
     return f"{start}{message.text}{end}"

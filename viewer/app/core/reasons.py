@@ -32,10 +32,7 @@ def no_panel(state: AppState, needs: str) -> str:
 
 
 def no_drive(state: AppState) -> str:
-    """Return the reason why the chosen actor has no joint match.
-
-    A motion that matches too few joints does not move the figure yet.
-    """
+    """Return why the chosen actor has no joint match; a match of too few joints still counts."""
     actor = state.actor
     if actor.drive is not None and actor.keyed is None:
         return ""

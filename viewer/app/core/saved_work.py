@@ -20,12 +20,10 @@ class SavedPose:
 
 @dataclass(slots=True)
 class SavedWork:
-    """Clips, joint maps, rigs and poses that were read from a file or saved.
+    """Clips, joint maps, rigs and poses that were read from a file or saved."""
 
-    Edits replace such an object by a new one, and undo restores the old one, so an object that is
-    not recorded contains unsaved edits. Poses are edited in place, so they are recorded by value.
-    """
-
+    # Edits replace an object by a new one, and undo restores the old one, so an object that is not
+    # recorded contains unsaved edits. Poses are edited in place, so they are recorded by value.
     _objects: list[object] = field(default_factory=list)
 
     def add(self, *objects: object) -> None:

@@ -52,10 +52,7 @@ class SceneVersion:
 def version_of(
     scene: Scene, options: DisplayOptions, last: SceneVersion | None = None
 ) -> SceneVersion:
-    """Return the version of a scene: the last one if nothing has changed since.
-
-    Parts that are unchanged are those of the last version, so that only changes are copied.
-    """
+    """Return a scene's version, reusing what has not changed since the last one."""
     before = () if last is None else last.actors
     known = {id(one.actor): one for one in before}
     actors = tuple(_version_of(actor, known.get(id(actor))) for actor in scene.actors)

@@ -105,10 +105,7 @@ class AppState:
         self._begin()
 
     def of(self, kind: type[Part]) -> Part:
-        """Return a feature's own state, created on first use.
-
-        ``kind``: dataclass of the feature with a default for every field.
-        """
+        """Return a feature's own state, created on first use from the defaults of its dataclass."""
         part = self._parts.get(kind)
         if part is None:
             part = self._parts[kind] = kind()
@@ -184,10 +181,7 @@ class AppState:
         self.history.observe(self.update_version(), busy)
 
     def set_front(self, front: Front) -> None:
-        """Set or estimate the axis that the figures face; the camera rotates with it.
-
-        ``front``: ``"auto"``, or an axis such as ``"+z"``, other than the up axis.
-        """
+        """Set the axis that figures face, or estimate it (``"auto"``); the camera rotates along."""
         ahead = front_azimuth(guess_front(self.scene) if front == "auto" else front, self.scene.up)
         orbit(self.camera, ahead - self.camera.front, 0.0)
         self.camera.front = ahead
@@ -212,10 +206,7 @@ class AppState:
         self.messages.show(text, is_status=True)
 
     def advance_job(self) -> bool:
-        """Perform the next step of the running job, and report how it ended.
-
-        Returns whether it failed in this frame.
-        """
+        """Step the running job and report how it ended; return whether it failed in this frame."""
         job = self.job
         if job is None:
             return False

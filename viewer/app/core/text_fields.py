@@ -46,12 +46,9 @@ _LONGEST = 100  # maximum number of characters of a number typed by hand
 
 
 def text_field(hidden: str, text: str, hint: str = "", flags: int = 0) -> tuple[bool, str]:
-    """Draw a text field, whose text is selected when the field gets the focus.
+    """Draw a text field that selects its text on focus; return whether it changed, and the text.
 
-    ``hidden``: hidden label, as from ``begin_field``. ``text``, ``hint``: the text, and a
-    placeholder shown in grey while it is empty. ``flags``: ImGui's ``InputTextFlags_``. Returns
-    ``changed``: whether the text was edited, or with ``enter_returns_true`` whether Enter was
-    pressed.
+    With ``enter_returns_true`` among the flags, a change means that Enter was pressed.
     """
     flags |= _FLAGS.auto_select_all
     return imgui.input_text_with_hint(hidden, hint, text, flags)
@@ -63,10 +60,7 @@ def search_field(hidden: str, text: str, hint: str) -> str:
 
 
 def name_field(hidden: str, name: str, hint: str) -> tuple[bool, str]:
-    """Draw a field for a file name; all but the suffix is selected at first.
-
-    Returns ``entered``: whether Enter was pressed.
-    """
+    """Draw a field for a file name, selected up to its suffix; return whether Enter was pressed."""
     name = text_field(hidden, name, hint)[1]
     editing = imgui.internal.get_input_text_state(imgui.get_item_id())
     if imgui.is_item_activated() and editing is not None:
@@ -85,10 +79,6 @@ def number_field(
 
     Enter, Tab or a click elsewhere enters the number; Escape restores the old one. Text that is not
     a number is marked while it is typed, and causes a message if it is entered.
-
-    ``hidden``: hidden label, as from ``begin_field``. ``text``: format of the number, with its
-    unit. ``is_whole``: whether the number must be a whole number. Returns the number that was
-    entered, if any.
     """
     unit = unit_of(text)
     wrong = _mistake(hidden, unit)
@@ -119,10 +109,7 @@ def whole_field(state: AppState, hidden: str, value: int) -> int | None:
 
 
 def is_typed_in_place(hidden: str) -> bool:
-    """Return whether a slider's number is being typed, or was until the previous frame.
-
-    ``number_field`` with the slider's label then continues the input that ImGui began.
-    """
+    """Return whether a slider's number is being typed, or was until the previous frame."""
     item = imgui.get_id(hidden)
     left: int = imgui.get_current_context().input_text_deactivated_state.id_
     return imgui.internal.temp_input_is_active(item) or left == item
@@ -171,16 +158,14 @@ def _number_with_unit(text: str, value: float) -> str:
 
 
 def read_number(text: str, unit: str = "") -> float:
-    """Return a typed number in the unit of its field.
+    """Return a typed number in the unit of its field; ``ValueError`` if it is none.
 
-    ``text``: a number or a calculation with ``+ - * / ( )`` and ``pi``, and optionally a unit. A
-    comma may be used as the decimal point. ``unit``: unit that the field shows; empty if it has
-    none. Raises ``ValueError`` if the text is not a number, the number is too large, or its unit is
-    not accepted by the field.
+    ``text``: a number or a calculation with ``+ - * / ( )`` and ``pi``, and optionally a unit that
+    fits the field's. A comma may be used as the decimal point.
 
     >>> read_number("90/2"), read_number("-(1 + 2) * .5"), read_number("1,5 s", "s")
     (45.0, -1.5, 1.5)
-    >>> read_number("pi rad", "\N{DEGREE SIGN}")
+    >>> read_number("pi rad", "°")
     180.0
     >>> read_number("2 m", "s")
     Traceback (most recent call last):

@@ -65,10 +65,7 @@ _DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a lig
 
 
 def apply_theme(scale: float, theme: str = "dark") -> None:
-    """Set up font, style and behaviour of the current ImGui context.
-
-    ``theme``: ``"dark"`` or ``"light"``.
-    """
+    """Set up font, style and behaviour of the current ImGui context."""
     font = interface_font()
     if font is not None:
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
@@ -97,10 +94,7 @@ def lacks_letters(texts: Iterable[str]) -> bool:
 
 
 def add_system_fonts() -> None:
-    """Merge system fonts into the font, for Chinese, Arabic and other scripts.
-
-    The files are large, so this is done after the first pictures of a window.
-    """
+    """Merge large system fonts for Chinese, Arabic and other scripts, after the first pictures."""
     for path in system_fonts():
         config = imgui.ImFontConfig()
         config.merge_mode = True

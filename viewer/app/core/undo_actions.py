@@ -31,11 +31,7 @@ def redo(state: AppState) -> None:
 
 
 def _cancels_change(state: AppState) -> bool:
-    """Cancel a job that is about to change the scene; return whether there was one.
-
-    It started from the current state, so its result would override an earlier change that is
-    undone meanwhile.
-    """
+    """Cancel a job whose result would override an earlier change that is undone; say if so."""
     job = state.job
     if job is None or not job.is_change or job.is_cancelled:
         return False

@@ -118,10 +118,7 @@ class History:
         self._replace(exchanged)
 
     def follow(self, version: SceneVersion, time: float) -> None:
-        """Adopt poses set by the clock without recording a step; edits keep their steps.
-
-        Edits made in the same frame must be observed before the clock poses the scene.
-        """
+        """Adopt poses set by the clock; edits of the same frame must have been observed before."""
         if self._seen is None:
             return
         self._clocked = {one.actor: one for one in version.actors if one.clip is not None}
@@ -226,10 +223,7 @@ class History:
         return _Snapshot(version, by_hand, time, self._kept())
 
     def _is_by_hand(self, now: ActorVersion) -> bool:
-        """Return whether an actor's pose differs from the one that the clock set from its clip.
-
-        A new clip overrides the pose in the same frame.
-        """
+        """Return whether an actor's pose differs from the one set by the clock from its clip."""
         clocked = self._clocked.get(now.actor)
         if clocked is None or clocked.clip is not now.clip or clocked.offset != now.offset:
             return False

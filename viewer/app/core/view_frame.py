@@ -43,11 +43,7 @@ class ViewFrame:
         return (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
 
     def at_depth_of(self, point: Floats, place: Place) -> Floats:
-        """Return the scene point at a window position, at the depth of another point.
-
-        ``point``: (3,), scene space, in front of the eye. Returns (3,), point on the plane through
-        the other point that is parallel to the image plane.
-        """
+        """Return the scene point (3,) at a window position, at the depth of another point (3,)."""
         clip = self.matrix @ np.append(point, 1.0)
         found = np.linalg.solve(self.matrix, self._clip(place, clip[2], clip[3]))
         return np.asarray(found[:3] / found[3])

@@ -40,10 +40,7 @@ class _Disabled:
 
 
 def note_item(state: AppState, label: str) -> None:
-    """Record the rectangle of the last widget under a label, for tests.
-
-    In a disabled block, its tooltip is the reason.
-    """
+    """Record the rectangle of the last widget under a label, for tests."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     state.item_rects[label] = (low.x, low.y, high.x, high.y)
     reasons = state.of(_Disabled).reasons
@@ -65,11 +62,7 @@ def disabled(state: AppState, why: str) -> Iterator[None]:
 
 
 def explain(text: str, why: str = "") -> None:
-    """Give the last widget a tooltip with its effect, or the reason why it is disabled.
-
-    ``text``: effect of the widget; may be empty. ``why``: reason why it is disabled; empty if it is
-    enabled.
-    """
+    """Give the last widget a tooltip: its effect, and the reason why it is disabled, if it is."""
     if not why and imgui.get_current_context().last_item_data.item_flags & _DISABLED:
         # The reason of the enclosing block is shown already.
         return
@@ -95,11 +88,7 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 
 
 def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
-    """Begin a separate window, which opens in the centre; ``imgui.end`` must follow.
-
-    ``size``: width and height when it first appears, in font sizes; smaller if the window is small.
-    Returns whether its content is visible, and False once the user closes it.
-    """
+    """Begin a centred window of a first size in font sizes; return (is visible, stays open)."""
     letter, viewport = imgui.get_font_size(), imgui.get_main_viewport()
     room = (
         min(size[0] * letter, 0.95 * viewport.size.x),
@@ -133,10 +122,7 @@ def slider(
     flags: int = 0,
     width: float = 0.0,
 ) -> float:
-    """Draw a slider and return its value, which keeps its full precision unless it was moved.
-
-    ``width`` is that of ``begin_field``.
-    """
+    """Draw a slider and return its value, which keeps its full precision unless it was moved."""
     shown = plain_zero(value, unit)
     changed, moved = slider_float(state, begin_field(label, width), shown, low, high, unit, flags)
     note_item(state, label)
@@ -242,10 +228,7 @@ def plain_zero(value: float, text: str) -> float:
 
 
 def key_name(state: AppState, usual: str) -> str:
-    """Return the current name of a key, given its label in the table of keys.
-
-    If an action has several keys, the first is named.
-    """
+    """Return the current name of a key, the first if there are several, given its usual label."""
     return state.of(KeyNames).changed.get(usual, usual).partition(" or ")[0]
 
 

@@ -152,12 +152,7 @@ def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
 
 
 def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: float) -> Points:
-    """Return a curve of a sampled animation: at most 2000 points, each exactly at a frame.
-
-    ``row``: row, see ``curves_of``. ``low``, ``high``: visible range, seconds; only as many frames
-    are skipped as this range requires. Returns (P,), seconds; lengths or radians without jumps of 2
-    pi. NaN in gaps.
-    """
+    """Return times and values (P,) of at most 2000 frames: NaN in gaps, angles without jumps."""
     timing = clip.timing
     first, step = 0, 1
     if timing.n_frames > _MOST_POINTS:

@@ -301,11 +301,7 @@ def _draw_time(plot: _Plot) -> None:
 
 
 def _draw_keys(plot: _Plot) -> bool:
-    """Draw keys and tangents; return whether the mouse is over one of them.
-
-    Of several overlapping items, the one drawn first gets the mouse. Selected keys are therefore
-    drawn first, then tangents, then other keys.
-    """
+    """Draw keys and tangents; return whether the mouse is over one of them."""
     keyed = keyed_of(plot.state.actor)
     if keyed is None:
         return False
@@ -323,6 +319,8 @@ def _draw_keys(plot: _Plot) -> bool:
     if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
         _draw_many(plot, seen)
         return False
+    # Of several overlapping items, the one drawn first gets the mouse: selected keys come first,
+    # then tangents, then other keys.
     places = [
         ((row, key), float(times[key]), float(values[key]))
         for row, times, values, keys in seen
@@ -525,9 +523,7 @@ def _ui_scale() -> float:
 
 
 def value_limits(values: Floats, least: float) -> tuple[float, float]:
-    """Return the ends of an axis that shows some values, with a margin.
-
-    ``values``: (N,), values; those that are not finite are ignored.
+    """Return the ends of an axis that shows the finite ones of some values (N,), with a margin.
 
     >>> value_limits(np.array([0.0, 100.0]), 0.1), value_limits(np.array([30.0, 30.0]), 0.1)
     ((-16.0, 116.0), (15.0, 45.0))

@@ -74,10 +74,7 @@ class Files:
 
 
 class Loader(ThreadJob):
-    """Thread that reads files; dropping it discards its result.
-
-    ``attempts``: tried in order until one loads; if all fail, the last error is reported.
-    """
+    """Thread that reads the first of several attempts that loads; dropping it drops its result."""
 
     def __init__(
         self,
@@ -193,11 +190,9 @@ class Stream(ThreadJob):
         self._wake()
 
     def take(self) -> tuple[list[Actor], list[Diagnostic], bool]:
-        """Add the parts read since the last call to the scene.
+        """Add what was read since the last call; return new actors, messages, whether it grew.
 
-        Returns ``new``: actors of people who appeared; ``notes``: messages about the parts;
-        ``grew``: whether anything was added. Raises ``RigError`` if bodies do not match the model;
-        the stream then ends.
+        Raises ``RigError`` if bodies do not match the model; the stream then ends.
         """
         new: list[Actor] = []
         notes: list[Diagnostic] = []
@@ -283,10 +278,7 @@ def open_bundled_body(state: AppState) -> None:
 
 
 def open_files(state: AppState, paths: Sequence[Path]) -> None:
-    """Begin to read files; the current scene is shown until they have been read.
-
-    A skin opened while the scene is a lone skeleton, or the reverse, is attached if it matches.
-    """
+    """Begin to read files; a skin or skeleton joins a scene of its matching counterpart alone."""
     if not paths:
         return
     files = state.of(Files)

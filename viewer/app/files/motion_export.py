@@ -59,10 +59,7 @@ class _Selection:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Motion:
-    """One actor to export: its state at the start of the export, target file and frames.
-
-    ``saved``: the edited clips and the pose that the file will contain.
-    """
+    """One actor to export: its state at the start of the export, target file and frames."""
 
     actor: Actor
     path: Path
@@ -72,11 +69,7 @@ class _Motion:
 
 
 def ask_for_motion(state: AppState, suffix: str = "") -> None:
-    """Open the dialog; all actors are preselected if there are several.
-
-    ``suffix``: suffix of the suggested name of a file with edited keys; that of the first format if
-    empty.
-    """
+    """Open the dialog; ``suffix``: that of the suggested file, the first format's if empty."""
     moving = _moving_actors(state)
     asks = len(moving) > 1 or state.actor not in moving
     selection = _Selection(asks)
@@ -157,11 +150,7 @@ def unsuited_formats(actor: Actor) -> dict[str, str]:
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
-    """Return all files that are written for a name, or the folder of frames.
-
-    ``state``: state with the scene and the chosen actor. ``path``: a file, or a folder: a name
-    without suffix. ``everyone``: whether all actors are written, or only the chosen one.
-    """
+    """Return all files that are written for a name, or the folder of frames (no suffix)."""
     actors = _moving_actors(state) if everyone else [state.actor]
     kinds = [kind for kind in exporters_at(path) if kind.stores_motion]
     if not kinds or not actors:
@@ -179,14 +168,11 @@ def _is_one_file(path: Path) -> bool:
 def save_motion(
     state: AppState, path: Path, everyone: bool = False, safe_names: bool = False
 ) -> None:
-    """Write motions within the playback range, in the background.
+    """Write all or none of the motions within the playback range, in the background.
 
     glTF gets all animations of a figure with their own keys, unless the range is a part of one.
-
-    ``path``: target, whose suffix selects the format; without a suffix, it is an EasyMocap folder.
-    Either all files are written or none. ``everyone``: whether all actors are written, or only the
-    chosen one. Folders, and formats that hold several figures, contain all of them, including those
-    that do not move; other formats get one file per actor. ``safe_names``: as in ``ExportOptions``.
+    Folders, and formats that hold several figures, contain ``everyone``, including those that do
+    not move; other formats get one file per actor. A path without suffix is an EasyMocap folder.
     """
     if why := no_job_room(state):
         state.error = why
@@ -293,12 +279,10 @@ def _parts(
     path: Path,
     options: ExportOptions,
 ) -> list[Part]:
-    """Return what is written: keys if the format holds them, otherwise frames.
-
-    In one file, all actors have keys, or all have frames, as if one of them begins later than
-    another: animations are shared and have no delay.
-    """
+    """Return what is written: keys if the format holds them, otherwise frames."""
     kind = EXPORTERS[options.kind]
+    # In one file, all actors have keys, or all have frames, as if one of them begins later than
+    # another: animations are shared and have no delay.
     keyed = [
         "clips" in kind.stores and each.frames is None and keeps_keys(scene, each.actor)
         for each in motions
@@ -362,10 +346,7 @@ def _draw_formats(
     formats: Mapping[str, Exporter],
     missing: Mapping[str, str],
 ) -> None:
-    """Draw a list of formats; a choice changes the suffix of the name.
-
-    ``formats``: exporters by suffix; ``FOLDER`` for a folder.
-    """
+    """Draw a list of formats by suffix or ``FOLDER``; a choice changes the suffix of the name."""
     typed = Path(dialog.typed_name()).suffix.lower()
     now = typed if typed in formats else dialog.suffix or FOLDER
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_outer

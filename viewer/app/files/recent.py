@@ -40,10 +40,7 @@ def _groups(data: bytes) -> list[tuple[str, ...]]:
 
 
 def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
-    """Move files to the front of the list and save it; return an error message, empty if saved.
-
-    ``recent``: groups of files, modified in place.
-    """
+    """Move files to the front of the list, in place, and save it; return an error, or nothing."""
     if not paths:
         return ""
     try:
@@ -131,10 +128,7 @@ def _check_sections(text: str) -> None:
 
 
 def _check_docks(docks: Sequence[re.Match[str]]) -> None:
-    """Raise ValueError unless the docks are trees, whose split nodes have two children each.
-
-    One leaf of each dock space is its central node, which the panels leave free.
-    """
+    """Raise ValueError unless the docks are trees, whose split nodes have two children each."""
     n_children, splits, n_central = dict[str, int](), set[str](), 0
     for found in docks:
         name, parent, is_split = found["id"], found["parent"], bool(found["split"])

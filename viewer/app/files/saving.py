@@ -38,11 +38,7 @@ def save_in_background(
     inputs: Sequence[Path] = (),
     saved: object = None,
 ) -> None:
-    """Write files in a job that reports its progress; cancelling it leaves all files unchanged.
-
-    ``state``: receives the job, or an error if another job is running or the scene was read from a
-    file that would be replaced. ``inputs``: further files that must not be replaced.
-    """
+    """Write files in a job, all or none; no input, nor a file of the scene, may be replaced."""
     if why := no_job_room(state):
         state.error = why
         return

@@ -437,10 +437,7 @@ def _take_findings(state: AppState) -> None:
 
 
 def _is_stale(state: AppState) -> bool:
-    """Return whether the scene or the limits have changed since the check.
-
-    Playback does not count as a change. Called once per frame.
-    """
+    """Return whether the scene, apart from playback, or the limits have changed since the check."""
     view = state.of(Linting)
     known = view.checked
     if known is None:
@@ -478,10 +475,7 @@ def _differs(now: ActorVersion, old: ActorVersion) -> bool:
 
 
 def _choose_finding(state: AppState, index: int) -> None:
-    """Show a finding: its actor, joint and time; -1 or the same index again clears the selection.
-
-    ``index``: index into ``state.of(Linting).checked.findings``.
-    """
+    """Show a finding's actor, joint and time; -1 or the same index again clears the selection."""
     view = state.of(Linting)
     view.chosen = -1 if index == view.chosen else index
     finding = view.finding

@@ -29,10 +29,7 @@ _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 
 
 def show_finding(state: AppState) -> Marks | None:
-    """Return the marks of the chosen finding in the current pose; move the camera if requested.
-
-    Called in each frame after the scene is posed and before it is drawn.
-    """
+    """Return the marks of the chosen finding in the current pose; move the camera if requested."""
     view = state.of(Linting)
     finding = view.finding
     wants_aim, view.wants_aim = view.wants_aim, False
@@ -81,12 +78,7 @@ def _key(state: AppState) -> object:
 
 
 def marks_of(places: Places) -> tuple[Marks, str]:
-    """Return markers for locations, and a note if there are too many to mark them all.
-
-    ``places``: places to mark; those that are not finite are omitted. Returns ``marks``: points at
-    vertices and joints, edges of triangles; ``note``: note about places that are not marked; empty
-    if all are.
-    """
+    """Return markers for finite places, and a note if there are too many to mark them all."""
     vertices, joints = _finite(places.vertices), _finite(places.joints)
     triangles = _finite(places.triangles)
     shown = triangles[: _MOST // 3]
@@ -121,10 +113,7 @@ def _radius(count: int) -> float:
 
 
 def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
-    """Aim the camera at some points, and move it to the front if it would see them from behind.
-
-    ``points``: (N, 3), scene space. ``facing``: (3,), mean normal, as in ``Places``.
-    """
+    """Aim the camera at points (N, 3), from the side that their mean normal (3,) faces."""
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding
     if not len(points) or finding is None or finding.actor is None:

@@ -49,11 +49,7 @@ def animation_texts(actor: Actor) -> dict[int, str]:
 
 
 def choose_animation(state: AppState, index: int) -> None:
-    """Play an animation of the chosen actor from its start, in all figures of its file.
-
-    Edited keys are kept while other animations play. If the file's keys are invalid, an error
-    message is shown and nothing changes.
-    """
+    """Play an animation of the chosen actor from its start, in all figures of its file."""
     chosen = state.actor
     if index == played(chosen) or not -1 <= index < len(chosen.figure.animations):
         return
@@ -63,7 +59,7 @@ def choose_animation(state: AppState, index: int) -> None:
         state.error = str(problem)
         return
     for actor, (number, clip) in clips.items():
-        _put_aside(state, actor)
+        _put_aside(state, actor)  # edited keys are kept while other animations play
         play_animation(actor, number, clip)
     state.framing.extent.note_choice()
     state.clock.follow(chosen)

@@ -202,12 +202,7 @@ def foreign_rate(state: AppState) -> str:
 
 
 def set_rate(state: AppState, rate: float) -> None:
-    """Set the frame rate of the chosen actor and of all people of its capture.
-
-    Keyed clips have no frames: only the rate for stepping and frame numbers is set for them.
-
-    ``rate``: frames per second; a rate outside ``_LIMITS`` is rejected with a message.
-    """
+    """Set the frames per second of the chosen actor's capture; keyed clips get no new samples."""
     if foreign_rate(state) or rate == rate_of(state):
         return
     if not (math.isfinite(rate) and _LIMITS[0] <= rate <= _LIMITS[1]):

@@ -117,13 +117,7 @@ def _draw_keys(
 
 
 def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[float, float]]:
-    """Return the extents of bars, widened to be visible.
-
-    ``narrowest``: minimum width of a bar, unless its neighbours leave less room.
-
-    >>> bars([0.0, 9.0, 20.0, 20.0, 22.0, 30.0, 40.0, 40.0], 5.0, 40.0)
-    [(0.0, 9.0), (16.0, 21.0), (22.0, 30.0), (35.0, 40.0)]
-    """
+    """Return the extents of bars, widened to ``narrowest`` as far as their neighbours let them."""
     found: list[tuple[float, float]] = []
     for number in range(0, len(places), 2):
         x0, x1 = places[number], places[number + 1]
@@ -135,11 +129,7 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
 
 
 def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
-    """Return the intervals in which a motion's actor is present.
-
-    ``shortest``: gaps shorter than this, in seconds, are ignored, because they would be invisible.
-    Returns the start and end times in the clip's own time, seconds.
-    """
+    """Return when a motion's actor is present, clip seconds; shorter gaps would be invisible."""
     timing = clip.timing
     if timing is None:
         return [(clip.start, clip.end)]
@@ -178,11 +168,7 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float]) -> None:
 
 
 def ruler_text_place(x: float, length: float, end: float) -> float:
-    """Return the start of a number on the ruler: right of its tick, or left of it at the end.
-
-    >>> ruler_text_place(50.0, 20.0, 100.0), ruler_text_place(90.0, 20.0, 100.0)
-    (53.0, 67.0)
-    """
+    """Return the start of a number on the ruler: right of its tick, or left of it at the end."""
     return x - _TICK_ASIDE - length if x + _TICK_ASIDE + length > end else x + _TICK_ASIDE
 
 
@@ -209,10 +195,7 @@ def _nice_step(smallest: float) -> int:
 
 
 def key_times(actor: Actor, joint: int) -> Floats:
-    """Return the times of an actor's keys.
-
-    Returns (N,), scene times in seconds, increasing.
-    """
+    """Return the increasing scene times (N,) of an actor's keys, in seconds."""
     clip, skeleton = actor.keyed, actor.figure.skeleton
     if skeleton is None or clip is None:
         return np.zeros(0)

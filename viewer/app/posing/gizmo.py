@@ -177,10 +177,7 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
 
 
 def _is_beside_handle(state: AppState, place: Place) -> bool:
-    """Return whether a press narrowly missed the handles of the selected joint.
-
-    Such a drag was meant for a handle: it must not orbit the camera.
-    """
+    """Return whether a press narrowly missed a handle, so that it must not orbit the camera."""
     posing, posed, frame = state.of(Posing), selected(state), view_frame(state)
     if posed is None or state.actor.pose is None:
         return False
@@ -539,10 +536,7 @@ def _bone(joint: PosedJoint) -> Floats:
 
 
 def arc_points(arc: _LimitArc, center: Floats, radius: float) -> Floats:
-    """Return points along an arc from its low to its high end: (N, 3), scene space.
-
-    ``center``: (3,), position of the joint. ``radius``: scene units.
-    """
+    """Return points (N, 3) of the scene along an arc from its low to its high end."""
     low, high = arc.low, min(arc.high, arc.low + _WHOLE)
     count = max(2, math.ceil((high - low) / _STEP) + 1)
     angles = np.linspace(low, high, count)[:, None]

@@ -70,10 +70,8 @@ def moved_joints(state: AppState) -> frozenset[int]:
 
 
 def _animated_joints(clip: TransformClip, skeleton: Skeleton) -> frozenset[int]:
-    """Return the joints that a clip translates or scales noticeably away from rest.
-
-    Many exporters write channels for every joint, most of them without effect.
-    """
+    """Return the joints that a clip translates or scales noticeably away from rest."""
+    # Many exporters write channels for every joint, most of them without effect.
     bones = np.linalg.norm(skeleton.rest_translations, axis=1)
     rests = {
         "translation": (skeleton.rest_translations, _NOTICEABLE * float(bones.max())),

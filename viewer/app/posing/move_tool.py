@@ -46,12 +46,9 @@ def longest_chain(skeleton: Skeleton, joint: int) -> int:
 
 
 def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
-    """Return the joints that rotate when a joint is dragged, the nearest first: (N,) int32.
-
-    ``asked``: maximum number; 0 means two, without the root, which would rotate the whole figure,
-    unless nothing else can rotate.
-    """
+    """Return the joints (N,) that rotate when one is dragged, the nearest first; 0 asks for two."""
     chain = chain_above(skeleton, joint, asked or 2)
+    # By default, the root stays, because it would rotate the whole figure.
     if not asked and len(chain) > 1:
         chain = chain[skeleton.parents[chain] >= 0]
     return chain
@@ -69,11 +66,7 @@ def shifts(skeleton: Skeleton, joint: int) -> bool:
 
 
 def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
-    """Return the arrows of a joint; none if it cannot be translated.
-
-    ``orientation``: a key of ``ORIENTATIONS``. A joint with one or two translation DOFs has arrows
-    along their axes instead.
-    """
+    """Return the arrows of a joint, along the axes of an orientation or of its few DOFs."""
     if not shifts(joint.skeleton, joint.joint):
         return []
     rows = translation_dofs(joint.skeleton, joint.joint)
@@ -88,10 +81,7 @@ def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
 def grab_arrow(
     found: list[Arrow], center: Floats, frame: ViewFrame, place: Place, reach: float = _REACH
 ) -> Arrow | None:
-    """Return the arrow under the pointer, or None.
-
-    ``center``: (3,), position of the joint, scene space.
-    """
+    """Return the arrow from a scene point (3,) that is under the pointer, or None."""
     best, nearest, scale = None, reach * frame.scale, frame.scale
     length = LENGTH * frame.unit_length(center)
     for arrow in found:
@@ -136,10 +126,7 @@ class ReachHandle:
 
 
 class MoveHandle:
-    """Handle of a root, or of a joint with translation DOFs.
-
-    ``arrow``: arrow along which the joint moves; None to move it in the image plane.
-    """
+    """Handle of a root, or of a joint with translation DOFs."""
 
     def __init__(
         self, posed: PosedJoint, start: Pose, place: Place, arrow: Arrow | None = None

@@ -45,12 +45,9 @@ class PosedJoint:
         return _axes(self.parent_linear)
 
     def rotation_axis(self, axis: Floats) -> Floats:
-        """Return the axis of a rotation in the scene: cof(A) axis, with the parent's axes A.
-
-        Cofactors transform rotation axes correctly even through reflected and stretched frames.
-
-        ``axis``: (3,), rotation axis in the parent's frame. Returns (3,), unit vector, scene space.
-        """
+        """Return a rotation axis (3,) of the parent's frame as a unit vector of the scene."""
+        # With the parent's axes A, the scene axis is cof(A) axis: cofactors transform rotation
+        # axes correctly even through reflected and stretched frames.
         x, y, z = self.parent_linear.T
         cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
         return unit(cofactors @ axis)
@@ -61,10 +58,7 @@ class PosedJoint:
         return unit(linear.T @ axis) * (-1.0 if np.linalg.det(linear) < 0.0 else 1.0)
 
     def axes(self, orientation: str) -> Floats:
-        """Return the axes of an orientation as the columns of a rotation: (3, 3), scene space.
-
-        ``orientation``: a key of ``ORIENTATIONS``.
-        """
+        """Return an orientation's axes in the scene as the columns of a rotation (3, 3)."""
         if orientation == "world":
             return np.eye(3)
         if orientation == "parent":
@@ -80,10 +74,7 @@ def _axes(linear: Floats) -> Floats:
 
 
 def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoint | None:
-    """Return a joint of an actor, or None if it has no such joint.
-
-    ``pose``: pose to use in place of the actor's.
-    """
+    """Return a joint in an actor's pose or another one; None if there is no such joint."""
     pose = actor.pose if pose is None else pose
     if pose is None or joint < 0:
         return None

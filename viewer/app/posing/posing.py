@@ -73,17 +73,7 @@ class Handle(Protocol):
     place: tuple[float, float]
 
     def follow(self, frame: ViewFrame, place: tuple[float, float], snaps: bool) -> Outcome:
-        """Return the result for a position of the pointer.
-
-        Parameters
-        ----------
-        frame : ViewFrame
-            Projection of the scene.
-        place : (float, float)
-            Position of the pointer, window coordinates.
-        snaps : bool
-            Whether angles snap to whole steps.
-        """
+        """Return the result for a position of the pointer; snapped angles are whole steps."""
         ...
 
 
@@ -108,11 +98,7 @@ class Drag:
 
 @dataclass(slots=True)
 class HeldVector:
-    """A joint's rotation vector as edited, which may be longer than pi.
-
-    Beyond pi, a shorter vector describes the same rotation, so the rotation does not determine the
-    vector.
-    """
+    """A joint's rotation vector as edited; beyond pi, the rotation does not determine it."""
 
     joint: int
     """Joint of the actor that was chosen at that time."""
@@ -157,11 +143,7 @@ class Posing:
 
 
 def pause_for_edit(state: AppState) -> None:
-    """Pause a clip that would overwrite the chosen actor's pose in the next frame; show a message.
-
-    ``state``: state with the chosen actor, which is about to be posed; unchanged if no clip drives
-    it.
-    """
+    """Pause a clip that would overwrite the chosen actor's pose in the next frame; say so."""
     clip, clock = state.actor.clip, state.clock
     if clip is None:
         return
@@ -201,11 +183,7 @@ def copy_numbers(state: AppState) -> None:
 
 
 def paste_pose(state: AppState) -> None:
-    """Pose the chosen actor from the clipboard: JSON, or the model's raw pose vector.
-
-    A pose copied from a figure with different DOFs is transferred joint by joint: JSON contains the
-    joint rotations.
-    """
+    """Pose the chosen actor from the clipboard: JSON, or the model's raw pose vector."""
     from viewer.formats import pose
     from viewer.loading.additions import apply_pose
 
@@ -219,6 +197,8 @@ def paste_pose(state: AppState) -> None:
         source = Source("clipboard", cleaned.encode("utf-8", "replace"))
         if not text.strip():
             raise source.fault("F002.pose-clipboard: expected a pose, found no text")
+        # A pose copied from a figure with different DOFs is transferred joint by joint: JSON
+        # contains the joint rotations.
         record = pose.read(source)
         notes = apply_pose(source.path, record, actor, drop_excess=False)
     except ViewerError as problem:

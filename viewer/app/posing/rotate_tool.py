@@ -49,10 +49,7 @@ class Ring:
 
 
 def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> list[Ring]:
-    """Return the rings of a joint; none if it cannot rotate.
-
-    ``orientation``: a key of ``ORIENTATIONS``.
-    """
+    """Return the rings of a joint for a key of ``ORIENTATIONS``; none if it cannot rotate."""
     skeleton = joint.skeleton
     if rotates_freely(skeleton, joint.joint):
         axes = joint.axes(orientation)
@@ -73,11 +70,7 @@ def toward_eye(frame: ViewFrame, point: Floats) -> Floats:
 
 
 def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = None) -> Floats:
-    """Return points of a closed circle around an axis: (N, 3).
-
-    ``center``, ``axis``: (3,), scene space; the axis of unit length. ``radius``: scene units.
-    ``start``: (3,), direction of the first point, perpendicular to the axis.
-    """
+    """Return points (N, 3) of a circle around a unit axis (3,), from a direction across it."""
     first = _across(axis) if start is None else start
     second = np.cross(axis, first)
     angles = np.linspace(0.0, 2.0 * math.pi, _STEPS + 1)[:, None]
@@ -93,12 +86,7 @@ def _across(axis: Floats) -> Floats:
 def grab_ring(
     found: list[Ring], center: Floats, frame: ViewFrame, place: Place, reach: float = _REACH
 ) -> tuple[Ring, Floats] | None:
-    """Return the ring under the pointer and the direction to its grabbed point.
-
-    The nearest of several rings is chosen; the half of a ring behind the joint counts as farther.
-
-    ``center``: (3,), position of the joint, scene space.
-    """
+    """Return the ring under the pointer, preferring near halves, and its direction there (3,)."""
     best, nearest = None, reach * frame.scale
     length = frame.unit_length(center)
     eye = toward_eye(frame, center)
@@ -128,11 +116,7 @@ def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
 
 
 class RotateHandle:
-    """Handle of a ring.
-
-    ``held``: (3,), direction from the joint to the grabbed point: a unit vector, scene space.
-    ``in_degrees``: whether angles are shown in degrees instead of radians.
-    """
+    """Handle of a ring, held at a unit direction (3,) from the joint."""
 
     def __init__(
         self,

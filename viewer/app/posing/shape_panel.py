@@ -127,10 +127,7 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
 
 
 def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
-    """Return the shapes whose names contain the given text, below the headings of their groups.
-
-    Headings are rows too, so that long lists can be clipped.
-    """
+    """Return the shapes whose names contain a text, below their groups' headings, rows as well."""
     rows: list[int | str] = []
     last = ""
     for index, (name, group) in enumerate(zip(shapes.names, shapes.groups, strict=True)):

@@ -30,11 +30,7 @@ _WIDTH = 14.5  # fixed width of each row, in font sizes: buttons must not move w
 
 
 def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
-    """Draw the tools; return their rectangle.
-
-    ``legend``: rectangle of the legend: the tools are placed below it if there is no room next to
-    it.
-    """
+    """Draw the tools, below the legend if there is no room beside it; return their rectangle."""
     x, y, width, height = state.view_rect
     if not state.panels_visible or width < _NARROWEST or height < _LOWEST:
         return None

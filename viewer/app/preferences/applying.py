@@ -27,10 +27,7 @@ _PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"
 
 
 def start_with(state: AppState, preferences: Preferences) -> None:
-    """Apply stored preferences to a new window.
-
-    ``state``: state whose preferences and angle unit are set.
-    """
+    """Apply stored preferences to a new window."""
     state.put(preferences)
     state.in_degrees, state.of(Files).up = preferences.in_degrees, preferences.up
 

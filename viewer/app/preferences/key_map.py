@@ -40,11 +40,7 @@ _CODES = {_name(code): getattr(imgui.Key, code) for code in _USABLE}
 
 
 def parse_chord(text: str) -> int:
-    """Return the key code of a name such as ``Ctrl+Shift+Z``; 0 if the name is invalid.
-
-    >>> parse_chord("Ctrl+Z") == imgui.Key.mod_ctrl | imgui.Key.z, parse_chord("Ctrl+")
-    (True, 0)
-    """
+    """Return the key code of a name such as ``Ctrl+Shift+Z``; 0 if the name is invalid."""
     *held, key = text.split("+")
     if key not in _CODES or any(name not in _MODIFIERS for name in held):
         return 0
@@ -72,11 +68,7 @@ def label_of(shortcut: Shortcut, keys: Mapping[str, str]) -> str:
 
 
 def conflicts(table: Sequence[Shortcut], keys: Mapping[str, str]) -> dict[str, str]:
-    """Return the actions whose key also runs another action.
-
-    ``keys``: changed keys, as in ``Preferences.keys``. The result maps the name of an action to the
-    text of another action with the same key.
-    """
+    """Map each action, by name, to the text of another one with the same key."""
     users: dict[int, list[Shortcut]] = {}
     for shortcut in table:
         for chord in chords_of(shortcut, keys):

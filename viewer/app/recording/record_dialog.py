@@ -376,11 +376,7 @@ def _start(state: AppState, paths: list[Path]) -> None:
 
 
 def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -> DisplayOptions:
-    """Return the display options of a recording.
-
-    ``state``: state with the options of the view, which are copied. ``n_frames``: number of frames;
-    several frames are not drawn in final quality unless it is chosen.
-    """
+    """Return a copy of the view's options for some frames; more than one is not drawn finally."""
     options = copy.deepcopy(state.options)
     if settings.look:
         options.quality = settings.look

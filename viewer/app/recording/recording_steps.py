@@ -37,11 +37,7 @@ _FULL = 360.0  # full revolution, degrees
 
 
 class RecordedMarks:
-    """Annotations of a moving scene: those of the pinned vertex and of the chosen finding.
-
-    ``state``: state with the marks and the explanation; they are copied, so later changes have no
-    effect.
-    """
+    """Annotations of the pinned vertex and the chosen finding, copied from the state."""
 
     def __init__(self, state: AppState) -> None:
         weights = state.of(Weights)
@@ -52,11 +48,7 @@ class RecordedMarks:
         self._binding = state.options.show == "binding"
 
     def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
-        """Return the annotations of one frame.
-
-        ``size``: width and height of the image, pixels. Raises ``ViewerError`` if a figure's shapes
-        cannot be read.
-        """
+        """Return the annotations of one frame for an image's size in pixels."""
         found = []
         if self._finding is not None:
             places = places_of(self._finding, scene, self._skinning, self._binding)
@@ -77,11 +69,7 @@ def _recording_steps(
     path: Path,
     ghost: Ghost | None = None,
 ) -> Generator[object, None, list[str]]:
-    """Record the playback range from the current view.
-
-    ``state``: state with the scene, which is copied: later edits do not affect the recording.
-    ``path``: target file; ``{frame}`` in the name of numbered images stands for their number.
-    """
+    """Record the playback range; ``{frame}`` in the path stands for the number of an image."""
     recording = _recording(state, settings)
     files = [path]
     if settings.kind == "pictures":

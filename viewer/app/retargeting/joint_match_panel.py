@@ -414,10 +414,7 @@ def _at(point: Floats) -> tuple[float, float]:
 
 
 def shown_match(state: AppState) -> _Shown | None:
-    """Return the match of the chosen actor's joints; None if no motion drives it.
-
-    A change is shown at once, even while the motion is still retargeted.
-    """
+    """Return the chosen actor's match, even while its motion is retargeted; None without one."""
     view, actor = state.of(JointMatch), state.actor
     drive, figure = shown_drive(state, actor), actor.figure
     if drive is None:

@@ -84,11 +84,7 @@ def similarity_now(state: AppState, template: Template) -> Similarity:
 
 
 def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
-    """Return the similarity nearest to a matrix; its scale is the geometric mean over the axes.
-
-    ``matrix``: (4, 4), matrix that is nearly a similarity, without reflection; rounding errors are
-    removed.
-    """
+    """Return the similarity nearest to a matrix (4, 4); its scale is the axes' geometric mean."""
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     own = np.ones(3)
     if like is not None and not like.is_plain:

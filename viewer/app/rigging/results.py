@@ -293,10 +293,7 @@ def _save_rigged(state: AppState, result: Result, path: Path) -> None:
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
-    """Return a motion that begins and ends in a pose; None if no joint can rotate.
-
-    Each joint except the roots rotates about the axis with the widest range, within its limits.
-    """
+    """Return a motion from a pose and back that moves each joint about its widest axis, or None."""
     order = depth_first(skeleton.parents)
     dofs = [dof for joint in order.tolist() if (dof := _bending_dof(skeleton, joint)) >= 0]
     if not dofs:

@@ -300,10 +300,7 @@ def template_files(key: str) -> tuple[Path, ...]:
 
 
 def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
-    """Read a template.
-
-    Raises ``ViewerError`` if a file cannot be read, or contains no rigged mesh.
-    """
+    """Read a template; ``ViewerError`` if a file cannot be read, or contains no rigged mesh."""
     scene = load(*paths)
     attached = [actor for actor in scene.actors if actor.figure.is_attached]
     if not attached:

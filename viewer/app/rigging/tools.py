@@ -83,10 +83,7 @@ def holds_mouse(state: AppState) -> bool:
 
 
 def show_rig(state: AppState) -> Ghost | None:
-    """Apply finished jobs and clicks of the Rig panel; return the template if it is to be drawn.
-
-    Called in each frame after the scene is posed and before it is drawn.
-    """
+    """Apply finished jobs and clicks of the Rig panel; return the template if it is to be drawn."""
     refresh(state)
     finish_work(state)
     view = state.of(Rigging)
@@ -263,16 +260,13 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
 
 
 def _camera_matrices(state: AppState, middle: Floats) -> tuple[Floats, Floats]:
-    """Return view and projection for ImGuizmo: both (4, 4).
-
-    ImGuizmo computes wrong rays for parallel projections. They are replaced by a perspective from
-    far away, which projects points at the depth of the gizmo's centre to the same positions, and
-    points near it to almost the same positions.
-    """
+    """Return view and projection (4, 4) for ImGuizmo, whose rays are wrong for parallel ones."""
     camera = state.camera
     view = camera.view_matrix()
     if not camera.is_parallel:
         return view, camera.projection_matrix(state.aspect, state.box)
+    # A perspective from far away projects points at the depth of the gizmo's centre to the same
+    # positions, and points near it to almost the same positions.
     half = camera.half_height
     away, depth = _FAR * half, float(view[2, :3] @ middle + view[2, 3])
     near, far = 0.5 * away, 1.5 * away

@@ -121,10 +121,7 @@ def _show_added(state: AppState, actor: Actor) -> None:
 def start_reading(
     state: AppState, paths: tuple[Path, ...] = (), then: _Finish | None = None
 ) -> None:
-    """Read the chosen template, or a template from other files, which is then chosen.
-
-    ``state``: state with the chosen template, which is read if there are no paths.
-    """
+    """Read the chosen template, or choose one and read it from other files."""
     key = "file" if paths else state.of(Rigging).template_key
 
     def act() -> _Finish:
@@ -144,10 +141,7 @@ def start_reading(
 
 
 def _snapshot(state: AppState, aligned: bool) -> Callable[[], Template]:
-    """Return a function that provides a thread with the template in its current or aligned pose.
-
-    The thread reads the template first if necessary.
-    """
+    """Return a function that gives a thread the template as posed or aligned, reading it first."""
     known, key = (
         aligned_template(state) if aligned else current_template(state),
         state.of(Rigging).template_key,
@@ -252,10 +246,7 @@ def start_match(state: AppState) -> None:
 
 
 def start_run(state: AppState, methods: tuple[str, ...]) -> None:
-    """Rig the target by one or several methods, and show the first result in its place.
-
-    The template is used in its current placement; if it has none, it is aligned first.
-    """
+    """Rig the target by some methods, and show the first result; align the template if needed."""
     target, choices, placing = (
         state.of(Rigging).target,
         replace(state.of(Rigging).choices),
@@ -304,10 +295,7 @@ def align_template(
     settings: AlignmentSettings,
     fits: bool,
 ) -> Placing:
-    """Align a template with a target.
-
-    Raises ``RigError``: as for ``align``.
-    """
+    """Align a template with a target; raises ``RigError`` as ``align`` does."""
     plain = template.pose.copy()
     plain.shape_weights = np.zeros(0)  # the shape is now part of the figure
     figure = shaped(template.figure, template.pose.shape_weights)
@@ -326,10 +314,7 @@ def align_template(
 
 
 def _with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
-    """Return a result whose report names the alignment method, if the alignment was given.
-
-    ``placing``: placement that was passed to the transfer; None if there was none.
-    """
+    """Return a result whose report names the alignment method, if the alignment was given."""
     known = placing.alignment if placing is not None else None
     if placing is None or known is None or rigged.alignment is None:
         return rigged
@@ -344,10 +329,7 @@ def _with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
 def _match_fields(
     template: Template, similarity: Similarity, mesh: Mesh, settings: MatchSettings
 ) -> tuple[tuple[VertexField, ...], float]:
-    """Find the vertices of a target that match an aligned template.
-
-    Returns ``fields``: matched or not, distance, and angle in degrees, of each vertex.
-    """
+    """Return matched or not, distance and angle in degrees of each vertex, and the part matched."""
     assert template.figure.mesh is not None  # templates have meshes
     posed = similarity.apply(deform(template.figure, template.pose)[0])
     welded = weld(mesh.positions, mesh.triangles)
@@ -374,11 +356,7 @@ def _match_settings(choices: RigChoices) -> MatchSettings:
 def _transfer_settings(
     choices: RigChoices, method: str, placing: Placing | None
 ) -> TransferSettings:
-    """Return the settings to transfer the rig of a template from its current placement.
-
-    ``method``: a key of ``METHODS``. ``placing``: placement of the template; None for a method that
-    needs none.
-    """
+    """Return the settings to transfer the rig of a template placed so, or not at all (None)."""
     alignment = AlignmentSettings()
     if placing is not None:
         alignment = AlignmentSettings(matrix=placing.similarity.matrix)

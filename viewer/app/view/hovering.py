@@ -58,11 +58,7 @@ def hover_joint(state: AppState) -> None:
 
 
 def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scale: float) -> None:
-    """Find the actor under a resting pointer if there are several actors, but not too many.
-
-    ``state``: state whose ``Hovered`` receives the actor. ``size``: width and height of the view,
-    pixels.
-    """
+    """Find the actor under a resting pointer if there are several actors, but not too many."""
     hovered, mouse, now = state.of(Hovered), imgui.get_io().mouse_pos, imgui.get_time()
     place = (mouse.x, mouse.y)
     is_told = 2 <= len(state.scene.actors) <= _MOST and not state.of(Posing).is_on

@@ -32,11 +32,7 @@ def toggle_outlines(state: AppState) -> None:
 
 
 def outlined_parts(state: AppState) -> tuple[Outlined, ...]:
-    """Return the outlines of the current frame.
-
-    The selected joint is outlined if the skeleton is drawn; otherwise, the actor is outlined if the
-    user chose it among several. The pinned vertex and the item under the pointer are also outlined.
-    """
+    """Return the outlines of the frame: joint or actor chosen, pinned vertex, hovered item."""
     if not state.of(Outlines).is_shown:
         return ()
     hovered, chosen, joint = state.of(Hovered), state.chosen_actor, state.selected_joint
@@ -67,11 +63,10 @@ def _pinned(state: AppState) -> list[Outlined]:
 
 
 class OutlineLayer:
-    """Draws outlines over the view when they or the image of the scene change.
+    """Draws outlines over the view when they or the image of the scene change."""
 
-    The item under the pointer changes often, whereas the image of the scene, which may be the
-    average of many passes, is cached: so outlines have an image of their own.
-    """
+    # The item under the pointer changes often, whereas the image of the scene, which may be the
+    # average of many passes, is cached: so outlines have an image of their own.
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
@@ -81,10 +76,7 @@ class OutlineLayer:
     def texture(
         self, state: AppState, renderer: Renderer, size: tuple[int, int], picture: object
     ) -> moderngl.Texture | None:
-        """Return the outlines as sRGB with straight alpha; None if there are none.
-
-        ``size``: width and height of the view, pixels.
-        """
+        """Return the outlines as sRGB with straight alpha; None if there are none."""
         outlined = outlined_parts(state)
         if not outlined:
             return None

@@ -39,10 +39,7 @@ _REST = 0.2  # seconds without mouse movement before a vertex is described
 def answer_picks(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
-    """Handle the pending click, and describe the vertex under the mouse once the mouse is still.
-
-    ``size``: size of the view, pixels.
-    """
+    """Handle the pending click, and describe the vertex under the mouse once the mouse is still."""
     picking = state.of(Picking)
     wanted, picking.wanted = picking.wanted, None
     try:
@@ -62,11 +59,7 @@ def _take_click(
     pixel: tuple[float, float],
     aims: bool,
 ) -> None:
-    """Pin the vertex at a pixel if vertices are picked; otherwise select or aim the camera.
-
-    A click on a skin selects the joint with the largest weight there; one on the background
-    deselects.
-    """
+    """Pin the vertex at a pixel if vertices are picked; otherwise select or aim the camera."""
     if not aims and wants_vertex(state.of(Weights)):
         found = vertex_at(state, renderer, size, pixel)
         if found is not None:
@@ -108,10 +101,7 @@ class Spot:
 def spot_at(
     state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
 ) -> Spot | None:
-    """Return the item at a pixel, None for the background; see ``vertex_at`` for the parameters.
-
-    Raises ``ViewerError`` if a figure's shapes cannot be read.
-    """
+    """Return the item at a pixel, None for the background; may raise ``ViewerError`` for shapes."""
     pick = _pick(state, renderer, size, pixel, state.options)
     found = vertex_at(state, renderer, size, pixel)
     x, y, width, _ = state.view_rect
@@ -180,11 +170,7 @@ def take_pick(state: AppState, found: Pick, aims: bool) -> None:
 def vertex_at(
     state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
 ) -> tuple[int, int, int] | None:
-    """Return the vertex of the surface visible at a pixel.
-
-    ``size``: size of the view, pixels. Returns (actor, vertex, triangle) or None, indices; the
-    triangle is -1 if the reduced mesh is drawn, which has different triangles.
-    """
+    """Return the actor, vertex and triangle (-1 for a reduced mesh) visible at a pixel, or None."""
     options = state.options
     # Only surfaces are picked, even where joints or keypoints are drawn over them.
     show = "skin" if options.show == "both" else options.show

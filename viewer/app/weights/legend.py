@@ -18,10 +18,7 @@ _LINE = (0.05, 0.05, 0.06, 1.0)
 
 
 def draw_legend(state: AppState) -> Rect | None:
-    """Draw the legend if a scalar quantity is shown; return its rectangle.
-
-    It is not drawn if the renderer already draws a legend into the image.
-    """
+    """Draw the legend of a shown quantity unless the image has it; return its rectangle."""
     x, y, width, height = state.view_rect
     shows_mesh = any(
         actor.visible and actor.figure.mesh is not None and state.options.show != "skeleton"

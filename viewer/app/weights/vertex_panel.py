@@ -103,8 +103,6 @@ def draw(state: AppState) -> None:
 def _fitting(room: float, font_size: float) -> tuple[float, int]:
     """Return the font scale and the number of decimals with which rows fit into the panel.
 
-    Returns ``digits``: number of decimals: four, or three if the smallest font is still too large.
-
     >>> _fitting(300.0, 15.0), _fitting(240.0, 15.0)[1], _fitting(50.0, 15.0)
     ((1.0, 4), 4, (0.75, 3))
     """
@@ -206,10 +204,7 @@ def _draw_swatch(color: Floats) -> None:
 
 
 def matrix_text(matrix: Floats) -> str:
-    """Return a matrix as rows of numbers in full precision.
-
-    ``matrix``: (4, 4), matrix to copy.
-    """
+    """Return a matrix (4, 4) as rows of numbers in full precision."""
     return "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
 
 
@@ -295,10 +290,7 @@ def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
 
 
 def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotation, ...]:
-    """Return the annotation of the pinned vertex; the same object as long as nothing changes.
-
-    ``size``: width and height of the image, pixels.
-    """
+    """Return the annotation of the pinned vertex; the same object as long as nothing changes."""
     view = state.of(Weights)
     pinned = view.pinned
     if pinned is None or state.options.show == "binding":
@@ -322,10 +314,7 @@ def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotati
 def vertex_annotation(
     explanation: Explanation, actor: Actor, draws_lines: bool, size: tuple[int, int]
 ) -> Annotation:
-    """Return a dot at a vertex, and lines from it to its rigid images M_i p with their weights.
-
-    ``size``: width and height of the image, pixels.
-    """
+    """Return a dot at a vertex, and lines from it to its rigid images M_i p with their weights."""
     scale = picture_scale(size)
     vertex = apply_transform(actor.placement, explanation.position)
     rim = dots(vertex[None], np.array(_DARK), scale * (_DOT + _RIM + 1.0))

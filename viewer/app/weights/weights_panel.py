@@ -281,10 +281,7 @@ def _draw_vertex_tools(state: AppState) -> None:
 
 
 def no_view(state: AppState, key: str) -> str:
-    """Return the reason why a scalar quantity cannot be shown; a joint or field may yet be chosen.
-
-    ``key``: a key of ``SCALARS``.
-    """
+    """Return why a key of ``SCALARS`` cannot be shown; its joint or field may yet be chosen."""
     figures = [actor.figure for actor in state.scene.actors if actor.figure.mesh is not None]
     if not figures:
         return "there is no mesh"
@@ -295,12 +292,7 @@ def no_view(state: AppState, key: str) -> str:
 
 
 def start_heat_map(state: AppState) -> None:
-    """Show a scalar quantity as colours; choices that would show nothing are replaced.
-
-    A quantity that no figure has is replaced by an available one; a missing joint, or one without
-    influence, by the joint with the most influence; a field that is 0 everywhere by the first one
-    that is not.
-    """
+    """Show a scalar quantity as colours; choices that would show nothing are replaced."""
     options = state.options
     options.shading = "scalar"
     key, about = split_name(options.scalar)
@@ -403,10 +395,7 @@ def unpin(state: AppState) -> None:
 
 
 def explained(state: AppState) -> Explanation | None:
-    """Return the explanation of the pinned vertex in the current pose; None if none is pinned.
-
-    Raises ``ViewerError`` if the figure's shapes cannot be read.
-    """
+    """Return the pinned vertex's explanation in the pose, or None; ``ViewerError`` for shapes."""
     view, actors = state.of(Weights), state.scene.actors
     pinned = view.pinned
     if pinned is None:
