@@ -119,10 +119,7 @@ def _export_frames(
 def _losses(
     animation: SampledAnimation, source: Source, span: tuple[int, int], options: ExportOptions
 ) -> list[Diagnostic]:
-    """Read a file back and return notes about its errors on and between the frames.
-
-    Between frames, captures are compared at the midpoints and on their own frames.
-    """
+    """Read a file back and return notes about its errors on the frames and between them."""
     clip, path = read(source), source.path
     assert isinstance(clip, Clip)  # the file was written from a clip
     figure, how, part = animation.figure, options.skinning, slice(*span)

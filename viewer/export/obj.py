@@ -67,11 +67,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
 def _export_frames(
     animation: SampledAnimation, path: Path, options: ExportOptions
 ) -> list[Diagnostic]:
-    """Write one numbered file per frame; see ``export``.
-
-    ``{frame}`` in the name is replaced by the frame number, as in ``walk_{frame:05}.obj``. Missing
-    frames have no file unless ``options.gaps`` requests holding or interpolation.
-    """
+    """Write one numbered file per frame, as in ``walk_{frame:05}.obj``, none for missing frames."""
     figure = animation.figure
     poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     frames = np.flatnonzero(poses.present)
@@ -208,11 +204,7 @@ def _rows(keyword: str, rows: Floats, is_short: bool = True) -> Iterator[bytes]:
 
 
 def _faces(mesh: Mesh, materials: Sequence[str], has_library: bool) -> Iterator[bytes]:
-    """Yield the lines of triangles; ``o`` and ``usemtl`` precede each run of a part or material.
-
-    ``materials``: names of the materials; none are written if it is empty.
-    ``has_library``: whether a library defines them, and a material for all other triangles.
-    """
+    """Yield the lines of triangles; ``o`` and ``usemtl`` precede each run of a part or material."""
     corners = [mesh.triangles + 1]
     if mesh.uvs is not None:
         uv = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
@@ -261,10 +253,7 @@ def _plain_name(names: Sequence[str]) -> str:
 
 
 def _material_library(mesh: Mesh, path: Path, names: Sequence[str]) -> dict[Path, bytes]:
-    """Return the images, followed by the ``.mtl`` that refers to them; empty for plain meshes.
-
-    ``names``: the name of each material.
-    """
+    """Return the images, followed by the ``.mtl`` that refers to them; empty for plain meshes."""
     uvs = mesh.uvs if mesh.uvs is not None else np.zeros((0, 2))
     materials = mesh.materials if any(map(_has_look, mesh.materials)) else ()
     files: dict[Path, bytes] = {}

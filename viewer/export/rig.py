@@ -328,10 +328,7 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> _CourseSkeleton:
 
 
 def course_pose(figure: Figure, pose: Pose) -> tuple[Figure, Pose]:
-    """Return the skeleton that is written for a figure at rest, and a pose of the figure for it.
-
-    Angles of turned joints mean something else in the file than in the figure.
-    """
+    """Return the skeleton that is written for a figure at rest, and a pose of the figure for it."""
     skeleton, plain = figure.require_skeleton(), pose.copy()
     plain.figure_scale, plain.figure_translation = 1.0, np.zeros(3)
     written = course_skeleton(skeleton, rest_pose(skeleton)).skeleton
@@ -380,10 +377,7 @@ def _plain_rows(skeleton: Skeleton, pose: Pose) -> tuple[Ints, Bools]:
 def _unscaled_offsets(
     skeleton: Skeleton, pose: Pose, translations: Floats, rotations: Floats
 ) -> Floats:
-    """Return the offsets that put unscaled joints where the scaled ones are: (J, 3).
-
-    With the product D of the rotations down to the parent: D^-1 (p_j - p_parent).
-    """
+    """Return the offsets that put unscaled joints where the scaled ones are: (J, 3)."""
     scaled = rotations * pose.scales[:, None]
     places = joint_worlds(skeleton.parents, scaled, translations)[:, :3, 3]
     turns = joint_worlds(skeleton.parents, rotations, np.zeros(3))[:, :3, :3]

@@ -232,10 +232,7 @@ def __getattr__(name: str) -> Any:
 
 
 def detect(source: Source) -> str:
-    """Return a file's key in ``FORMATS``, determined by its content, then by its suffix.
-
-    Raises ``FormatError`` if no format matches; the message states the apparent type of the file.
-    """
+    """Return a file's key in ``FORMATS``, determined by its content, then by its suffix."""
     if source.is_folder:
         return _detect_folder(source)
     suffix = source.path.suffix.lower()

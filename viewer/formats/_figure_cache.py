@@ -32,10 +32,7 @@ _wanted: frozenset[Path] = frozenset()
 
 @contextlib.contextmanager
 def keeping_figures(paths: Collection[Path]) -> Iterator[None]:
-    """Cache the figures of some files for later runs, until a run caches others.
-
-    A file that has changed is read again. Only files are cached, not folders.
-    """
+    """Cache the figures of files, until changed, for later runs, until a run caches others."""
     global _wanted
     before = _wanted
     _wanted = frozenset(path.resolve() for path in paths)

@@ -34,11 +34,7 @@ _KINDS = {
 
 
 def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
-    """Read a whole regular file.
-
-    ``max_size``: larger files, in bytes, are refused before they are read. Raises ``FormatError``
-    if the file is missing, unreadable, not a regular file, or too large.
-    """
+    """Read a whole regular file; if it has more than ``max_size`` bytes, it is refused unread."""
     kind = kind_of(path, max_size)
     if kind is not None:
         raise no_file(path, kind)

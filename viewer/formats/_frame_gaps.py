@@ -22,11 +22,7 @@ from viewer.rig.captures.person import person_label
 
 
 def invalid_rows(*tables: Floats | None) -> Bools:
-    """Return a mask of the rows, (N,), in which any of several (N, ...) tables has NaN.
-
-    >>> invalid_rows(np.array([[1.0], [np.nan]]), None).tolist()
-    [False, True]
-    """
+    """Return a mask of the rows, (N,), in which any of several (N, ...) tables has NaN."""
     found = [table for table in tables if table is not None]
     bad: Bools = np.zeros(len(found[0]) if found else 0, dtype=np.bool_)
     for table in found:
@@ -36,11 +32,7 @@ def invalid_rows(*tables: Floats | None) -> Bools:
 
 
 def gap_notes(source: Source, lost: Mapping[int | None, NDArray[np.integer]]) -> list[Diagnostic]:
-    """Return a note about frames that became gaps, if there are any.
-
-    ``source``: the file, whose ``frame_faults`` has the first error. ``lost``: mapping of person to
-    (N,), numbers of the lost frames, ascending; the person is None if there is only one.
-    """
+    """Return a note about the frames (N,) of each person that became gaps, if there are any."""
     frames = [
         Phrase(
             "{person}{frames}",

@@ -109,12 +109,7 @@ class Source:
         return self._data
 
     def line_parts(self, length: int) -> Iterator[bytes]:
-        """Yield the data in parts of whole lines, and report progress.
-
-        A long file is read part by part, unless it is in memory already.
-
-        ``length``: size of a part in bytes, unless one of its lines is longer.
-        """
+        """Yield the data in parts of whole lines, ``length`` bytes or more, and report progress."""
         text = self._text()
         total, done = len(text), 0
         report_bytes(done, total, f"reading {self.path.name}")
@@ -193,10 +188,7 @@ class Source:
         return len(self.data)
 
     def line(self, offset: int) -> int:
-        """Return the line of an offset, counted from 1; slow, for errors only.
-
-        CR CR LF, which occurs in real files, is one line ending, as is a single CR.
-        """
+        """Return the line of an offset, counted from 1; slow, for errors only."""
         start, line = self._counted
         if offset < start:
             start, line = 0, 1
@@ -210,10 +202,7 @@ class Source:
         return len(self.data.rstrip())
 
     def fault(self, key: str, offset: int | str | None = None, **values: Any) -> FormatError:
-        """Return the exception for an error after which the reader cannot continue.
-
-        ``offset``: position in the file, or a JSON pointer, if known.
-        """
+        """Return the exception for an error after which the reader cannot continue."""
         return FormatError(self._diagnostic(key, offset, values))
 
     def refuse(
@@ -247,11 +236,7 @@ class Source:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record a warning or note that leaves the file valid.
-
-        ``offset``: position in the file, or a JSON pointer, if known. ``count``, ``part``,
-        ``places``: int, str, (N,), number of errors, and their indices; see ``Diagnostic``.
-        """
+        """Record a warning or note that leaves the file valid; arguments as for ``refuse``."""
         self.diagnostics.add(self._diagnostic(key, offset, values, count, part, places))
 
     def _diagnostic(
@@ -274,13 +259,7 @@ class Source:
         return [str(found) for found in self.diagnostics.warnings]
 
     def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
-        """Register a function that finds the offset of the index-th element of a kind.
-
-        Readers of JSON give their figures pointers instead, see ``Origin``.
-
-        ``kind``: ``"positions"``, ``"normals"``, ``"weights"``, ``"triangles"``, ``"bindings"``,
-        ``"joints"``, ``"channels"`` or ``"frames"``.
-        """
+        """Register a function that finds the offset of the index-th element of a kind."""
         self._offsets[kind] = self, offset_of
 
     def offset_of(self, kind: str, index: int) -> int:
@@ -297,12 +276,9 @@ class Source:
         return kind in self._offsets
 
     def place(self, kind: str, index: int) -> tuple[Path, int] | None:
-        """Return the file and line of an element; None if its kind is not registered.
-
-        If a file has no normals, they are computed: only the vertices can be corrected.
-        """
+        """Return the file and line of an element; None if its kind is not registered."""
         if kind == "normals" and not self.knows(kind):
-            kind = "positions"
+            kind = "positions"  # the normals were computed: only the vertices can be corrected
         if not self.knows(kind):
             return None
         source, offset_of = self._offsets[kind]
@@ -342,10 +318,7 @@ def _indices(places: ArrayLike) -> Ints:
 
 
 class InvalidValueError(Exception):
-    """An invalid value; the caller adds the file and the line.
-
-    ``problem``: ``expected …, found …``.
-    """
+    """An invalid value, ``expected …, found …``; the caller adds the file and the line."""
 
     def __init__(self, problem: Phrase) -> None:
         self.problem = problem
@@ -366,10 +339,7 @@ def without_marks(data: bytes) -> bytes:
 
 
 class LongText:
-    """A text file that stays on disk; offsets are those of ``without_marks``.
-
-    ``path``: a regular file; errors as in ``read_part``. ``size``: its size in bytes.
-    """
+    """A text in a regular file that stays on disk; offsets are those of ``without_marks``."""
 
     __slots__ = ("_end", "_first", "_path")
 
@@ -398,12 +368,7 @@ class LongText:
 
 
 def line_parts(text: bytes | LongText, length: int) -> Iterator[bytes]:
-    """Yield a text in parts of whole lines, which end with LF or CR; only the last may not.
-
-    A line ending is never divided.
-
-    ``length``: size of a part in bytes, unless one of its lines is longer.
-    """
+    """Yield parts of whole lines, ``length`` bytes or more; no line ending is divided."""
     offset, rest = 0, b""
     # Reading as much as is left over keeps the cost of a long line proportional to its length.
     while new := _between(text, offset, offset + max(length, len(rest))):
@@ -441,10 +406,7 @@ def _between(text: bytes | LongText, start: int, end: int) -> bytes:
 
 
 def _lone_returns(block: bytes) -> int:
-    """Return the number of carriage returns in runs that no line feed follows.
-
-    The block neither begins nor ends with a carriage return.
-    """
+    """Return the number of carriage returns, none at an end, in runs that no line feed follows."""
     letters = np.frombuffer(block, dtype=np.uint8)
     is_return = np.concatenate([letters == ord("\r"), [False]])
     begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T

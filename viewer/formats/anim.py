@@ -49,10 +49,7 @@ _Key = tuple[float, float, Tangent, Tangent, int]  # the last item is the key's 
 
 
 def read(source: Source) -> Clip:
-    """Read a clip.
-
-    Raises ``FormatError`` if the text violates the grammar; the error has the file and line.
-    """
+    """Read a clip."""
     return _Parser(source).clip()
 
 

@@ -38,12 +38,7 @@ class _Section:
 
 
 def read(source: Source) -> MorphTarget:
-    """Read a target.
-
-    Returns a target named after the file, with vertices in ascending order. Raises ``FormatError``
-    if the text violates the grammar, or the sections list different vertices; the error has the
-    file and line.
-    """
+    """Read a target, named after the file, with vertices in ascending order."""
     sections: dict[bytes, _Section] = {}
     position = 0
     while (word := source.next_word(position)) is not None:

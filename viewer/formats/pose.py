@@ -107,10 +107,7 @@ _MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are 
 
 
 def read(source: Source) -> PoseRecord:
-    """Read one pose.
-
-    Raises ``FormatError`` if a value is not a number, or the file has several poses.
-    """
+    """Read one pose; a file with several is an error."""
     head = source.peek(4096)
     if head.startswith((b"PK", b"\x80")) or is_archive(head):
         return _from_values(_archive_values(source))
@@ -447,10 +444,7 @@ class _NamedValues:
     """The JSON text; None for archives, which have no lines."""
 
     def offset(self, *path: str | int) -> int | None:
-        """Return the offset of a value by the keys and indices that lead to it.
-
-        If the value is missing, return the offset of the nearest container; None for archives.
-        """
+        """Return the offset of a value, or of what should contain it; None for archives."""
         if self.text is None:
             return None
         while (place := value_place(self.text, path)) is None:
@@ -466,10 +460,7 @@ class _NamedValues:
         self.source.warn(key, self.offset(*path), **values)
 
     def array(self, key: str, kinds: str, expected: Phrase) -> NDArray[Any]:
-        """Return an array of the given kinds of values, stored as an array or as lists.
-
-        ``kinds``: numpy's letters of the kinds: ``"iuf"``, ``"bi"`` or ``"U"``.
-        """
+        """Return an array, or lists as one, if numpy's letter of its kind is among ``kinds``."""
         value = self.values.get(key)
         try:
             array = np.asarray(value)
@@ -507,10 +498,7 @@ def _described(value: Any) -> Phrase:
 
 
 def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
-    """Return the indices of the first value of a different kind in nested lists, and the value.
-
-    The indices are None if there is no such value, which means that the lists are ragged.
-    """
+    """Return indices and value of the first item of another kind; None for ragged lists."""
     if not isinstance(value, list | tuple):
         return (), value
     waiting: list[tuple[tuple[int, ...], Any]] = [((), value)]

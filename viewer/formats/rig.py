@@ -37,11 +37,7 @@ class NamedFiles:
 
 
 def read(source: Source) -> NamedFiles:
-    """Read the names of files that belong together, without opening them.
-
-    Raises ``FormatError`` if the text violates the grammar or does not specify a file; the error
-    has the file and line.
-    """
+    """Read the names of files that belong together, without opening them."""
     words = list(_WORD.finditer(source.data))
     words.reverse()
     _expect(source, words, b"rig")

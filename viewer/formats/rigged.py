@@ -81,12 +81,7 @@ _RECORDS = "material_records"
 
 
 def read(source: Source) -> Figure:
-    """Read a rigged mesh.
-
-    Returns a figure with mesh, skeleton and skin; correctives are read on first use. Raises
-    ``FormatError`` if an array is missing or has the wrong shape, or the parts do not match each
-    other.
-    """
+    """Read a rigged mesh; correctives are read on first use."""
     archive = archive_of(source)
     version = int(finite_array(archive, "viewer_rig", ()))
     if version != _VERSION:
@@ -411,18 +406,12 @@ def _texts(archive: Archive, key: str) -> tuple[str, ...]:
 
 
 def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | None = None) -> None:
-    """Write a figure with its rig.
-
-    Raises ``RigError`` if a part is missing. Raises ``OutputError`` if the file cannot be written.
-    """
+    """Write a figure with mesh, skeleton and skin."""
     save_arrays(path, {**figure_arrays(figure), **(more or {})})
 
 
 def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a figure by key, as stored in the file; correctives as float32.
-
-    Raises ``RigError`` if the figure has no mesh, skeleton or skin.
-    """
+    """Return the arrays of a rigged figure by key, as in the file; correctives are float32."""
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     if mesh is None or skeleton is None or skin is None:
         raise RigError(f"figure {figure.name}: expected mesh, skeleton and skin to write a rig")
@@ -508,10 +497,7 @@ def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[
 
 
 def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) -> dict[str, Any]:
-    """Return the fields of a texture that differ from their defaults, as plain data.
-
-    ``pictures``: extended by its image; None if name and image are stored elsewhere.
-    """
+    """Return a texture's fields that differ from their defaults, and add to ``pictures``."""
     placing: dict[str, Any] = {}
     for part in _PLACING:
         value = np.asarray(getattr(texture, part)).tolist()

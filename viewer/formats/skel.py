@@ -60,11 +60,7 @@ class _Joint:
 
 
 def read(source: Source) -> Figure:
-    """Read a skeleton.
-
-    Returns a figure without mesh; DOFs are clamped to their limits. Raises ``FormatError`` if the
-    text violates the grammar; the error has the file and line.
-    """
+    """Read a skeleton; DOFs are clamped to their limits."""
     joints = _Parser(source).joints()
     if not joints:
         looks = source.looks_like()
@@ -146,10 +142,7 @@ class _Parser:
             self.found[self.open[-1]].limits[axis] = values, start
 
     def _numbers(self, count: int) -> list[float]:
-        """Read the numbers of an item; the current word is its keyword.
-
-        The result is empty if an error was recorded; the item is then ignored.
-        """
+        """Read the numbers after the current keyword; none if the item has an error."""
         assert self.word is not None  # checked by the caller
         keyword = self.word
         values: list[float] = []

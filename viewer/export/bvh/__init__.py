@@ -441,13 +441,7 @@ def _visible(name: str) -> str:
 
 
 def _end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
-    """Return the offsets of end sites at rest; none is zero.
-
-    ``figure``: figure with its shape applied.
-    ``rest`` (J, 4, 4): joint space to figure space in the rest pose.
-    ``leaves`` (L,): joints without children.
-    Returns (L, 3): offsets from the joint in figure space.
-    """
+    """Return the offset of each leaf's end site (L, 3) in figure space at rest; none is zero."""
     skeleton = figure.require_skeleton()
     ends = np.zeros((len(leaves), 3))
     size = float(np.ptp(rest[:, :3, 3], axis=0).max())

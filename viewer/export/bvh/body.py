@@ -43,10 +43,7 @@ class Space:
 
 
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
-    """Return joint-to-figure matrices with all DOFs at 0, for given rest translations.
-
-    Constraints are left out: their rotations are in the channels of each frame, like those of DOFs.
-    """
+    """Return joint-to-figure matrices (J, 4, 4) with all DOFs at 0 and without constraints."""
     skeleton = replace(figure.require_skeleton(), rest_translations=offsets, constraints=())
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
@@ -54,13 +51,7 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
 
 
 class Conversion:
-    """Conversion of a figure's frames to channels, block by block.
-
-    ``figure``: figure without its shape applied; the frames contain the shape weights.
-    ``frames``: the first of them at least, none missing. ``reference``: frame that defines the
-    shape and scale of all bones; root positions follow every frame. ``order``: order of the
-    rotation channels. ``space``: transform to the file's space.
-    """
+    """Conversion of a figure's frames to channels; one frame gives the shape of all bones."""
 
     def __init__(
         self, figure: Figure, frames: Frames, reference: int, order: str, space: Space
@@ -79,11 +70,7 @@ class Conversion:
         self._low, self._high = np.full_like(points, np.inf), np.full_like(points, -np.inf)
 
     def channels(self, frames: Frames) -> tuple[Floats, Floats]:
-        """Return angles and positions of frames: (F, J, 3), (F, J, 3).
-
-        Angles are in the order of the rotation channels. Positions are relative to the parent,
-        including the offset; those of roots are in the file's space.
-        """
+        """Return angles in channel order, and positions with the offsets: (F, J, 3), (F, J, 3)."""
         figure, space = self._figure, self._space
         rotations = _rotations(figure, frames, space)
         angles = euler_angles(rotations, self._order)
@@ -99,12 +86,7 @@ class Conversion:
         return angles, positions
 
     def bones(self) -> tuple[Floats, Bools]:
-        """Return offsets at rest with constant translations, and which joints move: (J, 3), (J,).
-
-        Offsets are relative to the parent; for roots, to the figure's origin.
-
-        Both depend on all frames whose channels have been computed.
-        """
+        """Return offsets and which joints move, (J, 3), (J,), after all frames are converted."""
         noise = _NOISE * (self._size + 1e-3 * self._farthest)
         is_moved = ((self._high - self._low) > noise).any(axis=1)
         moves = self._inner & is_moved

@@ -56,8 +56,7 @@ class FileLosses:
 
     ``head``: text of the file before the frames of the motion. ``order`` (J,): place of each of the
     figure's joints among the joints of the file. ``space``: transform from the figure's space to
-    the file's. ``still`` (S,), ``scale``: shape and scale of the file's bones. ``how``: skinning of
-    the mesh. ``n_frames``: number of all frames that are compared.
+    the file's. ``still`` (S,), ``scale``: shape and scale of the file's bones.
     """
 
     def __init__(
@@ -98,12 +97,7 @@ class FileLosses:
         return self._losses.notes(path, figure, self._first_frame)
 
     def _side(self, read: Figure, clip: SampledClip, figure: Figure, frames: Frames) -> Side:
-        """Return the contents of a part as poses of a figure.
-
-        ``read``, ``clip``: joints and frames that were read back. ``figure``: original figure
-        without its shape applied. ``frames``: the written frames. They
-        define the placement of the whole figure, which is applied after skinning, without weights.
-        """
+        """Return the frames that were read back as poses; those written place the whole figure."""
         space, scale, still, order = self._space, self._scale, self._still, self._order
         rest = rest_matrices(figure, rest_translations_of(figure, still[None])[0])[:, :3, :3]
         own = space.rest @ rest * scale

@@ -46,8 +46,6 @@ def held_names(names: Sequence[str]) -> tuple[str, ...]:
 def safe_names(names: Sequence[str]) -> tuple[str, ...]:
     """Return names that every program can read: unique, and consisting only of ``[A-Za-z0-9_]``.
 
-    Names that were valid are unchanged.
-
     >>> safe_names(["hip", "hip", "", "left knee", "é"])
     ('hip', 'hip_2', 'joint2', 'left_knee', 'e')
     """
@@ -144,11 +142,7 @@ def head_text(
 def frame_texts(
     parents: Ints, moves: Bools, positions: Floats, angles: Floats, digits: int
 ) -> Iterator[bytes]:
-    """Yield the lines of frames, with joints in the order of the file.
-
-    ``parents`` (J,), ``moves`` (J,) bool, ``digits``: see ``head_text``.
-    ``positions`` (F, J, 3), ``angles`` (F, J, 3): angles are in radians in the rotation order.
-    """
+    """Yield the lines of frames (F, J, 3), joints in the file's order, angles in radians."""
     order = depth_first(parents)
     count = len(angles)
     for start in range(0, count, _BLOCK):

@@ -27,16 +27,10 @@ Picks = NDArray[np.integer]
 
 
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
-    """Triangulate polygons, keeping their order and winding.
+    """Triangulate polygons of ``counts`` (F,) corners (C,), keeping their order and winding.
 
-    A quad is split along the diagonal for which both halves face the same way as the quad; a
-    larger polygon becomes a fan if all corners are visible from the first, otherwise its ears are
-    clipped one by one (Meisters 1975), in the plane of its area vector (Newell).
-
-    ``positions``: (V, 3), figure units. ``corners``: (C,), vertices of all polygons, one polygon
-    after the other. ``counts``: (F,), corners of each polygon, 3 or more. Returns ``picks``: (T,
-    3), indices into ``corners``, which also select other attributes of the corners; ``faces``:
-    (T,), polygon of each triangle, in ascending order.
+    Returns indices into ``corners`` (T, 3), which also select other attributes, and the polygon of
+    each triangle (T,), ascending.
     """
     owners = np.repeat(np.arange(len(counts), dtype=np.int32), counts - 2)
     if (counts == 3).all():
@@ -62,6 +56,8 @@ def _cut(points: Floats) -> Picks:
     fan = _fan(size)
     result = np.tile(fan, (count, 1, 1))
     hidden = ~_is_covered(points, fan, normals)
+    # A fan is right if all corners are visible from the first. Otherwise a quad is split along its
+    # other diagonal, and the ears of a larger polygon are clipped one by one (Meisters 1975).
     if size == 4:
         turned = (fan + 1) % 4
         better = hidden & _is_covered(points, turned, normals)
@@ -150,12 +146,7 @@ def picked(corners: Picks, picks: Picks) -> Picks:
 
 
 def triangles_of(counts: Picks, faces: Picks) -> Picks:
-    """Return the triangles that ``triangulate`` creates from some polygons.
-
-    ``counts``: (F,), corners of each polygon, as for ``triangulate``; fewer than 3 give no
-    triangle. ``faces``: (N,), indices of polygons, in any order. Returns (T,), indices of
-    triangles, ascending.
-    """
+    """Return the triangles (T,), ascending, that ``triangulate`` makes of some polygons (N,)."""
     sizes = np.maximum(counts - 2, 0)
     faces = np.unique(faces)
     each = sizes[faces]
@@ -164,11 +155,7 @@ def triangles_of(counts: Picks, faces: Picks) -> Picks:
 
 
 def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
-    """Return corners with negative ones replaced by the first valid corner of the polygon, or 0.
-
-    ``corners``: (C,), vertices of all polygons. ``counts``: (F,), corners of each polygon.
-    ``owners``: (C,), polygon of each corner.
-    """
+    """Return corners (C,), negative ones replaced by their polygon's first valid one, or by 0."""
     known = np.flatnonzero(corners >= 0)
     first = np.zeros(len(counts), dtype=np.int64)
     # Values are assigned in reverse order, so that the first valid corner remains.
@@ -179,11 +166,7 @@ def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
 def filled_normals(
     source: Source, normals: Floats | None, positions: Floats, triangles: Ints
 ) -> Floats:
-    """Return a normal for every vertex, from the file or computed.
-
-    ``normals``: (V, 3) or None, normals of the file; with NaN if there is none. ``positions``,
-    ``triangles``: (V, 3), (T, 3), the mesh.
-    """
+    """Return a normal per vertex (V, 3): that of the file, or computed where there is none."""
     if normals is None:
         return vertex_normals(positions, triangles)
     # Columns are reduced one by one, because numpy is slow at reducing rows of three.

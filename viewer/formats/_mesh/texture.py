@@ -12,12 +12,7 @@ from viewer.rig.arrays import Bytes
 
 
 def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | None:
-    """Return a texture's pixels, or None with a warning that states its resolved path.
-
-    ``name``: name of the image, which must lie below that file's folder, see ``referenced_path``.
-    ``offset``: offset of the name in the file, or a JSON pointer, if known. Returns (H, W, 4) uint8
-    or None, sRGB with alpha, first row at the top.
-    """
+    """Return a texture's pixels as ``read_picture``, or None with a warning about its path."""
     path = referenced_path(source.path.parent, name)
     if path is None:
         source.warn(
@@ -36,8 +31,5 @@ def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | N
 
 
 def read_picture(source: Source) -> Bytes:
-    """Return the pixels of an image file: (H, W, 4) uint8, first row at the top.
-
-    Raises ``FormatError`` if the file is not a readable image.
-    """
+    """Return the pixels of an image file: (H, W, 4) uint8, sRGB with alpha, top row first."""
     return decode_picture(source.path, source.data)

@@ -11,13 +11,7 @@ _GROWTH = 1.1  # growth factor of the capacity; new rows take memory even before
 
 
 class GrowingTable:
-    """A table to which rows are added, in little more memory than they take.
-
-    Many small arrays would fill memory that the joined table cannot use. A large array instead
-    grows without being copied, because its pages are moved.
-
-    ``kind``: type of the numbers; the table takes a wider type if rows have one.
-    """
+    """A table to which rows are added, in little more memory than they take; it widens its type."""
 
     def __init__(self, shape: tuple[int, ...] = (), kind: DTypeLike = np.int64) -> None:
         self._rows: NDArray[Any] = np.empty((0, *shape), kind)

@@ -60,13 +60,7 @@ def line_at(text: str, offset: int) -> int:
 
 
 def value_place(text: str, path: Sequence[str | int]) -> int | None:
-    """Return the offset of a value, in characters; None if there is no such value.
-
-    If a key is repeated, its last value is used, as in Python.
-
-    >>> value_place('{"a": [1, 22]}', ("a", 1))
-    10
-    """
+    """Return a value's offset in characters, or None; the last of equal keys counts."""
     wanted = tuple(path)
     found = None
     for path, offset, is_key in _places(text):
@@ -76,15 +70,7 @@ def value_place(text: str, path: Sequence[str | int]) -> int | None:
 
 
 def nearest_place(text: str, path: Sequence[str | int]) -> int | None:
-    r"""Return the offset of a key or list item; if it is missing, the offset of its container.
-
-    None if the outermost container is also missing.
-
-    >>> nearest_place('[{"id": 0, "poses": []}]', (0, "poses"))
-    11
-    >>> nearest_place('[{"id": 0}]', (0, "poses"))
-    1
-    """
+    """Return the offset of a key or item, or of the container in which it is missing, or None."""
     wanted = tuple(path)
     deepest, found = 0, None
     for path, offset, _ in _places(text):

@@ -22,12 +22,11 @@ def row_texts(
     within: bytes = b"/",
     start: bytes = b"",
 ) -> Iterator[bytes]:
-    """Yield the lines of a table in parts.
+    """Yield the lines of a table (N, C), or (N, G, C) with G groups per line, in parts.
 
-    ``rows`` (N, C) or (N, G, C): numbers, whose G groups per line are separated by ``between``, and
-    the C numbers of a group by ``within``; without groups, all are separated by ``between``.
-    ``digits``: significant digits, without the zeros at their end; None for the shortest text of
-    the same float64. Small numbers have an exponent, as in 1.5e-7.
+    ``between`` separates groups, and ``within`` the C numbers of a group; without groups,
+    ``between`` separates all numbers. ``digits``: significant digits, without the zeros at their
+    end; None for the shortest text of the same float64. Small numbers have an exponent.
     """
     closing = b"]" * (rows.ndim - 1)
     for part in _parts(rows):

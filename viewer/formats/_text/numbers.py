@@ -88,14 +88,9 @@ def is_too_large(word: bytes) -> bool:
 
 
 def parse_numbers(data: bytes, start: int, end: int, is_kept: bool = True) -> tuple[Floats, int]:
-    """Parse white-space-separated numbers.
+    """Parse numbers separated by white space: those before the first invalid word, and its index.
 
-    ``is_kept``: whether the numbers are kept in the user's cache, if all are valid. Returns
-    ``values``: (N,), the numbers before the first word that is not a number; ``bad``: index of that
-    word, -1 if all are numbers.
-
-    >>> parse_numbers(b"1 -2.5  1e3", 0, 11)[0].tolist()
-    [1.0, -2.5, 1000.0]
+    The index is -1 if all are numbers; only these are kept in the user's cache, with ``is_kept``.
     """
     from viewer.media.array_cache import slot_of
 
@@ -110,31 +105,17 @@ def parse_numbers(data: bytes, start: int, end: int, is_kept: bool = True) -> tu
 
 
 def parse_few(text: bytes) -> tuple[Floats, int]:
-    """Parse up to about a hundred numbers, for which ``float()`` is faster; see ``parse_numbers``.
-
-    >>> parse_few(b"1 -2.5  up")
-    (array([ 1. , -2.5]), 2)
-    """
+    """Parse as ``parse_numbers``, but up to about a hundred, for which ``float()`` is faster."""
     return _parse_singly(text, whole=False)
 
 
 def parse_words(data: bytes, start: int, end: int) -> Floats:
-    """Parse white-space-separated words, which need not be numbers.
-
-    Returns (N,), NaN for every word that is not a number.
-
-    >>> parse_words(b"1 up 1e3", 0, 8).tolist()
-    [1.0, nan, 1000.0]
-    """
+    """Parse white-space-separated words (N,); NaN stands for every word that is not a number."""
     return _parse(data, start, end, whole=True)[0]
 
 
 def word_begins(letters: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return the offsets of white-space-separated words.
-
-    >>> word_begins(np.frombuffer(b" 1 23", np.uint8)).tolist()
-    [1, 3]
-    """
+    """Return the offsets of white-space-separated words (N,)."""
     # The subtraction wraps around, so that one comparison finds 9 to 13.
     inked = ~((letters == 32) | (letters - np.uint8(9) < 5))
     return np.flatnonzero(inked & ~np.concatenate([[False], inked[:-1]]))

@@ -20,14 +20,7 @@ Places = NDArray[np.int64]
 def read_table(
     source: Source, columns: int, part: Part = ""
 ) -> tuple[Floats, Callable[[int], int]]:
-    """Read a table of numbers.
-
-    ``part``: part of the figure that the rows describe, see ``Diagnostic``. Returns ``rows``: (N,
-    columns), values as written; NaN in invalid rows, unless the file is refused because of them;
-    ``offset_of``: returns the offset of a row in the file; slow, for errors only. Raises
-    ``FormatError`` if a row has more or fewer numbers, or a word is not a number; the error has the
-    line.
-    """
+    """Read rows (N, columns), NaN in invalid ones, and a function that finds a row in the file."""
     rows = _regular_rows(source, columns)
     if rows is not None:
         return rows, lambda row: source.word_offset(0, row * columns)
@@ -54,10 +47,7 @@ def _regular_rows(source: Source, columns: int) -> Floats | None:
 
 
 def read_numbers(source: Source) -> Floats:
-    """Read all numbers of a text, regardless of line breaks: (N,).
-
-    Raises ``FormatError`` if a word is not a number; the error has the line.
-    """
+    """Read all numbers of a text (N,), regardless of line breaks."""
     data = source.data
     values, bad = parse_numbers(data, 0, len(data))
     if bad >= 0:

@@ -66,11 +66,7 @@ def refuse_words(
     part: Part,
     places: NDArray[np.integer],
 ) -> None:
-    """Record infinite numbers as one error, and words that are not numbers as another.
-
-    ``bad``: (N,), indices of the invalid words. ``part``: part of the figure, see ``Diagnostic``.
-    ``places``: (N,), index of the vertex, triangle, joint or frame to which each word belongs.
-    """
+    """Record invalid words, infinite ones apart from others; ``places`` are their rows, (N,)."""
     infinite = [is_infinite(words.word(index)) for index in bad.tolist()]
     for is_chosen in (True, False):
         chosen = np.flatnonzero(np.array(infinite, dtype=np.bool_) == is_chosen)

@@ -111,10 +111,8 @@ def _rest_points(table: Table, skeleton: Skeleton) -> Floats:
 
 
 def _boxes(table: Table, parents: Ints) -> Floats:
-    """Return a box for each joint from itself to its children or End Sites: (J, 2, 3).
-
-    The exporter relies on an invariant: an End Site is at twice the centre of its joint's box.
-    """
+    """Return a box for each joint from itself to its children or End Sites: (J, 2, 3)."""
+    # The exporter relies on an invariant: an End Site is at twice the centre of its joint's box.
     inner = np.flatnonzero(parents >= 0)
     owners = np.concatenate([parents[inner], [joint for joint, _ in table.ends]]).astype(np.int32)
     tips = np.concatenate(

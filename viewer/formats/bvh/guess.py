@@ -38,11 +38,7 @@ _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
 
 
 def frame_rate(source: Source, frame_time: bytes | None) -> float:
-    """Return the standard frame rate whose rounded frame time is the one in the file.
-
-    ``0.0333333`` is 30 per second, ``0.033367`` is 30000/1001, ``0.1`` is 10. ``25`` is taken for a
-    rate, and ``33.3333`` for milliseconds, with a warning.
-    """
+    """Return the standard rate whose rounded frame time is in the file: 0.033367 is 30000/1001."""
     if frame_time is None:
         source.warn("F007.bvh-no-time: missing Frame Time: {rate:g} fps assumed", rate=DEFAULT_RATE)
         return DEFAULT_RATE
@@ -99,13 +95,7 @@ def _nearest_rate(frame_time: bytes, exact: float) -> float:
 
 
 def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
-    """Return the figure's unit, and facts and a note about it.
-
-    ``points``: (P, 3), positions of joints and End Sites in the rest pose. Returns ``unit``: as in
-    ``Figure.unit``: metres, centimetres or millimetres, whichever results in a plausible human
-    height; empty if none does; ``facts``: as in ``Figure.facts``: ``("unit", "cm, estimated from
-    …")``; ``note``: as in ``SkeletonMotion.unit_note``; None if the unit is metres.
-    """
+    """Return the unit in which the rest pose (P, 3) has a human's size, with facts and a note."""
     size = float(np.ptp(points, axis=0).max())
     metres = size * METRES["in"]
     is_near = _INCHES[0] < size < _INCHES[1]
@@ -201,13 +191,9 @@ def guess_up(
 
 
 def _lies(posed: Floats, along: str, up: str, size: float) -> bool:
-    """Return whether a body along one axis lies on the ground of a world with another up axis.
-
-    A standing body moves with its feet near 0 along its own axis. A lying one is near 0 along the
-    up axis, and anywhere along its own. Without a path there is no evidence, and people stand.
-
-    ``posed`` (F, J, 3): joints in some frames, ``size``: the distance of legs and upper body.
-    """
+    """Return whether a body (F, J, 3), upright along one axis, lies in a world with another up."""
+    # A standing body moves with its feet near 0 along its own axis. A lying one is near 0 along the
+    # up axis, and anywhere along its own. Without a path there is no evidence, and people stand.
     moves = np.ptp(posed[:, 0], axis=0).max() > _STILL * size
     lowest = np.abs(np.median(posed.min(axis=1), axis=0)) < _NEAR * size
     return bool(moves and not lowest["xyz".index(along)] and lowest["xyz".index(up)])

@@ -48,10 +48,7 @@ class Hierarchy:
 
 
 def read_hierarchy(source: Source) -> Hierarchy:
-    """Read everything up to the word MOTION.
-
-    Raises ``FormatError`` if the text violates the grammar; the error has the file and line.
-    """
+    """Read everything up to the word MOTION."""
     return _Parser(source).hierarchy()
 
 
@@ -208,10 +205,7 @@ class _Parser:
             self.doubled.append((keyword.start(), self.n_joints - 1, joint))
 
     def _refuse_offset(self, joint: BvhJoint, keyword: Word, found: int | list[Word]) -> None:
-        """Record an error in an OFFSET with a wrong number of values, and skip it.
-
-        ``found``: the number of values if there are too few, otherwise the additional words.
-        """
+        """Record and skip an OFFSET with too few values (their number) or the additional words."""
         refuse, word = self.source.refuse, self._found()
         places = None if joint.is_end else [self.n_joints - 1]
         item = Phrase("{item} of {owner}", item="OFFSET", owner=called(joint))

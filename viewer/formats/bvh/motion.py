@@ -392,10 +392,7 @@ def inner_moves(table: Table) -> list[int]:
 
 
 def moves_inner(table: Table, values: Floats) -> bool:
-    """Return whether position channels of joints with a parent differ from 0 beyond rounding.
-
-    ``values`` (N, C): some frames.
-    """
+    """Return whether frames (N, C) translate joints with a parent, beyond rounding."""
     inner = inner_moves(table)
     positions = values[:, [table.moves[at][2] for at in inner]]
     least = _ROUNDING * np.abs(offsets_replaced(table)[inner]).max(initial=0.0)
@@ -422,10 +419,7 @@ def placed(table: Table, shifts: Floats) -> Floats:
 
 
 def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
-    """Refuse frames that translate a joint beyond the limit, and repeat the previous frame.
-
-    ``names`` are the axis and joint of each column.
-    """
+    """Refuse frames that translate a joint beyond the limit, and repeat the previous frame."""
     is_far = is_beyond(shifts)
     if is_far.any():
         frame = int(is_far.argmax())

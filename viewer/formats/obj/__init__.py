@@ -129,13 +129,7 @@ class _Gathered:
 
 
 def read(source: Source) -> Figure:
-    """Read a mesh.
-
-    ``source``: the file; recoverable errors and ignored data are added to its warnings. Returns a
-    mesh without skeleton and skin; y up and without a unit, unless a comment written by this
-    program states them. Raises ``FormatError`` if the text violates the grammar; the error has the
-    file and line.
-    """
+    """Read a mesh; y up without a unit, unless a comment written by this program states them."""
     parts = _read_parts(source)
     source.release()
     if len(parts.positions) == 0:
@@ -185,10 +179,7 @@ def read(source: Source) -> Figure:
 
 
 def _read_parts(source: Source) -> _ObjParts:
-    """Read a whole file.
-
-    ``source``: the file; ignored data is added to its warnings.
-    """
+    """Read a whole file, and warn of ignored data."""
     gathered = _Gathered()
     for lines in pieces(source):
         _read_piece(source, lines, gathered)
@@ -418,10 +409,7 @@ def _uvs(source: Source, parts: _ObjParts, picks: Picks) -> tuple[Floats | None,
 
 
 def _materials(source: Source, parts: _ObjParts) -> tuple[tuple[Material, ...], Ints]:
-    """Return the materials, and the material index of each face.
-
-    If there is no ``usemtl``, several groups or objects become materials, to preserve their names.
-    """
+    """Return the materials, or names of groups without ``usemtl``, and the index of each face's."""
     used = parts.runs[b"usemtl"]
     by_name = bool(used)
     if not used:
@@ -444,11 +432,7 @@ def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints
 
 
 def _parts_of(source: Source, parts: _ObjParts) -> tuple[tuple[str, ...], Ints]:
-    """Return the names of objects, or else of groups, and the index of each face's name.
-
-    A file with fewer than two of them has no parts. Groups within objects are reported, as a face
-    has one part, unless they are kept as materials.
-    """
+    """Return two or more names of objects, or else of groups, and the index of each face's name."""
     objects, groups = ({name: None for _, name in parts.runs[word]} for word in (b"o", b"g"))
     within = [name for name in groups if name and name not in objects]
     if len(objects) > 1 and len(within) > 1 and parts.runs[b"usemtl"]:

@@ -54,10 +54,7 @@ class FaceRows:
 
 
 def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
-    """Read the faces of some lines; None if any is invalid.
-
-    Negative indices count back from the last ``v``, ``vt`` or ``vn`` before the face.
-    """
+    """Read faces, None if any is invalid; -1 is the last ``v``, ``vt`` or ``vn`` before it."""
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
     counts = np.diff(np.searchsorted(begins, rows.starts))
@@ -77,10 +74,7 @@ def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
 
 
 def _corner_numbers(rows: Rows, begins: Places) -> _Corners | None:
-    """Return the three numbers of every corner as written, 0 for missing numbers: (C, 3).
-
-    None if a corner is invalid.
-    """
+    """Return each corner's three numbers (C, 3), 0 for missing ones; None if one is invalid."""
     text = rows.body.replace(b"/", b" ")
     values, bad = parse_numbers(text, 0, len(text), is_kept=False)
     if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
@@ -95,10 +89,7 @@ def _corner_numbers(rows: Rows, begins: Places) -> _Corners | None:
 
 
 def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
-    """Return the columns that the numbers of all corners have in common, as in most files.
-
-    None if corners differ, or if one may be invalid.
-    """
+    """Return the columns of the numbers of all corners; None if corners differ or seem invalid."""
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
         return [0]
@@ -129,12 +120,7 @@ def _in_columns(values: Floats, columns: list[int], count: int) -> _Corners | No
 
 
 def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
-    """Classify corners by their slashes.
-
-    ``begins``: (C,), start of each corner in the body of the rows. Returns ``fits``: (C,) bool,
-    true for v, v/vt, v//vn and v/vt/vn; the numbers are not checked; ``n_numbers``: (C,), number of
-    values of each corner; ``has_gap``: (C,) bool, true for v//vn.
-    """
+    """Classify corners (C,): is it v, v/vt, v//vn or v/vt/vn, its count of numbers, is it v//vn."""
     number_begins = _number_begins(rows)
     slashes = np.flatnonzero(rows.letters == _SLASH)
     after = np.append(begins[1:], len(rows.letters))
@@ -177,11 +163,7 @@ def _whole(values: Floats) -> _Corners | None:
 
 
 def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
-    """Read the faces of some lines; see ``read_faces``.
-
-    ``source``: the file, which records the errors of omitted faces. Returns the faces, with the
-    errors to record when their triangles are known.
-    """
+    """Read faces as ``read_faces`` does, and record the errors of those that are omitted."""
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
     counts = np.diff(np.searchsorted(begins, rows.starts))
@@ -263,10 +245,7 @@ def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
 def checked_corners(
     source: Source, faces: FaceRows, faults: list[CornerFault], ends: dict[str, int]
 ) -> NDArray[np.integer]:
-    """Return the corners of all faces, with invalid corners replaced by others of their face.
-
-    Returns (C, 3), corners; -1 for invalid indices of texture coordinates and normals.
-    """
+    """Return the corners (C, 3) with valid ones for invalid vertices, -1 for invalid vt and vn."""
     corners, counts = faces.corners, faces.counts
     limits = np.array([ends[keyword] for keyword in _CORNER_KINDS])
     largest = [column.max(initial=-1) for column in corners.T]

@@ -134,14 +134,7 @@ def _is_blank(letters: Letters) -> Bools:
 
 
 def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
-    """Parse the numbers after a keyword.
-
-    Returns ``table``: (n, width), the first numbers of each line; ``counts``: (n,), number of
-    values in each line; ``values``: (N,), all values, one line after the other; ``rows``: the text
-    from which they were parsed.
-
-    None is returned instead if a line has too few numbers, or a word is not a number.
-    """
+    """Parse the numbers after a keyword, ``width`` or more a line; None if they are not that."""
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
     values, bad = parse_numbers(rows.body, 0, len(rows.body), is_kept=False)
@@ -157,11 +150,7 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
 
 
 def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
-    """Parse the numbers after a keyword; see ``number_rows``.
-
-    Returns as for ``number_rows``, with NaN for words that are not numbers and in rows that are too
-    short.
-    """
+    """Parse as ``number_rows``, with errors; NaN in rows too short and for invalid words."""
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
     values = parse_words(rows.body, 0, len(rows.body))

@@ -96,10 +96,7 @@ class _MapOptions:
 
 @dataclass(slots=True)
 class _Statements:
-    """Statements of one ``newmtl``: values, and maps with their location in the library.
-
-    ``replaces`` states whether maps replace the values; otherwise they are multiplied.
-    """
+    """Values and maps of one ``newmtl``; maps multiply the values unless ``replaces`` is set."""
 
     library: Source
     replaces: bool = False
@@ -110,11 +107,7 @@ class _Statements:
 def read_libraries(
     source: Source, libraries: list[tuple[bytes, int]], names: list[str]
 ) -> tuple[Material, ...]:
-    """Return materials by name, with their images if these can be read.
-
-    ``source``: the ``.obj``; warnings about missing libraries, materials and images are added to
-    it. ``libraries``: text after each ``mtllib``, and its offset.
-    """
+    """Return materials by name, with their images if these can be read; warn of missing ones."""
     known: dict[str, _Statements] = {}
     loaded: dict[tuple[Source, str], Bytes | None] = {}
 
@@ -171,11 +164,7 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
 
 
 def _name_here(folder: Path, written: str) -> str | None:
-    """Return the name under which a referenced file exists in a folder, None if it does not.
-
-    The name without quotes and its last component are tried in turn, ignoring case as Windows does,
-    since many programs write the path that the file had when it was exported.
-    """
+    """Return the name, ignoring case, under which a referenced file exists in a folder, or None."""
     name = written.strip("\"'").replace("\\", "/")
     for tried in (name, name.rsplit("/", 1)[-1]):
         path = referenced_path(folder, tried) if tried else None
@@ -318,10 +307,7 @@ def _holds_normals(library: Source, file: str, position: int, load: _Load) -> bo
 
 
 def _is_normal_map(image: Bytes) -> bool:
-    """Return whether an image, (H, W, 4) uint8, contains unit normals in tangent space.
-
-    Blender, Substance and others write normal maps as ``map_Bump``, which is meant for heights.
-    """
+    """Return whether an image, (H, W, 4) uint8, contains unit normals in tangent space."""
     normals = _sampled(image)[..., :3].reshape(-1, 3) / 127.5 - 1.0
     is_unit = np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _ERROR
     # Heights are grey: their vectors point along (1, 1, 1).

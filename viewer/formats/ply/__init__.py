@@ -51,13 +51,7 @@ _TEXTURE = "texturefile"
 
 
 def read(source: Source) -> Figure:
-    """Read a mesh.
-
-    ``source``: the file; recoverable errors and ignored data are added to its warnings. Returns a
-    mesh without skeleton and skin; y up and without a unit, unless a comment written by this
-    program states them. Raises ``FormatError`` if the file is invalid; the error has the file and
-    line, or the number of the vertex or face.
-    """
+    """Read a mesh; y up without a unit, unless a comment written by this program states them."""
     header = read_header(source)
     tables = read_tables(source, header)
     vertices, positions = _vertices(source, header, tables)
@@ -140,10 +134,7 @@ def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple
 
 
 def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
-    """Return properties side by side, (N, len(names)); None if one is missing.
-
-    Invalid rows are recorded as errors and become NaN; in a text file they are already NaN.
-    """
+    """Return properties as columns (N, len(names)), NaN in invalid rows; None if one is missing."""
     if any(name not in table.columns for name in names):
         return None
     with np.errstate(over="ignore"):

@@ -61,10 +61,7 @@ class Header:
 
 
 def read_header(source: Source) -> Header:
-    """Read the lines up to ``end_header``.
-
-    Raises ``FormatError`` if a line is invalid; the error has the line.
-    """
+    """Read the lines up to ``end_header``."""
     header = Header()
     position, number, has_format = 0, 0, False
     while position < min(len(source.data), _LONGEST):

@@ -63,11 +63,7 @@ class Table:
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
-    """Read all elements and return them by name.
-
-    Raises ``FormatError`` if there are fewer numbers than the header declares, or words that are
-    not numbers.
-    """
+    """Read all elements and return them by name."""
     body: _TextRows | _BinaryRows
     body = _BinaryRows(source, header) if header.order else _TextRows(source, header)
     tables: dict[str, Table] = {}
@@ -353,10 +349,7 @@ class _BinaryRows:
         return True
 
     def _list_sizes(self, element: Element, start: int) -> tuple[int, list[int]]:
-        """Return the size of one row in bytes, and the lengths of its lists as declared.
-
-        Counts beyond the end of the file are 0.
-        """
+        """Return the bytes of a row and the lengths of its lists, 0 beyond the end of the file."""
         place, counts = start, list[int]()
         for prop in element.properties:
             size = int(prop.kind[1])
@@ -374,10 +367,7 @@ class _BinaryRows:
         return place - start, counts
 
     def _walked(self, element: Element) -> _Places:
-        """Return the starts of rows, followed one by one because their lists differ in length.
-
-        This takes one iteration per face; files that contain only triangles never need it.
-        """
+        """Return the starts of rows, followed one by one because their lists differ in length."""
         starts = np.empty(element.count, dtype=np.int64)
         place, end = self.position, len(self.data)
         for row in range(element.count):
@@ -442,10 +432,7 @@ class _BinaryRows:
 
 
 def _even_text(element: Element, block: _Numbers) -> _Columns | None:
-    """Split rows of numbers into the columns of an element, (N, C).
-
-    Returns None if the rows do not fit, or have lists of different lengths.
-    """
+    """Split numbers into an element's columns (N, C); None if its rows differ or do not fit."""
     lists = [prop.name for prop in element.properties if prop.count_kind]
     width = block.shape[1] - len(element.properties)
     if len(element.properties) == 0 or len(lists) > 1 or width < 0 or (width and not lists):
@@ -469,11 +456,7 @@ def _even_text(element: Element, block: _Numbers) -> _Columns | None:
 def _even_binary(
     element: Element, data: bytes, start: int, order: str, counts: list[int]
 ) -> tuple[_Columns, int] | None:
-    """Return the columns of an element, and the size of its rows in bytes.
-
-    ``counts`` are the lengths of the lists in the first row. Returns None if other rows have other
-    lengths, or the file is too short.
-    """
+    """Return columns and bytes per row; None if later lists are not as long as the first row's."""
     left = iter(counts)
     fields: list[tuple[Any, ...]] = []
     for number, prop in enumerate(element.properties):
@@ -535,10 +518,7 @@ class _LineSizes:
     """Offset of each piece of the text, and the number of lines before it."""
 
     def offset(self, line: int) -> int:
-        """Return an offset between the words of a line and the words of the previous line.
-
-        The offset of the end of the text follows the last line.
-        """
+        """Return an offset between a line's words and the previous line's, or that of the end."""
         if line >= len(self.words):
             return len(self.data)
         place = bisect.bisect_right(self.marks, line, key=lambda mark: mark[1]) - 1
@@ -549,12 +529,7 @@ class _LineSizes:
 
 
 def line_sizes(data: bytes, start: int) -> _LineSizes:
-    r"""Return the number of words in each non-blank line, from an offset to the end.
-
-    >>> found = line_sizes(b"1 2\r\n\n3", 0)
-    >>> found.words.tolist(), found.offset(1)
-    ([2, 1], 5)
-    """
+    """Return the number of words in each non-blank line, from an offset to the end."""
     sizes = [np.zeros(0, np.int32)]
     marks, n_lines = [(start, 0)], 0
     while start < len(data):

@@ -46,12 +46,7 @@ from viewer.rig.skin import Skin, skin_rows
 
 
 def read(source: Source) -> Figure:
-    """Read a mesh with its weights and bindings.
-
-    Returns a figure without skeleton, and without skin if the file has neither weights nor
-    bindings. Raises ``FormatError`` if the text violates the grammar or its sections do not match;
-    the error has the file and line.
-    """
+    """Read a mesh with its weights and bindings; it has no skin if the file has neither."""
     sections = read_sections(source)
     mesh = _mesh(source, sections)
     _check_mesh(source, sections, mesh)
@@ -141,10 +136,7 @@ def _unbound_skin(sections: Sections) -> Skin:
 
 
 def _even_counts(source: Source, sections: Sections) -> None:
-    """Refuse sections whose number of vertices differs from the number of positions.
-
-    If all other sections agree, the positions are assumed to be wrong.
-    """
+    """Refuse sections that have another number of vertices than the positions have."""
     tables = sections.tables
     counts = {name: len(table) for name, table in tables.items()}
     if sections.starts is not None:

@@ -71,10 +71,7 @@ class Sections:
 
 
 def read_sections(source: Source) -> Sections:
-    """Split a file into its sections and parse their numbers.
-
-    Raises ``FormatError`` if the text violates the grammar; the error has the file and line.
-    """
+    """Split a file into its sections and parse their numbers."""
     sections = Sections()
     extra_braces = 0
     position = 0
@@ -153,11 +150,7 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
 def _read_material(
     source: Source, header: _Word, pictures: dict[str, Bytes | None]
 ) -> tuple[Material, int]:
-    """Read one material.
-
-    ``header``: the word ``material``. Returns ``material``: material with its image, if the image
-    can be read; ``end``: offset after the section.
-    """
+    """Read one material with its image, if it can be read, and the offset after the section."""
     name, brace = _material_name(source, header)
     texture: str | None = None
     named = header.start()

@@ -56,10 +56,7 @@ class Block:
 
 
 def find_block(source: Source, name: str, header: _Word, position: int) -> Block:
-    """Return the range of a section's numbers; only weights may omit the opening brace.
-
-    ``position`` is the offset after the section's count, or after its keyword if there is no count.
-    """
+    """Return the range of a section's numbers; weights may omit the opening brace."""
     stated = position - 1
     brace = source.next_word(position)
     if brace is not None and brace.group() == b"{":
@@ -107,12 +104,7 @@ def read_rows(
     first: int = 0,
     item: str = "{section} of vertex {index}",
 ) -> tuple[Floats, OffsetOf]:
-    """Parse a block of rows.
-
-    Returns ``rows``: (N, width), values; NaN for words that are not numbers, and in rows with more
-    or fewer numbers; ``offset_of``: returns the offset of a row. Raises ``FormatError`` if the
-    start of the rows is unknown.
-    """
+    """Parse rows (N, width), NaN in invalid ones; returns also what finds a row's offset."""
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
         values.flags.writeable = False  # the mesh can use a read-only array without a copy
@@ -200,10 +192,7 @@ def _row_begins(
 
 
 def words_of(source: Source, block: Block) -> Words:
-    """Return the words of a block, which must not contain the keyword of another section.
-
-    Raises ``FormatError`` if the block is not closed before another section begins.
-    """
+    """Return the words of a block, which must be closed before the keyword of another section."""
     from viewer.formats._text.words import read_words
 
     words = read_words(source.data, block.start, block.end)
@@ -223,11 +212,7 @@ def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> 
 
 
 def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
-    """Return triangles as integers, ``LOST`` for corners that are not integers: (T, 3).
-
-    ``rows``, ``offset_of``: (T, 3), callable, results of ``read_rows``, which has recorded its
-    errors.
-    """
+    """Return corners (T, 3) as integers; ``LOST`` for invalid ones, with their errors recorded."""
     known = ~np.isnan(rows)
     if known.all():
         corners, changed = to_whole(rows)

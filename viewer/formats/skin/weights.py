@@ -34,12 +34,7 @@ Influences = tuple[Ints, Ints, Floats, OffsetOf]
 
 
 def read_weights(source: Source, block: Block, count: int) -> Influences:
-    """Parse the influences of all vertices.
-
-    Returns ``starts``: (N + 1,), first influence of each vertex; an unreadable vertex has none;
-    ``joints``, ``weights``: (M,), both 0 if either is not a number; ``offset_of``: returns the
-    offset of a vertex. Raises ``FormatError`` if the numbers cannot be assigned to vertices.
-    """
+    """Parse the influences of all vertices; an unreadable vertex has none, recorded as an error."""
     values, bad = parse_numbers(source.data, block.start, block.end)
     heads = _find_heads(values, count) if bad < 0 else None
     found = None if heads is None else _whole_influences(source, block, values, heads)
@@ -47,12 +42,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
 
 
 def _find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
-    """Return the positions of the vertices' counts, (V,); None if they do not fill the block.
-
-    Each count determines the position of the next, so they form a linked list. Composing the map
-    from each position to the next with itself four times lets each step of the loop skip 16
-    vertices.
-    """
+    """Return the positions of the vertices' counts (V,); None if they do not fill the block."""
     size = len(values)
     if count == 0:
         return None if size else np.zeros(0, np.int32)
@@ -65,6 +55,8 @@ def _find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
     counts += np.arange(1, size + 1, dtype=kind)
     is_count &= counts <= size
     np.copyto(after[:size], counts, where=is_count)
+    # Each count determines the position of the next: a linked list. The map from each position to
+    # the next, composed with itself four times, lets a step of the loop skip 16 vertices.
     leap = after
     for _ in range(_LEAP.bit_length() - 1):
         leap = leap[leap]
@@ -203,10 +195,7 @@ def _faulty_pairs(
 def _no_influences(
     source: Source, block: Block, words: Words, known: Floats, count: int
 ) -> FormatError:
-    """Return the error for the first wrong count, found by following the counts one by one.
-
-    If all of them are counts, there are too few or too many numbers for the declared vertices.
-    """
+    """Return the error for the first wrong count, found by following the counts one by one."""
     numbers = known.tolist()
     heads: list[int] = []
     position = 0
