@@ -1,7 +1,5 @@
 """Commands that run Python in a separate process in which no signal is ignored."""
 
-from __future__ import annotations
-
 import sys
 
 # A signal that is ignored when a program starts stays ignored: after nohup, in background jobs of a

@@ -1,7 +1,5 @@
 """Fixtures and paths shared by test files."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import os

@@ -1,7 +1,5 @@
 """Files dragged from another program onto a window: the source side of the XDND protocol."""
 
-from __future__ import annotations
-
 import ctypes
 import time
 from ctypes import POINTER, Structure, c_char_p, c_int, c_long, c_uint, c_ulong, c_void_p

@@ -1,7 +1,5 @@
 """The real window, driven by xdotool, and comparisons of its screenshots."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import subprocess

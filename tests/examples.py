@@ -1,7 +1,5 @@
 """Collection of doctests from the modules that contain examples, one in fifteen."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from pathlib import Path
 

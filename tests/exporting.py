@@ -1,7 +1,5 @@
 """Exports through the front door, for tests that write one kind of content."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

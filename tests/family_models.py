@@ -1,7 +1,5 @@
 """Figures of the SMPL family for all test folders: a made-up model, written and read back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors and warnings of a call as data: (key, line, values)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 

@@ -4,8 +4,6 @@ A forked program starts at its first line, with default signal handlers, and end
 does: exit functions run, and the interpreter is shut down.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import os

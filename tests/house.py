@@ -3,8 +3,6 @@
 ``make house`` runs this. There are no limits: a commit that moves a number the wrong way says why.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import re

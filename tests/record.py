@@ -8,8 +8,6 @@ written. ``help.txt`` holds the help of all commands. Two records are compared w
 runs. This is no part of the tests; it takes some minutes.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

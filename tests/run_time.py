@@ -4,8 +4,6 @@
 takes longer does not fail: that would depend on the machine.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections import Counter

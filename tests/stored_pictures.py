@@ -4,8 +4,6 @@
 re-rendered image before committing it.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The command line as a program: exit codes, one-line messages, signals, pipes, imports."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -1,7 +1,5 @@
 """The scripts of ``viewer help examples``: each runs as printed and does what it says."""
 
-from __future__ import annotations
-
 import csv
 import re
 import runpy

@@ -2,8 +2,6 @@
 themselves at the tested moment, so no test depends on their speed.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -1,7 +1,5 @@
 """BVH among other files: common units, driven models, and messages about both."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motions of bodies and other figures retargeted to characters with different joints."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

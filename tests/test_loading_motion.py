@@ -1,7 +1,5 @@
 """Motions, poses and morphs opened together with figures: assignment and refusals."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Actors and scenes are named uniquely after the opened files."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Standard streams that are closed, full, redirected or without a reader: one line at most."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

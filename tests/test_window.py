@@ -1,7 +1,5 @@
 """The real window under Xvfb, driven by xdotool; screenshots are compared."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The idle window: frames that show the awaited event, then none."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.app.window import Rest

@@ -1,7 +1,5 @@
 """Another program that uses the clipboard of an X display."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -4,8 +4,6 @@ The box is 2 m high, 0.5 m wide and 0.25 m deep. Its joints are at the middle of
 left side (+x), and of its right side (-x). Each side follows its joint rigidly.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 HEIGHT, WIDTH, DEPTH = 2.0, 0.5, 0.25

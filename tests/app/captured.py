@@ -1,7 +1,5 @@
 """Scenes of captures for tests: the tiny figure as several people, and captured points."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import viewer

@@ -1,7 +1,5 @@
 """Fixtures for interface tests: apps that are closed after each test, and tiny files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app import box_body

@@ -1,7 +1,5 @@
 """Test driver: mouse and keyboard input for a HeadlessApp, aimed by widget labels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

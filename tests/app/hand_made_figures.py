@@ -1,7 +1,5 @@
 """Tiny files of known size and front."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -1,7 +1,5 @@
 """Synthetic rigs for the posing tools, and window positions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.app.posing.posed_joint import posed_joint

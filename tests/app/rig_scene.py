@@ -1,7 +1,5 @@
 """A bent arm as template, and its mesh, rotated and scaled by thirty, as target for rigging."""
 
-from __future__ import annotations
-
 import numpy as np
 from autorig.rigged_shapes import arm, mesh_of, turn
 

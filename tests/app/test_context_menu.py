@@ -1,7 +1,5 @@
 """Context menus: entries for what was clicked, each of which can be undone."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.app.context_menu import ContextMenu

@@ -1,7 +1,5 @@
 """Loss of the X server while the window is open."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Opening of the first files in a thread: results, errors, progress and cancelling."""
 
-from __future__ import annotations
-
 import threading
 from contextvars import ContextVar
 

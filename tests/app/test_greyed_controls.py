@@ -1,7 +1,5 @@
 """Greyed controls and the reasons in their tooltips, for which the window wakes up."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

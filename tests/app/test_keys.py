@@ -1,7 +1,5 @@
 """Shortcuts: every row of KEYS has its described effect, and undo reverts it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

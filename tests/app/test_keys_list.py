@@ -1,7 +1,5 @@
 """The shortcut list: complete columns at the usual text size, scrollable if they do not fit."""
 
-from __future__ import annotations
-
 import pytest
 from imgui_bundle import imgui
 

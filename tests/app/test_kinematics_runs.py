@@ -1,7 +1,5 @@
 """The number of forward kinematics runs: once per frame, even if several panels show the pose."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.app.actors.following import start_following

@@ -1,7 +1,5 @@
 """Panels, sizes and scales: closed panels reopen, and clicks hit at every scale."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.captured import people

@@ -1,7 +1,5 @@
 """The menus: the bundled body, models in a remembered folder, and pose editing."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The mouse in the view: orbit, pan, zoom, and no effect of the mouse over panels."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

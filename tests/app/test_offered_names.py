@@ -1,7 +1,5 @@
 """File names that the window suggests for recordings, screenshots, poses, clips and exports."""
 
-from __future__ import annotations
-
 import pytest
 from formats.capture_files import body, write_frames
 

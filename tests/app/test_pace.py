@@ -1,7 +1,5 @@
 """The number of passes that the window draws in each frame, and fading of shadows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 ``make golden NAME…`` re-renders them; review them before committing.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

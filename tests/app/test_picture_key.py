@@ -1,7 +1,5 @@
 """The cache key of the view, which changes with every visible change, and only then."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import fields, replace
 

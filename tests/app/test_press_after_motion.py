@@ -2,8 +2,6 @@
 Remote desktops, tablets and slow machines deliver both together.
 """
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

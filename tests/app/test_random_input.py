@@ -2,8 +2,6 @@
 VIEWER_MONKEY_EVENTS=20000 runs more events.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """Open panels: most are open until closed, the others open only on request."""
 
-from __future__ import annotations
-
 from imgui_bundle import imgui
 
 from viewer.app.layout import PANELS, ShownPanels, is_open, set_open

@@ -1,7 +1,5 @@
 """Fonts and colours of the interface: additional scripts, and contrast of text."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from imgui_bundle import imgui

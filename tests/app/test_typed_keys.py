@@ -1,7 +1,5 @@
 """Text that arrives faster than frames are drawn, and clicks and keys between two frames."""
 
-from __future__ import annotations
-
 import pytest
 from imgui_bundle import imgui
 

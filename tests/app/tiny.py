@@ -1,7 +1,5 @@
 """Files of a tiny rig with limited, unlimited and locked DOFs, and of a column that bends."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 SKEL = """

@@ -1,7 +1,5 @@
 """Small rigged figures for tests of rig transfer."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rig.figure import Figure

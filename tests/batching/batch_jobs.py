@@ -1,7 +1,5 @@
 """Jobs that worker processes import; the name of an item selects the failure."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Engines, which must return exactly one result per item, even if a worker crashes."""
 
-from __future__ import annotations
-
 import os
 from itertools import count
 

@@ -1,7 +1,5 @@
 """Inputs of a batch: search, order, and refused arguments."""
 
-from __future__ import annotations
-
 import inspect
 import io
 import sys

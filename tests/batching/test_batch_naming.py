@@ -1,7 +1,5 @@
 """Output names of a batch, and errors found before anything starts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

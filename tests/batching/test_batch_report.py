@@ -1,7 +1,5 @@
 """Reports of batches: complete and incomplete lines, several writers, and keys for --resume."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Runs of batches, in which no item is lost or run twice after any kind of end."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Figures cached between the runs of one process."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

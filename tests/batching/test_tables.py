@@ -1,7 +1,5 @@
 """Tables of a batch: numbers, order, and text that spreadsheets must not execute."""
 
-from __future__ import annotations
-
 import csv
 import math
 

@@ -4,8 +4,6 @@ cores were idle, for 1,000 files. Workers start once per batch. The arguments ar
 files (1,000), of frames per file (120), and of rounds.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import statistics

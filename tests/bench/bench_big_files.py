@@ -10,8 +10,6 @@ frames. To show this, a quarter of the frames is measured too.
 ``--full`` uses files of a size that users notice: 430 MB of .skin, 100,000 frames.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Frames of posed bodies: pose correctives by both methods or none, dual quaternions, and PIG."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bench_skinning

@@ -1,7 +1,5 @@
 """Reading of 10,000 EasyMocap frames of two people, compared with json.loads of the same bytes."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 import tracemalloc

@@ -1,7 +1,5 @@
 """Deformation on the CPU in float64, compared with scipy's product of weights and matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 from bench_skinning import synthetic
 from measure import interleaved, median_ratio, report

@@ -3,8 +3,6 @@ ground and sudden knees, of motions that are built from trigonometry. Files give
 as ``.bvh``, are measured on the bundled body too.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ drivers and do not depend on other programs. The figure is PIG if its files exis
 bundled figure.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reading and drawing of large GLB files, compared with reading their bytes, JSON and images."""
 
-from __future__ import annotations
-
 import gc
 import io
 import json

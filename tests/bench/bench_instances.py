@@ -5,8 +5,6 @@ cancels out. The work on the CPU (kinematics, correctives, upload) is printed to
 actors from which instancing pays off.
 """
 
-from __future__ import annotations
-
 import re
 import statistics
 from collections.abc import Callable

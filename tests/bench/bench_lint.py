@@ -3,8 +3,6 @@ Reading means opening body and motion like ``viewer view``; the check starts fro
 The time of each check is printed as well.
 """
 
-from __future__ import annotations
-
 import statistics
 import tempfile
 import time

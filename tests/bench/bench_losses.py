@@ -1,7 +1,5 @@
 """Export of 1,000 frames of the bundled body, and the cost of comparing the written file."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from unittest.mock import patch

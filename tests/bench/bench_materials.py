@@ -3,8 +3,6 @@ frames have draft quality and a moving camera. Blended, sorted triangles are com
 triangles, and the upload of 20 materials that share an image with that of 20 images.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Peak memory of rendering the bundled figure, compared with a minimal program."""
 
-from __future__ import annotations
-
 import statistics
 import tempfile
 from pathlib import Path

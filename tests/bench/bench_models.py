@@ -1,7 +1,5 @@
 """Reading of body models: PIG from text, pickle and .npz; large compressed or unused arrays."""
 
-from __future__ import annotations
-
 import pickle
 import tempfile
 from functools import partial

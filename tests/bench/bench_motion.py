@@ -3,8 +3,6 @@ The frame is 1280 x 720 with the default display. The growth of memory over 500 
 printed as well, for Python objects and for the whole process.
 """
 
-from __future__ import annotations
-
 import gc
 import resource
 import statistics

@@ -1,7 +1,5 @@
 """Creation of a figure from a long chain of nodes, compared with a chain of half the length."""
 
-from __future__ import annotations
-
 import numpy as np
 from measure import interleaved, report
 

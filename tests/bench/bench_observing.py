@@ -4,8 +4,6 @@ a key determines whether the picture is out of date. Both must be cheap compared
 whole frame of the window is printed as well, at 320 x 200 with all panels.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from measure import interleaved, median_ratio, report
 

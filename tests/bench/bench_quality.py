@@ -5,8 +5,6 @@ the same drafts in alternating processes. Times are processor times, because sof
 all cores.
 """
 
-from __future__ import annotations
-
 import os
 import statistics
 import subprocess

@@ -3,8 +3,6 @@ Both draw all faces at 1280 x 720, one sample per pixel, with the same fragment 
 frame is the same mesh posed before.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from measure import interleaved, report
 

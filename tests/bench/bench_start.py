@@ -17,8 +17,6 @@ Limits, in ms of processor time of the main thread on two 2.5 GHz cores:
   these; it spends 35 more because it uses Pillow instead of isal.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import resource

@@ -3,8 +3,6 @@ The bundled body has a new pose in each frame, at 1280 x 720 with one sample. Fr
 that the speed of the machine cancels out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

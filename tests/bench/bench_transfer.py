@@ -6,8 +6,6 @@ without options and with ``--scale axes``; ``scans``, meshes as produced by scan
 time of each step.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 

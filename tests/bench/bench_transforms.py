@@ -2,8 +2,6 @@
 channels is compared with a loop that evaluates one channel at a time with numpy.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from measure import interleaved, report
 

@@ -3,8 +3,6 @@ recorder with a sink that drops the frames; encoding uses the video sink with st
 video has 1280 x 720 pixels, 4 samples per pixel, and H.264 at the default quality.
 """
 
-from __future__ import annotations
-
 import statistics
 import tempfile
 from collections.abc import Callable

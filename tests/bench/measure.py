@@ -1,7 +1,5 @@
 """Measurements for all benchmarks: interleaved rounds, ratios, processes."""
 
-from __future__ import annotations
-
 import os
 import statistics
 import subprocess

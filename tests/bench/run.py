@@ -1,7 +1,5 @@
 """Runner of all or the named benchmarks: ``python tests/bench/run.py start skinning``."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path

@@ -5,8 +5,6 @@ proportions than the fox. Run as a program, the module writes them as .obj, and 
 template as .bvh: python tests/bench/scan_targets.py FOLDER
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path

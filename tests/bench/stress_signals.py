@@ -9,8 +9,6 @@ are printed with the program's output, and the exit code is then 1. PYTHONPATH s
 of the viewer.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import random

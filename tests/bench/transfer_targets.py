@@ -3,8 +3,6 @@ template placed and posed to match it, and the matrix of that placement, so that
 compared with or without the search for an alignment.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Fixtures for command tests."""
 
-from __future__ import annotations
-
 import pytest
 from app.tiny import write_rig
 from commands.drawn_motions import anim_text

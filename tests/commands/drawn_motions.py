@@ -1,7 +1,5 @@
 """Motions for the tests of ``viewer render``, and their images."""
 
-from __future__ import annotations
-
 import numpy as np
 from PIL import Image
 

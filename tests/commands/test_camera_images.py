@@ -1,7 +1,5 @@
 """``viewer render --view`` and ``--cameras`` with images of the cameras of a capture."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from formats.filmed_capture import CENTER, SIDE, write_filmed

@@ -1,7 +1,5 @@
 """Shell completion, tested in real shells."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re
@@ -11,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Self
 
 import pytest
 
@@ -182,7 +181,7 @@ class Terminal:
         )
         os.close(inside)
 
-    def __enter__(self) -> Terminal:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

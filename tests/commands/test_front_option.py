@@ -1,7 +1,5 @@
 """The option --front and the first view, equal in images, images with panels, and the window."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

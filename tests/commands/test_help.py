@@ -1,7 +1,5 @@
 """Help texts, with all options explained in groups that follow the order of work."""
 
-from __future__ import annotations
-
 import argparse
 from importlib import import_module
 

@@ -1,7 +1,5 @@
 """``viewer help``: topics, pages as text or formatted, options of a command, and unknown topics."""
 
-from __future__ import annotations
-
 import io
 import sys
 

@@ -1,7 +1,5 @@
 """``viewer info`` of captures and morphs: positions, up axis, and missing frames."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

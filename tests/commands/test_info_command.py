@@ -1,7 +1,5 @@
 """``viewer info``: hand-counted values as text and as JSON."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The options --joint-map and --save-joint-map."""
 
-from __future__ import annotations
-
 import pytest
 from faults import told
 from formats.bvh_text import person

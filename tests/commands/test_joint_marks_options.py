@@ -1,7 +1,5 @@
 """The options --xray, --joint-names, --joint-axes and --bones: rendering and messages."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.tiny import write_rig

@@ -1,7 +1,5 @@
 """``viewer render --view`` with lens distortion that is ignored and reported with its size."""
 
-from __future__ import annotations
-
 import pytest
 from formats.capture_files import points, write_frames
 

@@ -1,7 +1,5 @@
 """``viewer lint``: lines for editors, JSON for programs, and exit codes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

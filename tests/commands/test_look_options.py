@@ -1,7 +1,5 @@
 """Options of the look: where the camera aims, opacity, colours of numbers, and their legend."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

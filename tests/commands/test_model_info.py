@@ -1,7 +1,5 @@
 """``viewer info`` of body models: hand-calculated values as text and as JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """The option ``--model-path``: a remembered folder of body models, and models opened by name."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The option ``--shape`` for bodies and morphs, by name and as a list."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.tiny import skin_text, write_rig

@@ -1,7 +1,5 @@
 """``viewer render --overlay`` and ``--video``: people drawn over the video of their camera."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

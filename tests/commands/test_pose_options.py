@@ -1,7 +1,5 @@
 """Invalid shape, pose and skinning options, refused in one line with the expected value."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

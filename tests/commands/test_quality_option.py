@@ -1,7 +1,5 @@
 """``--quality`` of drawn pictures: the default, and refused combinations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.tiny import write_rig

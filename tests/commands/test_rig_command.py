@@ -1,7 +1,5 @@
 """``viewer rig``, which turns a bare mesh into an animatable figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Scalar quantities on the command line: rendering, messages, and refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.tiny import write_rig

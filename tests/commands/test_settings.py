@@ -1,7 +1,5 @@
 """Options made from fields of a settings class, and settings made from options."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.commands._settings import add_settings, settings_of, stated

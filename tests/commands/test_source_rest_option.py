@@ -1,7 +1,5 @@
 """The option for the rest pose of a skeleton that drives a figure."""
 
-from __future__ import annotations
-
 import argparse
 
 import pytest

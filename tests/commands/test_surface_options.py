@@ -1,7 +1,5 @@
 """Options of surfaces: the drawn shading, and refused values."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PIL import Image

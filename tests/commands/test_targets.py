@@ -1,7 +1,5 @@
 """Outputs of all commands, which replace existing files only with --force, and never inputs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

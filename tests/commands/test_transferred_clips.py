@@ -1,7 +1,5 @@
 """``viewer rig --clip``, which transfers motions of the template to the rigged mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """``viewer FILES`` without a display, which prints one line and writes an image."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.tiny import write_rig

@@ -1,7 +1,5 @@
 """Every output format on a full disk, with failures at each write and each fill level."""
 
-from __future__ import annotations
-
 import errno
 import os
 from itertools import count

@@ -1,7 +1,5 @@
 """Commands that write files, one per output format, and their inputs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -21,8 +21,6 @@ In the file, ``cases`` holds the names, and for each name there are ``name/verti
   to an absent vector, unless ``flat_hand_mean``.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import pickle

@@ -1,7 +1,5 @@
 """Description of diagnostics as JSON."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sentences of all diagnostics: their codes, and the values that calls supply for them."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

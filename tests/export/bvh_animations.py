@@ -1,7 +1,5 @@
 """Animations for BVH exports, and comparison of joint positions with an independent reader."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import faults

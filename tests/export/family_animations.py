@@ -1,7 +1,5 @@
 """Animations of synthetic SMPL-family bodies, and explicit formulas for their vertices."""
 
-from __future__ import annotations
-
 import numpy as np
 from plain_smpl import rotation, smpl_forward
 

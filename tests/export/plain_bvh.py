@@ -3,8 +3,6 @@ requires the line layout expected by Blender's importer: "{" on its own line, th
 CHANNELS.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

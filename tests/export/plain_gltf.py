@@ -3,8 +3,6 @@
 It checks the rules of the specification and evaluates vertices and joints in double precision.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

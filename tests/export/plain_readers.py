@@ -1,7 +1,5 @@
 """Readers of ``.obj``, ``.mtl`` and binary ``.ply`` that share no code with the exporters."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 from types import SimpleNamespace

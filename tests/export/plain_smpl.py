@@ -1,7 +1,5 @@
 """The forward pass of the SMPL family as in its paper, with explicit loops (Loper et al. 2015)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A figure with every feature that exporters handle: seams, two materials, joints, raw weights."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rig.figure import Figure

@@ -1,7 +1,5 @@
 """Small figures as text files for the command line, with hand-calculated results."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from formats.pig_text import write as write_pig

@@ -1,7 +1,5 @@
 """A chain of joints with bones and a mesh that grow with a blend shape by known lengths."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rig.blendshapes import BlendShapes, JointRegressor

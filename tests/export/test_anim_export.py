@@ -1,7 +1,5 @@
 """Export to .anim with the keys of the clip, or with one key per frame and a measured error."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """BVH exports of figures with several roots or a rotated or scaled rest pose, and their angles."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The one door of exports: which parts of a selection are written, to which files, or refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from export.stretched import chain

@@ -1,7 +1,5 @@
 """The BVH writer, compared with an independent reader for bodies, .skel-style rigs and others."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

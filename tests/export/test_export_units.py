@@ -1,7 +1,5 @@
 """Figures in centimetres and other units, written by every exporter that handles units."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Motions of keyed files, written as frames at the rate of the keys."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

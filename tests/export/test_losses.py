@@ -1,7 +1,5 @@
 """Reported export losses, which are the true maximum over all frames, joints and vertices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Materials in exported files: every field of glTF and of the PBR extension of .mtl."""
 
-from __future__ import annotations
-
 import io
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Pose files: everything in .json, and what .txt cannot hold, with the true difference."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import faults

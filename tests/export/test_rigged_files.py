@@ -1,7 +1,5 @@
 """Files of rigged meshes, written completely or not at all, and correctives in each format."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

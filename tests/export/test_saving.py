@@ -1,7 +1,5 @@
 """Exporters with a full disk, a locked folder or an unusual target, which must not lose files."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

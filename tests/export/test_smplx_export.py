@@ -1,7 +1,5 @@
 """SMPL-X arrays for retargeting to robots: keys, values, and conversions; options of arrays."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import faults

@@ -1,7 +1,5 @@
 """Small files for tests of errors, and functions that read them tolerantly."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from faults import Fault, fault_of

@@ -1,7 +1,5 @@
 """Small BVH files as text, for tests of the reader."""
 
-from __future__ import annotations
-
 from faults import Fault, warnings_of
 
 from viewer.diagnostics import Phrase

@@ -1,7 +1,5 @@
 """Folders in the layout of EasyMocap for tests."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

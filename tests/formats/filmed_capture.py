@@ -1,7 +1,5 @@
 """A tiny capture with a calibrated camera and its images."""
 
-from __future__ import annotations
-
 import numpy as np
 from formats.capture_files import points, write_frames
 from PIL import Image

@@ -1,7 +1,5 @@
 """Skeleton and motion files with one error each, and the reported error."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from faults import Fault

@@ -1,7 +1,5 @@
 """``.npz`` and ``.npy`` files as bytes for tests, and functions that read them."""
 
-from __future__ import annotations
-
 import io
 import struct
 import tracemalloc

@@ -1,7 +1,5 @@
 """Pickles assembled opcode by opcode, including forms that current writers do not use."""
 
-from __future__ import annotations
-
 import struct
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ two vertices have two texture coordinates each. Vertex 4 belongs to no triangle.
 multiples of a quarter, for hand calculation.
 """
 
-from __future__ import annotations
-
 import shutil
 from itertools import pairwise
 

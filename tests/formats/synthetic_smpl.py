@@ -5,8 +5,6 @@ represents exactly, so a reader that converts to float32 (as the package smplx d
 model.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

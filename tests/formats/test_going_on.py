@@ -1,7 +1,5 @@
 """Readers that continue after errors and replace invalid values by neutral ones."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Readers that continue after errors, with one error of each kind, its location and its effect."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Checks of output paths: refused targets, and several paths of one file."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

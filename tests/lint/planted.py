@@ -1,7 +1,5 @@
 """Figures and motions with one planted error each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

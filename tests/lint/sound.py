@@ -1,7 +1,5 @@
 """Small valid figures and motions for tests that introduce one error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

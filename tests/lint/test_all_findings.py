@@ -1,7 +1,5 @@
 """Files with many errors, each of which is found once at its line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bind matrices: singularity, and other findings despite a singular matrix."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

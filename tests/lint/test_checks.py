@@ -1,7 +1,5 @@
 """The check registry, lint codes, progress, and scene locations of findings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Frame numbers of findings in keyed clips, which match the timeline for any sampling rate."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

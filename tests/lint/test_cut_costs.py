@@ -1,7 +1,5 @@
 """Influence limit error if some joints or vertices are unusable."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

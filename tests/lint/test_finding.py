@@ -1,7 +1,5 @@
 """Inputs of the checks: figure size and default limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from lint.sound import column, legs, make_mesh

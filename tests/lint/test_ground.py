@@ -1,7 +1,5 @@
 """Ground detection and sinking feet, with synthetic motions and their expected findings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Feet that were planted or held do not slide: detector and limits are those of the planner."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

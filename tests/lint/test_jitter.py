@@ -1,7 +1,5 @@
 """Estimated noise of motions, compared with its known size; jumps and gaps are not noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Jumps of the root that are slower than the limit of all joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from lint.sound import column

@@ -1,7 +1,5 @@
 """Surfaces with invalid triangles, which may or may not be treated as closed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Values in findings, and valid borderline figures."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

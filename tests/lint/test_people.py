@@ -1,7 +1,5 @@
 """Swapped IDs of people, and tracks that continue with a different ID."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

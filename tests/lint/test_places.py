@@ -1,7 +1,5 @@
 """Scene locations of findings for posed figures, and their facing directions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from lint.sound import column, keypoints, scene_of

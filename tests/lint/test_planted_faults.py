@@ -1,7 +1,5 @@
 """Single errors introduced into valid figures and motions, and their codes and locations."""
 
-from __future__ import annotations
-
 import pytest
 from lint.planted import FAULTS, captured, findings_of, keyed, moving
 from lint.sound import (

@@ -1,7 +1,5 @@
 """Errors introduced into files, which are reader errors and reader warnings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

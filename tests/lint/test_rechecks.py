@@ -1,7 +1,5 @@
 """Repeated checks of an open scene and its files: duplicates, locations, and changed files."""
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import replace

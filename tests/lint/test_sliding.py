@@ -1,7 +1,5 @@
 """Sliding feet: drifts are found; swings close to the ground, landings and steps are not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

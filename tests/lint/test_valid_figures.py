@@ -1,7 +1,5 @@
 """Valid figures without errors or warnings, and the known errors in real files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

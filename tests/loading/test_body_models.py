@@ -1,7 +1,5 @@
 """Body models that are chosen by the model and gender which the files of motions state."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

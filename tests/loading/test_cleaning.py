@@ -1,7 +1,5 @@
 """Clean-up of a scene: order of changes, notes, merging of people, and refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feet of figures driven by a file, and the option ``--feet``."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from exporting import export_frames

@@ -1,7 +1,5 @@
 """Faults of figures: every command that loads a file prints what ``viewer lint`` prints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

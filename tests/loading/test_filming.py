@@ -1,7 +1,5 @@
 """Videos and folders of images for the cameras of captures: camera, rate, size, and refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

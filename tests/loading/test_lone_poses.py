@@ -1,7 +1,5 @@
 """Single poses of bodies without a figure: they open like motions of one frame."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

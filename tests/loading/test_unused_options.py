@@ -1,7 +1,5 @@
 """Options that do not apply to the opened files and are reported."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -3,8 +3,6 @@ with ``<!-- table: NAME -->`` and ``<!-- end -->``. ``make manual`` writes the t
 pages, ``test_pages.py`` fails if one is out of date.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

@@ -1,7 +1,5 @@
 """Small files of the right kinds for all names that the commands of the manual use."""
 
-from __future__ import annotations
-
 import pickle
 import shutil
 import zipfile

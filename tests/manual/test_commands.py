@@ -1,7 +1,5 @@
 """Every command of README and manual runs, with small files in place of the reader's own."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The pages of the manual, which must be complete, up to date, and have working commands."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Small images for videos, and an independent reader of video frames."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cached arrays, which are used only for exactly the bytes from which they were computed."""
 
-from __future__ import annotations
-
 import os
 import struct
 import threading

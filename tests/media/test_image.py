@@ -1,7 +1,5 @@
 """Batched decoding of images: contents, errors in order, and a common limit of pixels."""
 
-from __future__ import annotations
-
 import io
 import threading
 import warnings

@@ -1,7 +1,5 @@
 """Numbered images and contact sheets."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PIL import Image

@@ -1,7 +1,5 @@
 """Round trips of videos: colours, sizes, rates and transparency."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Videos that are refused, aborted or too large for the disk, and leave no partial files."""
 
-from __future__ import annotations
-
 import os
 import stat
 import subprocess

@@ -1,7 +1,5 @@
 """Write errors of videos at every write and fill level: one line is printed and no file is left."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os

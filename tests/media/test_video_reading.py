@@ -1,7 +1,5 @@
 """Frames of a video by time: sequential, in any order, rotated, outside the video, and damaged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from media.small_videos import write

@@ -1,7 +1,5 @@
 """Fixtures for rendering tests."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.rendering.offscreen import Offscreen

@@ -1,7 +1,5 @@
 """Figures for rendering tests: random figures with any number of joints, and simple solids."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

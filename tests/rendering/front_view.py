@@ -3,8 +3,6 @@
 Squares with a material are lit only by the studio.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Golden images of motion: instances, captured points, motion paths, and calibrated cameras."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -2,8 +2,6 @@
 because text looks different with every version of Pillow; see test_legend_picture.py.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

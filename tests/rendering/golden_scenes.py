@@ -1,7 +1,5 @@
 """The contents of the golden images of 300 x 300 pixels, with one function per image."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache

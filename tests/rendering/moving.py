@@ -1,7 +1,5 @@
 """An arm that moves along x with a missing frame, and a moving camera."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

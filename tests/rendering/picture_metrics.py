@@ -1,7 +1,5 @@
 """Comparison of images, exact for one rasteriser and structural between two."""
 
-from __future__ import annotations
-
 import numpy as np
 
 SAME_DIFFERENCE = 2  # maximum difference in any channel, of 255

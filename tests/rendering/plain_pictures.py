@@ -1,7 +1,5 @@
 """Small images without perspective or shading, and queries of their covered pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rendering.camera import Camera

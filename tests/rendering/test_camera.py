@@ -1,7 +1,5 @@
 """The orbit camera: projected points, calculated by hand and with plain numpy."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The colour map, in which perceived lightness rises from one end to the other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Cameras that frame a whole motion, also as a turntable, and the target of following cameras."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Comparison with golden images, and tests of the comparison."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pixels of materials: metallic-roughness formula, normal maps, opacity, sides, and matcaps."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

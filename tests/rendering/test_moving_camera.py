@@ -1,7 +1,5 @@
 """Moving calibrated cameras: matrices over time, frusta, and release from the calibrated view."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Images without a window: sizes, samples, several contexts, threads, and memory."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Palettes with distinguishable neighbours, also for colour vision deficiencies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Body parts in distinct colours, hidden parts, and reduced meshes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Picking at known positions: actor, joint, triangle, keypoint and scene position."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Calibrated cameras, for which points project to the pixels of OpenCV's formula."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Single pixels, compared with hand calculation: orientation, colours, and transparency."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pixels of display options: shading, grid, background, boxes, highlights, and samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Projected points in front of and behind a camera on an axis, calculated by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The recorder: frames that match single images, unchanged scenes, and a clean end at any time."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mapping of values to colours, with ranges that are robust to outliers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.front_view import alone, front_view, grid_figure

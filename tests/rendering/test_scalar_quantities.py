@@ -1,7 +1,5 @@
 """Scalar quantities: values on the GPU, their range, and rendered colours."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

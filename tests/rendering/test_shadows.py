@@ -1,7 +1,5 @@
 """Shadows on ground and figures, contact shadows, ambient occlusion, and averaged passes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

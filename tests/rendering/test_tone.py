@@ -1,7 +1,5 @@
 """Scene-linear light on the screen, with the tone curve and hemisphere ambient light."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Translucent actors, drawn as one layer regardless of surfaces inside or behind them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import scene_of, sphere, square

@@ -1,7 +1,5 @@
 """Waiting for the driver, during which other threads run."""
 
-from __future__ import annotations
-
 import threading
 import time
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Figures with keyed transforms, and a plain evaluator of glTF's interpolation, key by key."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

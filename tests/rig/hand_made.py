@@ -1,7 +1,5 @@
 """Small rigs for tests of the maths, and a simple reference implementation of skinning."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cycles among parents, compared with a traversal from every joint."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

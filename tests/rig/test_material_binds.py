@@ -1,7 +1,5 @@
 """Materials changed by the weights of expressions, compared with hand calculation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cached results: count, lifetime, and use by several threads."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import weakref

@@ -1,7 +1,5 @@
 """World and skinning matrices of a pose: correctness, single computation, and invalidation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

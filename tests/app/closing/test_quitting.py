@@ -1,7 +1,5 @@
 """Questions before quitting or opening files loses a running job or unsaved edits."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import weakref

@@ -1,7 +1,5 @@
 """Poses made by hand count as unsaved edits until they are saved, undone, reset or overridden."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from imgui_bundle import imgui

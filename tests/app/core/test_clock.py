@@ -1,7 +1,5 @@
 """The scene clock: scene time as a function of wall-clock time in every mode."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

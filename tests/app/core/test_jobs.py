@@ -1,7 +1,5 @@
 """Background work that counts its steps: progress, output lines, errors, and cancellation."""
 
-from __future__ import annotations
-
 import threading
 
 from viewer.app.core.jobs import ThreadJob

@@ -1,7 +1,5 @@
 """The bounded message log with repetition counts, its window, and message positions in the view."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Switching the space of captured people: their positions, cameras, time and selection."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Window state: the core and the state of features."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 
 from app.driver import make_state

@@ -1,7 +1,5 @@
 """Typing into fields: focus, Tab, Escape, calculations, and invalid input."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

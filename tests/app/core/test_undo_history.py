@@ -1,7 +1,5 @@
 """Changes detected by the undo history, and what undo restores."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

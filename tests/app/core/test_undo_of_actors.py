@@ -1,7 +1,5 @@
 """Undo restores the set of actors, not only their poses."""
 
-from __future__ import annotations
-
 from app.captured import people
 
 from viewer.rig.scene import Actor

@@ -1,7 +1,5 @@
 """Camera fit to the unobstructed part of the view, and the ground under changing shapes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app import box_body

@@ -1,7 +1,5 @@
 """Projection between scene and window, compared with hand-calculated pinhole projections."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """A clip of the tiny rig in the Curves panel, and positions in its plot."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

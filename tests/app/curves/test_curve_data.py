@@ -1,7 +1,5 @@
 """Curves of a motion as plotted: names, numbering, and exact values on frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal

@@ -1,7 +1,5 @@
 """The Curves panel: keys of whole poses, opened files, and motions without keys."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.curves.plotted import ARM_X, SIZE, _arm, _center, _clip, _pick, _type_into, clip_text

@@ -1,7 +1,5 @@
 """The Curves panel: keys, tangents and modes edited by mouse and keyboard; read-only curves."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

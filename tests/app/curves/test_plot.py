@@ -1,7 +1,5 @@
 """The lines of the plot in the Curves panel."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from app.curves.plotted import ARM_X

@@ -1,7 +1,5 @@
 """Undo and redo of key edits restore time, curve and pose together."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses and images dropped on an open figure, and folders dropped on the window."""
 
-from __future__ import annotations
-
 import pytest
 from formats.pig_text import write as write_pig
 from PIL import Image

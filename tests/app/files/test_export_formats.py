@@ -1,7 +1,5 @@
 """Export formats: the properties that each keeps or omits, and the suffix of the file name."""
 
-from __future__ import annotations
-
 from viewer.app.files.files import Files
 from viewer.app.files.motion_export import FOLDER, motion_formats, pose_formats, unsuited_formats
 

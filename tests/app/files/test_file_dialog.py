@@ -1,7 +1,5 @@
 """The file dialog: folders, several files, cancelling, and unreadable folders."""
 
-from __future__ import annotations
-
 import pytest
 from app.tiny import write_rig
 

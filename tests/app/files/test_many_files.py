@@ -1,7 +1,5 @@
 """Files that are opened one after the other, as on a long day: nothing accumulates."""
 
-from __future__ import annotations
-
 import gc
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """Motion export from the window: in the background, never overwriting open files."""
 
-from __future__ import annotations
-
 import json
 import re
 import threading

@@ -1,7 +1,5 @@
 """Opening files in the window: replaced and retained state, and messages."""
 
-from __future__ import annotations
-
 import json
 import threading
 

@@ -1,7 +1,5 @@
 """Files kept between runs: whatever a crash or a bad disk leaves in them, the program starts."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes with findings, and queries of the Lint panel."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

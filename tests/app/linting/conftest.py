@@ -1,7 +1,5 @@
 """Fixtures for Lint panel tests."""
 
-from __future__ import annotations
-
 import pytest
 from app.linting.checked_scenes import SIZE, finish
 from lint.sound import scene_of

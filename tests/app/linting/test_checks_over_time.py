@@ -1,7 +1,5 @@
 """Checks in the window while figures move: stale findings, cancellation, and other running jobs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

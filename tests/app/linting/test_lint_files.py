@@ -1,7 +1,5 @@
 """The Lint panel: agreement with ``viewer lint``, which reads files again, and jumps to gaps."""
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The Lint panel: checks, the list of findings, jumps to findings, marks, and stale findings."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The manual window: opened from the menu, read, and closed."""
 
-from __future__ import annotations
-
 import pytest
 from imgui_bundle import imgui
 

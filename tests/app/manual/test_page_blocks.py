@@ -1,7 +1,5 @@
 """Pages of the manual as blocks: prose, lists, code and tables."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.app.manual import Block, blocks_of

@@ -1,7 +1,5 @@
 """Fuzzy matching: words rank above letters, prefixes above infixes, and all words must match."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.app.palette import ranked, score

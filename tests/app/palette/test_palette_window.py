@@ -1,7 +1,5 @@
 """The command palette, used by keyboard alone and by mouse."""
 
-from __future__ import annotations
-
 import pytest
 from imgui_bundle import imgui
 

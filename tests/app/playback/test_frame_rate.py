@@ -1,7 +1,5 @@
 """The field "Frames per second": undoable for captures, and used to number keyed frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.captured import dots, people, walk

@@ -1,7 +1,5 @@
 """Scrubbing snaps to whole frames unless Alt is held, on the timeline and in the curves."""
 
-from __future__ import annotations
-
 import pytest
 from app.captured import people
 from app.curves.plotted import SIZE, _at, _center, clip_text

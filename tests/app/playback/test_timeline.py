@@ -1,7 +1,5 @@
 """The timeline with mouse and keys: play, step, scrub, range, tracks, and captures being read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

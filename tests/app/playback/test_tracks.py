@@ -1,7 +1,5 @@
 """Timeline tracks: minimum bar width, ruler labels and track colours."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.captured import people, walk

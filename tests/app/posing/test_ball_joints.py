@@ -1,7 +1,5 @@
 """Ball joints of body models: rotation vectors, raw pose values and placement."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

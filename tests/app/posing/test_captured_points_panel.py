@@ -1,7 +1,5 @@
 """The Joints panel of captured keypoints: description, names and confidences."""
 
-from __future__ import annotations
-
 import pytest
 from app.captured import NAMES, dots
 from imgui_bundle import imgui

@@ -1,7 +1,5 @@
 """Sliders of expressions that change materials."""
 
-from __future__ import annotations
-
 from formats.vrm.swinging import swinging
 
 

@@ -1,7 +1,5 @@
 """Handles in the view, dragged by a synthetic mouse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.posing_rigs import SIZE, arm_figure, arm_scene, around, drag_along, joint_seen

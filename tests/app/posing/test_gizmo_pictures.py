@@ -3,8 +3,6 @@
 ``make golden NAME…`` re-renders them; review them before committing.
 """
 
-from __future__ import annotations
-
 import pytest
 from app.posing_rigs import around, joint_seen
 from app.test_panel_pictures import _compare, _is_like

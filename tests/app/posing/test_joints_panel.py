@@ -1,7 +1,5 @@
 """The Joints panel: sliders, limits, units, resets and the filter."""
 
-from __future__ import annotations
-
 import math
 import time
 

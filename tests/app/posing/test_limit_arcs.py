@@ -1,7 +1,5 @@
 """Limit arcs, which end at the positions of the bone at the limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.posing_rigs import arm_figure

@@ -1,7 +1,5 @@
 """The Move tool: two-link chains in closed form, arrows, and translations of roots and figures."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.posing_rigs import arm_figure

@@ -1,7 +1,5 @@
 """Copying and saving poses; exporting figures."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

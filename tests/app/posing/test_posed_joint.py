@@ -1,7 +1,5 @@
 """A joint's position and axes in the scene, and its observed rotation axis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.posing_rigs import arm_figure

@@ -1,7 +1,5 @@
 """Rotation rings and their effect, for a camera looking along -z at the joint."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Shape panel: coefficients, random shapes, and hand-calculated measurements of a box body."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

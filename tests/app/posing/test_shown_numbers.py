@@ -1,7 +1,5 @@
 """Numbers shown in the window: angles in the panel's unit, and no negative zero."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

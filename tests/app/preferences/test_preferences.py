@@ -1,7 +1,5 @@
 """Preferences: applied while the window runs, stored, validated when read, and reset."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, replace
 

@@ -1,7 +1,5 @@
 """Recording from the window: the dialog, output files, progress, and cancelling."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from imgui_bundle import imgui

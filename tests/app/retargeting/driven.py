@@ -1,7 +1,5 @@
 """A scene whose figure is driven by a capture with an unrecognised elbow name and a tail."""
 
-from __future__ import annotations
-
 from rig.retargeting.two_people import BODY, HIK, figure_of, moving
 
 from viewer.rig.retargeting.drive import Drive

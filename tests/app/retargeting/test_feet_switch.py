@@ -1,7 +1,5 @@
 """The switch for planted feet of driven figures in the Actors panel."""
 
-from __future__ import annotations
-
 import threading
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The Joint match panel: edits are retargeted immediately, undone, saved and loaded."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Fixtures for Rig panel tests."""
 
-from __future__ import annotations
-
 import pytest
 from app import rig_scene
 from app.rig_scene import TRUE

@@ -1,7 +1,5 @@
 """Queries and steps for tests of the Rig panel."""
 
-from __future__ import annotations
-
 from viewer.app.rigging.results import plays_motion, plays_trial
 from viewer.app.rigging.rigging import Rigging
 from viewer.rig.geometry.transform import apply_transform

@@ -1,7 +1,5 @@
 """Manual alignment of the template: gizmo, typed values, landmarks."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 

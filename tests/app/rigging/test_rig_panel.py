@@ -1,7 +1,5 @@
 """The Rig panel, operated by mouse and keys: choose, align, match, run, compare, save."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Golden images of the Rig panel: a mesh with its template, and the result with its report."""
 
-from __future__ import annotations
-
 import pytest
 from app import rig_scene
 from app.test_panel_pictures import _compare, _shown

@@ -1,7 +1,5 @@
 """Rig panel: settings, templates from files, messages, and saved results."""
 
-from __future__ import annotations
-
 import threading
 import time
 from dataclasses import replace

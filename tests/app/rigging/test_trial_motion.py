@@ -1,7 +1,5 @@
 """Trial motion: each joint in turn bends within its limits and returns to the initial pose."""
 
-from __future__ import annotations
-
 import numpy as np
 from app.tiny import write_rig
 

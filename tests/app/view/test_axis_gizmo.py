@@ -1,7 +1,5 @@
 """The axis gizmo: a click rotates the camera to an axis in a fifth of a second; a drag orbits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Outlines and names of objects that a click would select, and the pick distance of joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The Display, Camera, Lights and Stats panels: every widget changes the option that it names."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Clicks in the view: activating actors, selecting joints, aiming the camera."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Show cameras and Image brightness of the Camera panel."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from formats.filmed_capture import write_filmed

@@ -1,7 +1,5 @@
 """The Skinning panel: method, influence limit, normalising."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The View menu, its keys, and the check boxes of the Display panel."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.app.view.display_panel import JOINT_TOGGLES

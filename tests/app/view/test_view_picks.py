@@ -1,7 +1,5 @@
 """Hovering over a surface, clicks on vertices, and joints visible through the skin."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

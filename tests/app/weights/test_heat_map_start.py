@@ -1,7 +1,5 @@
 """The initial heat map, which shows a joint or field that is not 0 everywhere."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Vertex panel: the skinning terms of a pinned vertex, its lines in the view, and unpinning."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Weights panel: scalar colours, range and legend, and vertex tools."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

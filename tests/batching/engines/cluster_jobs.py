@@ -1,7 +1,5 @@
 """Jobs for workers of test clusters."""
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Values of --cluster."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.batching.engines._cluster_text import parse_cluster

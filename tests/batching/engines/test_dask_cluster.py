@@ -1,7 +1,5 @@
 """Batches on Dask workers, with real schedulers and processes, some of which are killed."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import signal

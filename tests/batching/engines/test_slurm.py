@@ -1,7 +1,5 @@
 """SLURM jobs, with substitutes for SLURM's commands that start real workers on this machine."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

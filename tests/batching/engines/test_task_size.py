@@ -1,7 +1,5 @@
 """Number of items per task, from their times."""
 
-from __future__ import annotations
-
 from viewer.batching.engines._task_size import TaskSize
 
 

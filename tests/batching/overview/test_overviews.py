@@ -1,7 +1,5 @@
 """Overviews: order of their content, and pages that do not execute untrusted text."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """Submissions: selection of the compared files, and untrusted archives."""
 
-from __future__ import annotations
-
 import io
 import stat
 import struct

@@ -3,8 +3,6 @@
 triangles as the bundled figure has at 1280 x 720, four samples per pixel, without reading any file.
 """
 
-from __future__ import annotations
-
 import io
 import sys
 from pathlib import Path

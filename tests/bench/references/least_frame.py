@@ -6,8 +6,6 @@ and the picture is read as OpenGL stores it. Without options, textures or error 
 lower bound for the same driver, not a goal.
 """
 
-from __future__ import annotations
-
 import moderngl
 import numpy as np
 

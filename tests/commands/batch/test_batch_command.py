@@ -1,7 +1,5 @@
 """``viewer batch``: results that equal single runs, exit codes, and early refusals."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Graphics devices of workers that render."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 from viewer.batching.items import Item

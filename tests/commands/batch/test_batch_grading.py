@@ -1,7 +1,5 @@
 """Grading: ``viewer batch diff`` of folders and archives against one reference."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import os

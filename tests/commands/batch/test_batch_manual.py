@@ -1,7 +1,5 @@
 """Commands of the manual's page about batches."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

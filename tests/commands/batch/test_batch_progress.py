@@ -1,7 +1,5 @@
 """Progress of a batch: rate and time left, in a terminal and without one."""
 
-from __future__ import annotations
-
 import io
 import re
 import sys

@@ -1,7 +1,5 @@
 """Number of workers of a batch: as requested, as assigned by SLURM, at most one per item."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Identity of functions: changes that --resume must detect, and differences that it must ignore."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

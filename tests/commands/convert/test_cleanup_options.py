@@ -1,7 +1,5 @@
 """Clean-up options of ``viewer convert``: values, errors, printed changes, and written frames."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``viewer convert`` with captures: keypoints without bodies, absent and untracked people."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

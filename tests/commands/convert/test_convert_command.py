@@ -1,7 +1,5 @@
 """``viewer convert``: requested outputs, verified by independent readers."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``viewer convert`` with motions: exporters, frames, files, and refusals."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``viewer convert`` of one pose, at a frame or time, or of static figures."""
 
-from __future__ import annotations
-
 import json
 import math
 

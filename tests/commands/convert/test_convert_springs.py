@@ -1,7 +1,5 @@
 """``viewer convert --bake-springs``: simulated rotations of hair in written motions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from formats.vrm.swinging import HAIR, swinging

@@ -1,7 +1,5 @@
 """Single poses of captures as files, with y up in glTF and a recorded up axis in other formats."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

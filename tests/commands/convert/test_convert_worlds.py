@@ -1,7 +1,5 @@
 """Round trips of upside-down captures through ``viewer convert``."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

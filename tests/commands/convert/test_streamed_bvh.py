@@ -1,7 +1,5 @@
 """Conversion of long BVH files part by part, compared with conversion of the whole file."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np

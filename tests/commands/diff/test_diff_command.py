@@ -1,7 +1,5 @@
 """``viewer diff``: known differences, exit codes, the table and JSON."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pairing of figures by ``viewer diff``."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.commands.diff import pair_actors

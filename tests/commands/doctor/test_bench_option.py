@@ -1,7 +1,5 @@
 """``viewer doctor --bench``: its measurements, with few repetitions."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.commands import doctor

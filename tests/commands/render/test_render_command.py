@@ -1,7 +1,5 @@
 """``viewer render``: the effects of all options, and protection of existing files."""
 
-from __future__ import annotations
-
 import io
 import math
 import os

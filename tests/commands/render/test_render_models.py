@@ -1,7 +1,5 @@
 """``viewer render`` of body models, in which each option changes the expected part of the image."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

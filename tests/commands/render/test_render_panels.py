@@ -1,7 +1,5 @@
 """``viewer render --panels``: pictures of the whole interface."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from app.tiny import write_rig

@@ -1,7 +1,5 @@
 """``viewer render`` of motions as videos with all frames at their rate and one camera."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

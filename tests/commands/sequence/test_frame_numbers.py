@@ -1,7 +1,5 @@
 """Frame numbers on the command line, which are consistent in render, convert and info."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

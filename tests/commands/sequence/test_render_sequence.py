@@ -1,7 +1,5 @@
 """``viewer render`` of motions as numbered images, videos and contact sheets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Round trips of figures through ``.glb``: parts, colours, textures and materials."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """Animations that keep their keys in glTF, checked by a small independent evaluator."""
 
-from __future__ import annotations
-
 import json
 import math
 import struct

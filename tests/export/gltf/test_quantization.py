@@ -1,7 +1,5 @@
 """Quantised glTF files: round trips, and their printed errors."""
 
-from __future__ import annotations
-
 import json
 import struct
 from dataclasses import replace

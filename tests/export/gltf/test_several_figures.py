@@ -1,7 +1,5 @@
 """Several figures and cameras in one glTF file, read by an evaluator of the specification."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sampled motions of several figures in one glTF file, compared with closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

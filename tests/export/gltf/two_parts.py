@@ -1,7 +1,5 @@
 """A small figure of two parts with keyed animations of every interpolation."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rig.blendshapes import BlendShapes

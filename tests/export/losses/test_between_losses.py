@@ -1,7 +1,5 @@
 """Reported losses between frames of keyed curves, as the maximum over all times."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

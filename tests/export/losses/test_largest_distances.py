@@ -1,7 +1,5 @@
 """The search for the vertex with the largest difference, compared with brute force."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Characters against the specification: found by lint, and never written again as they were."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """VRM characters written back with all references to the same objects as in the original."""
 
-from __future__ import annotations
-
 import json
 import struct
 from dataclasses import replace

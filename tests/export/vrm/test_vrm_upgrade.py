@@ -1,7 +1,5 @@
 """VRM 0.x characters written as VRM 1.0, compared with values computed from both specifications."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

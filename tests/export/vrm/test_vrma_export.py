@@ -1,7 +1,5 @@
 """Motions of humanoids as VRM animations that are read back onto a character."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

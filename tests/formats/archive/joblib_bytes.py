@@ -1,7 +1,5 @@
 """Joblib files as bytes, written without joblib."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Opening of pickles, ``.npz`` and ``.npy``, and access to their values."""
 
-from __future__ import annotations
-
 import io
 import pickle
 from pathlib import Path

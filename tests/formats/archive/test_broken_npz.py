@@ -1,7 +1,5 @@
 """Archives with false headers or damage, which are refused in one line with little memory."""
 
-from __future__ import annotations
-
 import io
 import random
 import struct

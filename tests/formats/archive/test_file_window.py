@@ -1,7 +1,5 @@
 """Large pickles, of which only the required bytes are read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

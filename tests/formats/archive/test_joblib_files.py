@@ -1,7 +1,5 @@
 """Uncompressed and compressed joblib files, in which arrays follow their descriptions."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import lzma

@@ -1,7 +1,5 @@
 """Hostile joblib files: false sizes, bombs and damage, refused in one line with little memory."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import lzma

@@ -1,7 +1,5 @@
 """Lazy and exact reading of ``.npz`` and ``.npy`` files, and refusal of inconsistent files."""
 
-from __future__ import annotations
-
 import struct
 import warnings
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Refusals of BVH files given as text."""
 
-from __future__ import annotations
-
 from faults import Fault, refusal_of
 from formats.bvh_text import read
 

@@ -1,7 +1,5 @@
 """Broken ``.bvh`` files with their messages, and thousands of mutations."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

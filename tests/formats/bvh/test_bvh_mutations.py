@@ -1,7 +1,5 @@
 """BVH files with mutations, truncation or inserted words, which load or are refused in one line."""
 
-from __future__ import annotations
-
 import random
 import re
 import tracemalloc

@@ -1,7 +1,5 @@
 """The BVH reader: all rotation orders, positions on any joint, quirks, and estimates."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

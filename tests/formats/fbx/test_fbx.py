@@ -1,7 +1,5 @@
 """The ``.fbx`` reader: contents, units and axes, and failures of the child process."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 

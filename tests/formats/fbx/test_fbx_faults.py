@@ -1,7 +1,5 @@
 """Invalid numbers in ``.fbx``: one line with the file and the place."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 

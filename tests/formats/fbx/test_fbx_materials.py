@@ -1,7 +1,5 @@
 """Materials of ``.fbx``: values and the textures that replace them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Curves of ``.fbx``: extrapolation, fast rotations, weights of blend shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The child process that reads ``.fbx`` files, which keeps the library's objects until it exits."""
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

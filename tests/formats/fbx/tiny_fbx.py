@@ -1,7 +1,5 @@
 """A hand-written ASCII ``.fbx``: a strip of two quads that bends at its second joint."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

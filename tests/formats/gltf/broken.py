@@ -1,7 +1,5 @@
 """Broken variants of a complete document: truncated, or with changed JSON values."""
 
-from __future__ import annotations
-
 import copy
 import json
 import random

@@ -1,7 +1,5 @@
 """Small glTF files that are built array by array."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -1,7 +1,5 @@
 """Documents with one error each, keyed by the code under which lint reports it."""
 
-from __future__ import annotations
-
 from formats.gltf.files import File, animated, skinned
 
 __all__ = ["PLANTED"]

@@ -2,8 +2,6 @@
 code with the viewer and computes in the requested precision.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -1,7 +1,5 @@
 """Cameras and helper nodes of glTF files: projection, movement, and what is written."""
 
-from __future__ import annotations
-
 import json
 import math
 import struct

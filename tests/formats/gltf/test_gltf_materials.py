@@ -1,7 +1,5 @@
 """Materials of glTF files: values, textures, images, extensions, and invalid members."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

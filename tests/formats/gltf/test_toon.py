@@ -1,7 +1,5 @@
 """Toon materials of VRM characters."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

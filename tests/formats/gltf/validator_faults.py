@@ -3,8 +3,6 @@ with the code that lint reports and the JSON pointer to the error. Codes about u
 materials and cameras are omitted, because most files have them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from formats.gltf.files import File, animated, skinned

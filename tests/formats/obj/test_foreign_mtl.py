@@ -1,7 +1,5 @@
 """Material libraries of other programs: names, defaults, and images in unexpected folders."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal

@@ -1,7 +1,5 @@
 """Material libraries: the PBR extension, opacity, texture placement, and unknown statements."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from faults import fault_of

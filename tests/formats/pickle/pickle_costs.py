@@ -1,7 +1,5 @@
 """Limits on the cost of reading a pickle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from formats.pickle_bytes import (

@@ -1,7 +1,5 @@
 """Truncated, modified or random pickles, each of which is read or refused in one line."""
 
-from __future__ import annotations
-
 import pickle
 import random
 

@@ -1,7 +1,5 @@
 """Pickles by all common writers, from which arrays are read as views of the file."""
 
-from __future__ import annotations
-
 import pickle
 from collections import OrderedDict
 from pathlib import Path

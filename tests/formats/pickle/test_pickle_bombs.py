@@ -1,7 +1,5 @@
 """Pickles with false sizes, or with repeated or circular values."""
 
-from __future__ import annotations
-
 import pickle
 import struct
 import time

@@ -1,7 +1,5 @@
 """Malicious pickles, which are refused in one line without execution, writing or allocation."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sparse matrices of SciPy in pickles: compressed columns, compressed rows, and single entries."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from formats.pickle_bytes import array, created, mapping, matrix, opened, saved, several, shape

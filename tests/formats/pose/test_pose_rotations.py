@@ -1,7 +1,5 @@
 """Joint rotations in pose files: bit-exact round trips, and refusal of invalid rotations."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

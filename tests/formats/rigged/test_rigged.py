@@ -1,7 +1,5 @@
 """Rigged meshes in one ``.npz`` file: round trips, and messages about invalid arrays."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

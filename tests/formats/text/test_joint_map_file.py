@@ -1,7 +1,5 @@
 """Joint map files: round trips of names with any characters, and locations of invalid lines."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.errors import FormatError

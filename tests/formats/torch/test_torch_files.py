@@ -1,7 +1,5 @@
 """Tensors of torch in zip archives, legacy streams, and other pickles."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Hostile torch files: false sizes, foreign names and damage, which are refused in one line."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 from typing import Any

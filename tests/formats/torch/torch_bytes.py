@@ -1,7 +1,5 @@
 """Torch and joblib files as bytes, written without these packages, optionally with errors."""
 
-from __future__ import annotations
-
 import io
 import struct
 import zipfile

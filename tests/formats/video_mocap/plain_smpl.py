@@ -1,7 +1,5 @@
 """The published equations of the SMPL family, reimplemented with plain loops over joints."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

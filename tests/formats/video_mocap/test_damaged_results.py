@@ -1,7 +1,5 @@
 """Results with damaged bytes or foreign values, which are read or refused in one line."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

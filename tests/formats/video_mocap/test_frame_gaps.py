@@ -1,7 +1,5 @@
 """Frames with invalid numbers in results of video motion capture: they become gaps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """GVHMR results: both spaces, the mean hands, and the camera that connects the spaces."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

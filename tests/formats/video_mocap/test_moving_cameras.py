@@ -1,7 +1,5 @@
 """TRAM, PromptHMR and SLAHMR results: people and moving cameras in world space."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

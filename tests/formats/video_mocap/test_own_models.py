@@ -1,7 +1,5 @@
 """Captures drawn with an SMPL-family model of the user, if the model folder contains it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """SMPL parameters in dicts of any layout: key names, forms of rotations, people and frames."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

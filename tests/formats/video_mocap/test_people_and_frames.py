@@ -3,8 +3,6 @@
 Every body is at x = frame, y = person, so its place tells where it belongs.
 """
 
-from __future__ import annotations
-
 import json
 import pickle
 from pathlib import Path

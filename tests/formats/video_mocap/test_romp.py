@@ -1,7 +1,5 @@
 """ROMP and BEV: dicts in arrays of objects, people by track or order, and the images' numbers."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """SAM 3D Body results: people as upright points, with their camera."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Dicts with repeated references to the same values, which are refused before they are expanded."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

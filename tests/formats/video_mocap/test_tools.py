@@ -1,7 +1,5 @@
 """The table of tools: its modules, and the manual pages that name every tool."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

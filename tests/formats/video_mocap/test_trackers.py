@@ -1,7 +1,5 @@
 """4D-Humans and PHALP results: detections frame by frame, with people out of sight."""
 
-from __future__ import annotations
-
 import zlib
 from pathlib import Path
 from typing import Any

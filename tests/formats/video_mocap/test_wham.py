@@ -1,7 +1,5 @@
 """WHAM results: people with IDs and gaps, both spaces, shapes per frame, assumed frame rates."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Small results of each tool in the layout of its program."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A small person in glTF files, with the bones of VRM."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ It stands in a T-pose and faces +z (version 1.0) or -z (0.x). Boxes follow some 
 hair hangs from the head, and an animation rotates the hips and the head.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from typing import Any

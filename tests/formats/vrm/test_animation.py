@@ -1,7 +1,5 @@
 """Motions of humanoids in ``.vrma`` files, alone and on a character."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

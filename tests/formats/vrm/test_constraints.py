@@ -1,7 +1,5 @@
 """Node constraints in glTF files."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

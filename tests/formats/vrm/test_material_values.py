@@ -1,7 +1,5 @@
 """Changes of materials by expressions of VRM files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

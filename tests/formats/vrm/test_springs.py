@@ -1,7 +1,5 @@
 """Spring chains of VRM files, and their simulation while a motion plays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

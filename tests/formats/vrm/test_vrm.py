@@ -1,7 +1,5 @@
 """Humanoids, expressions and permissions of VRM files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

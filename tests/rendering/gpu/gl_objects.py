@@ -1,7 +1,5 @@
 """The number of existing OpenGL objects, as reported by OpenGL."""
 
-from __future__ import annotations
-
 import ctypes
 import ctypes.util
 from collections import Counter

@@ -1,7 +1,5 @@
 """Release of the buffers of closed figures and failed uploads."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

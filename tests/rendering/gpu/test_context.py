@@ -1,7 +1,5 @@
 """Machines without usable OpenGL, simulated by environment variables, and their messages."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """EGL devices of worker processes, on simulated machines with several graphics cards."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.rendering.gpu.context import device_count

@@ -1,7 +1,5 @@
 """A context and its programs, which outlive the renderers that use them."""
 
-from __future__ import annotations
-
 import threading
 
 import moderngl

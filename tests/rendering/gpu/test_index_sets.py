@@ -1,7 +1,5 @@
 """Triangle order for the vertex cache: consecutive neighbours, all triangles, unchanged runs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import sphere

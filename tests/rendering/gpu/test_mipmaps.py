@@ -1,7 +1,5 @@
 """Mipmap levels of textures: averages in linear light, as shaders sample them."""
 
-from __future__ import annotations
-
 import moderngl
 import numpy as np
 import pytest

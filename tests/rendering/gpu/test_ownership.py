@@ -1,7 +1,5 @@
 """Release of the resources of refused uploads, which may fail at any point."""
 
-from __future__ import annotations
-
 import moderngl
 import pytest
 

@@ -1,7 +1,5 @@
 """Output of the skinning shader, compared with the float64 reference, and its number of runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import moderngl

@@ -1,7 +1,5 @@
 """Shader programs, and compile errors with file and line for every driver."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

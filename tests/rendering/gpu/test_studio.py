@@ -1,7 +1,5 @@
 """The studio's light, reproduced by its script and compared with the integrals."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Pixels of vertex colours, additional texture coordinates, and texture filters."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from dataclasses import replace
 

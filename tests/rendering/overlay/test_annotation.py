@@ -1,7 +1,5 @@
 """Labels next to points: size, and priority if not all fit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

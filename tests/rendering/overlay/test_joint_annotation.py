@@ -1,7 +1,5 @@
 """Rendered joints: bones seen through the skin, names, axes, and picking."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import skeleton

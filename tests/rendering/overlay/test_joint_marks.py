@@ -1,7 +1,5 @@
 """Joint overlays: bones, axes, dots, and picking them at a pixel."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

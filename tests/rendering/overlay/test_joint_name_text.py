@@ -1,7 +1,5 @@
 """Joint names: the selected joint first, then the nearest, and the number of omitted names."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Label candidates, for which batched results are compared with point-by-point checks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

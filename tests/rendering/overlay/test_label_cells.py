@@ -1,7 +1,5 @@
 """Label cells: the contents of rectangles, compared with brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

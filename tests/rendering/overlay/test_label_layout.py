@@ -1,7 +1,5 @@
 """Layout of labels next to their points, without overlap or ambiguity."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

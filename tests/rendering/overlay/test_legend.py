@@ -1,7 +1,5 @@
 """The contents of legends: round numbers, units, entries sorted by area, and notes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

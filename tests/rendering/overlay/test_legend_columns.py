@@ -1,7 +1,5 @@
 """Columns of legends: as few as possible, with a count of omitted entries."""
 
-from __future__ import annotations
-
 import pytest
 
 from viewer.rendering.overlay.legend import LegendColumns, legend_columns

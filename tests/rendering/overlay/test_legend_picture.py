@@ -1,7 +1,5 @@
 """Rendered legends: position, visibility and undisturbed surroundings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rendering of text to pixels: size, outline, and packing on shelves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rendering.overlay.typeface import Lettering, shelves

@@ -1,7 +1,5 @@
 """Rendered marks: position, size, depth, and clipping behind the eye."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

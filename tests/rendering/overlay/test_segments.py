@@ -1,7 +1,5 @@
 """Segments and dots on the screen: width, round ends and depth."""
 
-from __future__ import annotations
-
 import moderngl
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Fonts for text: letters of other scripts, and letters missing in all fonts."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

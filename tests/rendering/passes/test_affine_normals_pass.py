@@ -1,7 +1,5 @@
 """GPU normals of figures whose joints scale, shear or reflect."""
 
-from __future__ import annotations
-
 import moderngl
 import numpy as np
 import pytest

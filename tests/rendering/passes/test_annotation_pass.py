@@ -1,7 +1,5 @@
 """Rendered annotations: segments and labels of several annotations, their order, and omissions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import square

@@ -1,7 +1,5 @@
 """Back faces, which are drawn only if they can be seen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Backgrounds, which are computed once per size and equal in every frame."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import scene_of, sphere

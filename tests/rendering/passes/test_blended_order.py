@@ -1,7 +1,5 @@
 """Pixels of blended triangles within one mesh, which are sorted by depth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """STAR, SUPR, SKEL and MHR on the GPU, single and as instances, compared with the reference."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from formats.mhr.mhr_files import write as write_mhr

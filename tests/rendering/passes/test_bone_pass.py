@@ -1,7 +1,5 @@
 """Skeletons drawn as octahedra, sticks and axes: direction, roll, ends, branches, and picking."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Shape and pose correctives on the GPU, summed in or before the shader, and their uploads."""
 
-from __future__ import annotations
-
 import moderngl
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Dual quaternion skinning in the shader, alone and mixed with LBS, compared with the reference."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

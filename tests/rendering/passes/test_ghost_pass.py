@@ -1,7 +1,5 @@
 """Ghosts, which are surfaces drawn over the scene without being part of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The ground grid and the shadows on it, which flat meshes on the ground hide."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Actors drawn as instances, compared with the float64 reference and images of single actors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rendered keypoints: position, visibility through the surface, and the option that shows them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rendered motion paths: position, width, visible part, and caching."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Outlines of constant width around actors, joints and points, but not inside them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import skeleton

@@ -1,7 +1,5 @@
 """Rendered captured keypoints: position, size, colour and opacity."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.drawn_figures import square

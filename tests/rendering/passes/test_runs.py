@@ -1,7 +1,5 @@
 """Masked, blended and single-sided materials in shadows, occlusion, picking and outlines."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

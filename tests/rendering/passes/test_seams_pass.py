@@ -1,7 +1,5 @@
 """Seams on the GPU, with a row for every split vertex and identically posed copies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from family_models import family_figure

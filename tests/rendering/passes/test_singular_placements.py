@@ -1,7 +1,5 @@
 """Images of actors whose placement is singular because it flattens or scales to zero."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

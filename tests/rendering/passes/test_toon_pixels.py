@@ -1,7 +1,5 @@
 """Pixels of toon materials: rim light, matcap, outlines, and materials that expressions change."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A video behind the scene, seen through a moving camera, with markers at the scene's points."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.moving import FILMED, RATE, SIZE, moving_camera, pixel

@@ -1,7 +1,5 @@
 """Offsets of correctives without their zeros: sums, columns, dense files, and errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal

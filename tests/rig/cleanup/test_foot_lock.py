@@ -1,7 +1,5 @@
 """Feet of captures that are held in place."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small synthetic clips of one or two joints for tests of clean-up."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion

@@ -1,7 +1,5 @@
 """Comparison of figures and motions with known differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

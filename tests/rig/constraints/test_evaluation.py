@@ -1,7 +1,5 @@
 """Constraints, compared with hand calculations and between all ways of posing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Animal legs, found by the shape of the skeleton, and planted paws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

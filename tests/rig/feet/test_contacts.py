@@ -1,7 +1,5 @@
 """Contacts of feet with the ground, found from the paths of balls and heels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rig.retargeting.rest_twins import Y, Z

@@ -1,7 +1,5 @@
 """Legs that reach a target, and their hips."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from lint.sound import FRAMES, RATE, legs, standing

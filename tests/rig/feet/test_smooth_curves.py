@@ -1,7 +1,5 @@
 """Smooth curves through weighted targets."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """The lowest point of a foot, compared with the mesh, or with the ankle if there is no mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from lint.sound import legs, scene_of, standing

@@ -1,7 +1,5 @@
 """Products of rotations about axes, compared with one-by-one multiplication."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal

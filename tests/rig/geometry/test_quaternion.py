@@ -1,7 +1,5 @@
 """Quaternions, compared with rotation matrices and closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

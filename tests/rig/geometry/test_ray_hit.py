@@ -1,7 +1,5 @@
 """Intersections of rays with triangles, which are hit from either side."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

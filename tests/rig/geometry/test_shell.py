@@ -1,7 +1,5 @@
 """Detection of closed meshes, and borders of openings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

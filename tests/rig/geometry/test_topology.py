@@ -1,7 +1,5 @@
 """Connected components and orientation, compared with simple graph traversals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

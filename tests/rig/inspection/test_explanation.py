@@ -1,7 +1,5 @@
 """Explanation of a vertex: an arm of two joints, with all values calculated by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

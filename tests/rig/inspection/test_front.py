@@ -1,7 +1,5 @@
 """The front of a figure, estimated from names, feet, faces, end joints, soles and travel."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

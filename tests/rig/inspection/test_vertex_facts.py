@@ -1,7 +1,5 @@
 """Properties of a vertex in figures of a few points, calculated by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

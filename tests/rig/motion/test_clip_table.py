@@ -1,7 +1,5 @@
 """Evaluation of many curves at many times, compared with a simple implementation of the format."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

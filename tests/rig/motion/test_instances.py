@@ -1,7 +1,5 @@
 """Batched posing of many actors, compared with posing them one by one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rig.hand_made import skeleton

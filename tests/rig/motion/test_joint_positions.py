@@ -1,7 +1,5 @@
 """Joint positions computed without orientations, compared with world matrices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

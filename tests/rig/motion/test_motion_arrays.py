@@ -1,7 +1,5 @@
 """Motions of captured people as arrays of frames, rotations and joint positions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

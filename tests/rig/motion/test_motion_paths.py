@@ -1,7 +1,5 @@
 """Paths of joints and captured points: positions, times, and gaps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rig.hand_made import skeleton

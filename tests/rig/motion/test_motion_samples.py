@@ -1,7 +1,5 @@
 """What motions set, and what they leave to the pose."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal

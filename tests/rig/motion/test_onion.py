@@ -1,7 +1,5 @@
 """Onion skins: poses of a motion in one scene."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rendering.moving import MISSING, RATE, SPEED, moving_arm

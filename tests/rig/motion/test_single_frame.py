@@ -1,7 +1,5 @@
 """A pose as an animation of one frame: joint positions, motion, and up axis."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

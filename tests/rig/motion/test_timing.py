@@ -1,7 +1,5 @@
 """Frames on a timeline: exact times, gaps, and held or absent ends."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

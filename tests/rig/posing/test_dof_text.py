@@ -1,7 +1,5 @@
 """DOFs as text: degrees as on sliders, with as many decimals as necessary."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Inverse kinematics, compared with the closed form of a two-link arm and finite differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """DOFs of a joint for a given rotation: explicit matrix products, limits, and ties."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

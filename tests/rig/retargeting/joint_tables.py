@@ -1,7 +1,5 @@
 """Joints of the skeletons of many programs, and their names in the SMPL family."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

@@ -4,8 +4,6 @@ a T-pose and the world rotations G of the joints relative to that pose. A file w
 C_parent^T offset. In its zero pose, the offsets are added without rotation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 The body is the one defined in ``rest_twins``. Hips, knees and ankles rotate about x only.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from rig.retargeting.rest_twins import NAMES, POINTS, X, worlds
 from rig.retargeting.walking import STRIDE, plane_angles, walk

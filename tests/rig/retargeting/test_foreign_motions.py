@@ -4,8 +4,6 @@ The source's limbs are computed here, by multiplying matrices down its hierarchy
 other proportions and an A-pose.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

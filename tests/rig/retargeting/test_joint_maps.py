@@ -1,7 +1,5 @@
 """Joint maps: chosen matches, and how each joint was matched."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Recognition of the joint names of many programs."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

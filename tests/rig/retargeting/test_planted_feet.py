@@ -1,7 +1,5 @@
 """Feet of driven figures, planted during the stances of the source."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Transfer of poses between figures with unequal DOF orders, rest rotations, up axes and joints."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

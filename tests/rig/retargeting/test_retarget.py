@@ -1,7 +1,5 @@
 """Retargeting of motions between skeletons with different rest poses, axes, units and names."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Retargeting onto different hierarchies: matched joints and transferred rotations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

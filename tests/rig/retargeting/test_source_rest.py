@@ -1,7 +1,5 @@
 """One walk in files with different rest conventions, which must move the bundled body equally."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feet of driven figures during jumps, while kneeling, on treadmills, and with tilted soles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

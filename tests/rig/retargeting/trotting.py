@@ -1,7 +1,5 @@
 """Animals of different proportions, and a trot with exactly planted paws, built by trigonometry."""
 
-from __future__ import annotations
-
 import numpy as np
 from rig.retargeting.two_people import figure_of
 from rig.retargeting.walking import RATE, plane_angles

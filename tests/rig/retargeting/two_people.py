@@ -1,7 +1,5 @@
 """Two people with different joint names, poses and proportions, and their limb directions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viewer.rig.figure import Figure

@@ -5,8 +5,6 @@ on the ground, and swings to the next position in the remaining frames. Hips, kn
 rotate about x only.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from rig.retargeting.rest_twins import NAMES, POINTS, X, worlds
 

@@ -1,7 +1,5 @@
 """Strain quantities of a square whose corners slide, against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

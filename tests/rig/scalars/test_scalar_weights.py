@@ -1,7 +1,5 @@
 """Weight quantities of a few vertices, each value calculated by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

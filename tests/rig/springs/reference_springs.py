@@ -1,7 +1,5 @@
 """Reference simulation of spring joints, following the pseudocode of ``VRMC_springBone`` 1.0."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

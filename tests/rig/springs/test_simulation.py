@@ -1,7 +1,5 @@
 """Spring joints, compared with closed forms and an independent implementation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
