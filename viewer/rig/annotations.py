@@ -97,11 +97,7 @@ class VertexField:
 
 
 def keypoint_positions(keypoints: Keypoints, vertices: Floats, joints: Floats) -> Floats:
-    """Return the positions of keypoints: their joints, or sum_k b_k v_k of triangle corners.
-
-    ``vertices``: (V, 3), posed vertices. ``joints``: (J, 3), posed joints, in the same space.
-    Returns (N, 3), positions in that space.
-    """
+    """Return the keypoints' positions (N, 3): posed joints, or sum_k b_k v_k of posed vertices."""
     placed = np.einsum("nk,nka->na", keypoints.weights, vertices[keypoints.vertices])
     at_joint = keypoints.joints >= 0
     placed[at_joint] = joints[keypoints.joints[at_joint]]

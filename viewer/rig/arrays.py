@@ -22,9 +22,8 @@ Bytes = NDArray[np.uint8]
 class Deferred:
     """An array in a file, read on first use and then cached.
 
-    ``load``: reads the array; called once; may raise a ``FormatError``. ``blocks``: yields the
-    array in blocks of a given number of rows, each valid until the next one, without reading it as
-    a whole; may raise a ``FormatError``.
+    ``load`` reads the array, and ``blocks`` yields it in blocks of a given number of rows, each
+    valid until the next one; both may raise a ``FormatError``.
     """
 
     __slots__ = ("_by_blocks", "_load", "_values", "dtype", "shape")
@@ -46,11 +45,7 @@ class Deferred:
         return self._values is not None
 
     def values(self) -> NDArray[Any]:
-        """Return the array, read-only.
-
-        Raises ``FormatError`` if the file can no longer be read, or its contents contradict its
-        declaration.
-        """
+        """Return the array, read-only; raises ``FormatError`` if it can no longer be read."""
         if self._values is None:
             values = self._load()
             values.flags.writeable = False
@@ -70,14 +65,10 @@ class Deferred:
 def frozen(
     name: str, values: Any, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64
 ) -> NDArray[Any]:
-    """Return a read-only copy of ``values`` of the given shape and type.
+    """Return a read-only copy of ``values``, or ``values`` itself if nothing can modify its memory.
 
-    ``values``: copied if its memory can still be modified. ``shape``: required shape; ``None``
-    allows any length of an axis. Raises ``RigError`` if the shape differs, a number is not finite,
-    or an integer type is required and a value has a fraction.
-
-    >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
-    False
+    ``None`` in ``shape`` allows any length of an axis. Raises ``RigError`` if the shape differs, a
+    number is not finite, or an integer type is required and a value has a fraction.
     """
     array = _converted(name, values, np.dtype(dtype))
     fits = array.ndim == len(shape) and all(
@@ -99,10 +90,6 @@ def freeze(array: NDArray[Item]) -> NDArray[Item]:
     """Make an array, and the arrays whose memory it uses, read-only, so that ``frozen`` keeps it.
 
     For new arrays that no other code changes; a copy would double the memory.
-
-    >>> array = np.zeros(3)
-    >>> frozen("offset", freeze(array), (3,)) is array
-    True
     """
     owner: Any = array
     while isinstance(owner, np.ndarray):

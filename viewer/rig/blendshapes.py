@@ -21,18 +21,7 @@ class ShapeSpace(Protocol):
     """Displacement of the rest mesh and joints by weights; 0 for weights of 0. Immutable."""
 
     def displacement(self, weights: Floats) -> Floats:
-        """Return the displacement of the rest vertices.
-
-        Parameters
-        ----------
-        weights : (N,)
-            N <= S; missing weights are treated as 0.
-
-        Returns
-        -------
-        (V, 3)
-            Figure units.
-        """
+        """Return the displacement (V, 3) of the rest vertices for the first N <= S weights."""
 
     def joint_displacement(self, weights: Floats) -> Floats | None:
         """Return the displacement of the rest joints, (J, 3); None if a regressor moves them."""
@@ -241,10 +230,7 @@ class Correctives:
             self.values()
 
     def displacement(self, weights: Floats) -> Floats:
-        """Return sum_p c_p d_p, skipping joints without rotation.
-
-        ``weights``: (P,), from ``viewer.rig.shape.pose_weights``. Returns (V, 3), figure units.
-        """
+        """Return sum_p c_p d_p, (V, 3), for weights (P,), skipping joints without rotation."""
         if isinstance(self.offsets, SparseOffsets) and weights.any():
             found = self.offsets.total(weights)
             if found is not None:
@@ -256,10 +242,7 @@ class Correctives:
 
 
 def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
-    """Return the ranges of consecutive blocks of rows whose weights are not all 0.
-
-    Long ranges are split, so that the products of a range need little memory.
-    """
+    """Return ranges of rows whose weights are not all 0, split so that products stay small."""
     active = weights.reshape(-1, block).any(axis=1)
     edges = np.flatnonzero(np.diff(active, prepend=False, append=False)) * block
     ranges = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
@@ -271,10 +254,7 @@ def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
 
 
 def corrective_weights(rotations: Floats) -> Floats:
-    """Return the weights of the correctives: the nine entries of R - I of each non-root joint.
-
-    ``rotations``: (J, 3, 3), rotation of each joint relative to its parent.
-    """
+    """Return the nine entries of R - I of each non-root joint, from rotations (J, 3, 3)."""
     return (rotations[1:] - np.eye(3)).reshape(-1)
 
 
@@ -312,10 +292,7 @@ class JointRegressor:
 
 
 def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
-    """Return the joints of a rest mesh.
-
-    ``positions``: (V, 3), rest vertices, figure units. Returns (J, 3), figure units.
-    """
+    """Return the joints (J, 3) of rest vertices (V, 3)."""
     bias = np.zeros(3) if regressor.bias is None else regressor.bias
     if regressor.axes is not None:
         to, of = regressor.axes.T

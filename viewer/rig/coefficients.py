@@ -16,11 +16,7 @@ _MOST_SIGMA = 1e6  # largest plausible coefficient, standard deviations
 
 
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
-    """Return a message about coefficients that a figure does not have, unless they are all 0.
-
-    ``group``: ``"shape"`` or ``"expression"``. ``values``: (..., S), all coefficients of the group
-    in the record.
-    """
+    """Return a message about coefficients (..., S) from ``used`` on that are not all 0."""
     rest, count = values[..., used:], values.shape[-1]
     if not rest.any():
         return []
@@ -68,13 +64,10 @@ def space_misfit(space: ShapeSpace, figure: Figure) -> Diagnostic | None:
 def apply_coefficients(
     group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
 ) -> list[Diagnostic]:
-    """Set the weights of one group of blend shapes in place; other weights of the group become 0.
+    """Set a group's first weights (N,) in place and its others to 0; None leaves them unchanged.
 
-    ``group``: ``"shape"`` or ``"expression"``. ``values``: (N,) or None, coefficients of the
-    group's first shapes; None leaves the weights unchanged. ``figure``: figure with or without
-    blend shapes. ``pose``: modified in place. ``cut``: ignore coefficients that the figure does not
-    have, instead of raising an error. Returns messages about ignored coefficients. Raises
-    ``RigError`` if there are too many coefficients, or one is implausibly large.
+    ``cut`` ignores coefficients that the figure does not have; otherwise they raise ``RigError``,
+    as do implausibly large ones. Returns messages about ignored coefficients.
     """
     if values is None or len(values) == 0:
         return []

@@ -68,11 +68,7 @@ class ExpressionRules:
         put("overrides", (len(self.rows), len(PROCEDURAL)), np.int32)
 
     def shown(self, weights: Floats) -> Floats:
-        """Return the displayed weights (VRM 1.0, ``expressions.md``).
-
-        ``weights``: (N,), weights of all blend shapes; weights of expressions are clamped to 0 … 1.
-        Returns (N,), weights; weights of other blend shapes are unchanged.
-        """
+        """Return the displayed weights (N,), expressions within 0 and 1 (VRM 1.0)."""
         known = self.rows < len(weights)
         values = np.zeros(len(self.rows))
         values[known] = np.clip(weights[self.rows[known]], 0.0, 1.0)
@@ -117,10 +113,7 @@ class MaterialBinds:
             raise RigError(f"kinds: found {', '.join(sorted(unknown))}")
 
     def changed(self, materials: Sequence[Material], weights: Floats) -> dict[int, Material]:
-        """Return the materials that differ from the given ones, by index.
-
-        ``weights``: (N,), displayed weights of the blend shapes; missing weights are treated as 0.
-        """
+        """Return the materials that displayed weights (N,) change; missing weights are 0."""
         whole = np.zeros(max(int(self.shapes.max(initial=-1)) + 1, len(weights)))
         whole[: len(weights)] = weights
         active = whole[self.shapes]
@@ -185,12 +178,10 @@ def _moved(
 
 
 def _placed(texture: Texture, moves: list[tuple[float, Floats]]) -> Texture:
-    """Return a texture with weighted targets of its scale and offset; its rotation is unchanged.
-
-    With v flipped, M = [[a, -b, b + x], [-c, d, 1 - d - y]] for the linear part (a, b; c, d) = R S
-    and the offset (x, y).
-    """
+    """Return a texture with weighted targets of its scale and offset; its rotation is unchanged."""
     matrix = texture.matrix
+    # With v flipped, M = [[a, -b, b + x], [-c, d, 1 - d - y]] for the linear part (a, b; c, d) = R
+    # S and the offset (x, y).
     (a, b), (c, d) = (matrix[0, 0], -matrix[0, 1]), (-matrix[1, 0], matrix[1, 1])
     linear, scale = np.array([[a, b], [c, d]]), np.hypot([a, b], [c, d])
     scale[1] *= -1.0 if a * d - b * c < 0.0 else 1.0

@@ -255,11 +255,7 @@ def read_from(
 
 
 def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return points that span the posed skeleton: joint origins and the corners of its boxes.
-
-    ``skeleton``: skeleton with or without boxes. ``pose``: DOFs in lengths and radians. Returns (N,
-    3), figure space.
-    """
+    """Return points (N, 3) that span the posed skeleton: joint origins and corners of boxes."""
     world = posed_skeleton(skeleton, pose).world
     if skeleton.boxes is None:
         return world[:, :3, 3]

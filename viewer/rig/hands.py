@@ -31,11 +31,7 @@ class Hand:
 
 
 def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
-    """Return the finger joints' rotation vectors: mean + sum_i c_i component_i.
-
-    ``coefficients``: (N,), N <= C; missing coefficients are treated as 0. Returns (H, 3), radians.
-    Raises ``RigError`` if there are more coefficients than components.
-    """
+    """Return the finger joints' rotation vectors (H, 3): mean + sum_i c_i component_i, radians."""
     if len(coefficients) > len(hand.components):
         raise RigError(
             f"expected at most {len(hand.components)} hand coefficients, found {len(coefficients)}"
@@ -45,12 +41,7 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
 
 
 def hand_coefficients(hand: Hand, vectors: Floats, flat: bool, count: int) -> Floats:
-    """Return the first ``count`` coefficients that best reproduce a hand pose.
-
-    ``vectors``: (H, 3), rotation vectors of the hand's joints, radians. ``flat``: as for
-    ``hand_vectors``. Returns (count,), the least-squares solution; the components need not be
-    orthogonal.
-    """
+    """Return the first ``count`` coefficients that best fit vectors (H, 3), by least squares."""
     wanted = vectors.ravel() - (0.0 if flat else hand.mean)
     found = np.linalg.lstsq(hand.components[:count].T, wanted, rcond=None)[0]
     return np.asarray(found, dtype=np.float64)

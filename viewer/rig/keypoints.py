@@ -23,12 +23,7 @@ _parts: Memo[Figure, tuple[Figure, Keypoints]] = Memo()
 
 
 def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None) -> Floats:
-    """Return the keypoints of a posed figure.
-
-    ``pose``: DOFs in lengths and radians. ``skinning``: skinning method and influences; the
-    defaults if omitted. Returns (N, 3), figure space. Raises ``RigError`` if the figure has no
-    keypoints.
-    """
+    """Return the keypoints (N, 3) of a posed figure, figure space."""
     if figure.keypoints is None or figure.mesh is None:
         raise RigError(f"figure {figure.name} has no keypoints")
     part, keypoints = _parts.get(figure, None, lambda: _part(figure))
@@ -53,11 +48,7 @@ def _part(figure: Figure) -> tuple[Figure, Keypoints]:
 
 
 def some_vertices(figure: Figure, vertices: Ints) -> Figure:
-    """Return a figure with a few vertices and no triangles that deforms like the whole figure.
-
-    ``vertices``: (N,), their indices. Returns a figure without a joint regressor, so its joints do
-    not follow its shape.
-    """
+    """Return a figure of a few vertices that deform like the whole, without joint regressor."""
     mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives
     return Figure(

@@ -22,17 +22,10 @@ Indices = NDArray[np.intp]
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
-    """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
+    """Concatenate local matrices (J, 4, 4) down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Pointer doubling for one pose: every pass multiplies each joint's matrix by the matrix of the
-    ancestor to which it points, and adopts that ancestor's pointer, so a chain of n joints takes
-    log2(n) passes (Hillis and Steele 1986). The matrices of many poses are multiplied joint by
-    joint, which takes a single product for each.
-
-    ``parents``: (J,), index of each joint's parent, smaller than its own; -1 for a root. ``local``:
-    (J, 4, 4) or (J, F, n, n), joint-to-parent matrices; of many poses, these can also be rotations
-    alone. ``root``: (4, 4), placement of the whole figure in the world; identity if omitted.
-    Returns (J, 4, 4) or (J, F, n, n), joint-to-world matrices, lengths in the unit of ``local``.
+    Matrices of many poses are (J, F, n, n), and may be rotations alone. ``root`` (4, 4) places the
+    whole figure; the identity if omitted.
 
     >>> local = np.stack([np.eye(4)] * 2)
     >>> local[:, 0, 3] = 2.0, 1.0
@@ -48,6 +41,9 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
                 np.matmul(world[parent], local[joint], out=world[joint])
         return world if root is None else root @ world
     parents = np.asarray(parents, dtype=np.int32)
+    # Pointer doubling: every pass multiplies each joint's matrix by the matrix of the ancestor to
+    # which it points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n)
+    # passes (Hillis and Steele 1986).
     is_kept = len(parents) <= _MOST_JOINTS
     for above, below in _kept_passes(parents.tobytes()) if is_kept else _passes(parents):
         world[below] = world[above] @ world[below]
@@ -55,11 +51,7 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
 
 
 def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:
-    """Return the joint-to-figure matrices of one or many poses: (J, 4, 4) or (F, J, 4, 4).
-
-    ``linear`` (..., J, 3, 3): rotation and scale relative to the parent. ``offsets`` (..., J, 3):
-    place relative to the parent. Both are broadcast.
-    """
+    """Return joint-to-figure matrices (J, 4, 4) or (F, J, 4, 4) of local 3 x 3 maps and offsets."""
     shape = np.broadcast_shapes(linear.shape[:-2], offsets.shape[:-1])
     if len(shape) == 1:
         return forward_kinematics(parents, affine_matrices(linear, offsets))
@@ -86,22 +78,14 @@ def _kept_passes(parents: bytes) -> tuple[tuple[Indices, Indices], ...]:
 
 
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return the world matrices of all joints in a pose.
-
-    ``pose``: DOFs in lengths and radians. Returns (J, 4, 4), joint-to-figure matrices.
-    """
+    """Return the joint-to-figure matrices (J, 4, 4) of a pose."""
     turns = joint_rotations(skeleton, pose)
     parts = local_transforms(skeleton, turns, pose.dofs, pose.translations, pose.scales)
     return joint_worlds(skeleton.parents, *parts)
 
 
 def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
-    """Return the world and skinning matrices of a pose, cached until the pose changes.
-
-    The pose stores the result, so forward kinematics runs once per frame for all passes and panels.
-
-    ``pose``: DOFs in lengths and radians. The matrices are read-only.
-    """
+    """Return the read-only world and skinning matrices of a pose, cached until it changes."""
     known, key = pose.posed, pose.skinning_key
     if known is None or known.skeleton is not skeleton or known.key is not key:
         known = pose.posed = PosedSkeleton(skeleton, key, world_matrices(skeleton, pose))
@@ -115,20 +99,12 @@ def is_posed(skeleton: Skeleton, pose: Pose) -> bool:
 
 
 def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
-    """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
-
-    ``world``: (J, 4, 4), joint-to-world matrices. ``inverse_bind``: (J, 4, 4), world-to-joint
-    matrices at bind time. Returns (J, 4, 4), bind-to-posed matrices.
-    """
+    """Return the skinning matrices (J, 4, 4), bind to posed: M[j] = W[j] inverse(B[j])."""
     return world @ inverse_bind
 
 
 def rigid_sizes(palette: Floats) -> Floats:
-    """Return the square s^2 of each joint's scale if it is uniform, and 0 for all other joints.
-
-    ``palette``: (..., J, 4, 4), skinning matrices. Returns (..., J), s^2 if the 3 x 3 part A
-    satisfies A^T A = s^2 I, and det A > 0.
-    """
+    """Return s^2 (..., J) of joints with A^T A = s^2 I and det A > 0, and 0 for all others."""
     linear = palette[..., :3, :3]
     gram = np.swapaxes(linear, -1, -2) @ linear
     squares = gram[..., 0, 0]
@@ -146,14 +122,6 @@ def are_alike(lowest: Floats, highest: Floats) -> Bools:
 
 
 def is_rigid(palette: Floats) -> Bools:
-    """Return whether all joints only rotate and translate, up to one common uniform scale.
-
-    ``palette``: (..., J, 4, 4), skinning matrices. The result is true if every 3 x 3 part A
-    satisfies A^T A = s^2 I with one common s, and det A > 0.
-
-    >>> palette = np.stack([np.eye(4)] * 2)
-    >>> bool(is_rigid(palette)), bool(is_rigid(palette * np.array([2.0, 1.0, 1.0, 1.0])))
-    (True, False)
-    """
+    """Return whether all of (..., J, 4, 4) only rotate and move, up to one common uniform scale."""
     sizes = rigid_sizes(palette)
     return are_alike(sizes.min(axis=-1, initial=np.inf), sizes.max(axis=-1, initial=0.0))

@@ -25,10 +25,9 @@ class Memo(Generic[_Owner, _Value]):
         self._values: WeakKeyDictionary[_Owner, dict[Hashable, _Value]] = WeakKeyDictionary()
 
     def get(self, owner: _Owner, key: Hashable, make: Callable[[], _Value]) -> _Value:
-        """Return the cached result of an owner and key, calling ``make`` if there is none.
+        """Return the result of an owner and key, calling ``make`` if there is none.
 
-        ``owner``: immutable, compared by identity; the result must not refer to it. ``make``:
-        called without arguments.
+        The owner is immutable, compared by identity; the result must not refer to it.
         """
         known = self._values.setdefault(owner, {})
         if key in known:
@@ -44,18 +43,7 @@ class Memo(Generic[_Owner, _Value]):
 
 
 class NumberKey:
-    """A snapshot of the contents of some arrays.
-
-    Keys of equal contents are equal, and ``array`` returns the contents.
-
-    ``*arrays``: (...), arrays of any shapes.
-
-    >>> angles = np.zeros(3)
-    >>> key = NumberKey(angles)
-    >>> angles[1] = 0.5
-    >>> key.updated(angles) is key, key.updated(np.zeros(3)) is key, key == NumberKey(np.zeros(3))
-    (False, True, True)
-    """
+    """A snapshot of the contents of some arrays; equal contents make equal keys."""
 
     __slots__ = ("_parts",)
 
@@ -63,10 +51,7 @@ class NumberKey:
         self._parts = tuple(map(bytearray, arrays))
 
     def updated(self, *arrays: Floats) -> NumberKey:
-        """Return the key of the arrays' current contents: this key if they are bitwise equal.
-
-        Arrays are compared without copying, and only those that changed are copied.
-        """
+        """Return this key if arrays are bitwise equal, or one that copies changed ones."""
         old = self._parts
         if len(arrays) != len(old):
             return NumberKey(*arrays)

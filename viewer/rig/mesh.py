@@ -135,14 +135,7 @@ def _check_range(name: str, indices: Ints, end: int) -> None:
 
 
 def bounding_box(points: Floats) -> Floats:
-    """Return the lowest and highest corner of the points.
-
-    ``points``: (N, 3), points; for an empty array, the box has size 0 at the origin. Returns (2,
-    3), corners, in the unit of ``points``.
-
-    >>> bounding_box(np.array([[0.0, 1.0, 2.0], [3.0, 0.0, 1.0]])).tolist()
-    [[0.0, 0.0, 1.0], [3.0, 1.0, 2.0]]
-    """
+    """Return the lowest and highest corner (2, 3) of points (N, 3); zeros without points."""
     if len(points) == 0:
         return np.zeros((2, 3))
     # Rows of 64 points reduce ten times faster than rows of three numbers.
@@ -156,20 +149,12 @@ def bounding_box(points: Floats) -> Floats:
 
 
 def box_size(box: Floats) -> float:
-    """Return the length of a box's diagonal, the "size" to which tolerances refer.
-
-    >>> box_size(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.0]]))
-    3.0
-    """
+    """Return the length of a box's diagonal, the "size" to which tolerances refer."""
     return float(np.linalg.norm(box[1] - box[0]))
 
 
 def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
-    """Return each triangle's area, |(b - a) x (c - a)| / 2.
-
-    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices. Returns (T,), areas,
-    squared units.
-    """
+    """Return each triangle's area (T,), |(b - a) x (c - a)| / 2."""
     return 0.5 * np.linalg.norm(area_vectors(positions, triangles), axis=1)
 
 
@@ -200,15 +185,7 @@ def _median(values: Floats) -> Floats:
 
 
 def volume(positions: Floats, triangles: Ints) -> float:
-    """Return the volume that a closed mesh encloses: sum a . (b x c) / 6 (divergence theorem).
-
-    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices, counter-clockwise
-    from outside. The result is in cubed units; negative if the triangles are clockwise.
-
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)
-    0.166666666667
-    """
+    """Return the volume inside a closed mesh: sum a . (b x c) / 6; negative if it is clockwise."""
     # All tetrahedra share the mean as a corner, so that a small hole changes the sum only slightly.
     centered = positions - positions.mean(axis=0)
     a, b, c = (centered[triangles[:, corner]] for corner in range(3))
@@ -218,9 +195,8 @@ def volume(positions: Floats, triangles: Ints) -> float:
 def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     """Split vertices along texture seams, so that each has one texture coordinate, as on GPUs.
 
-    Returns ``sources``: (R,) int32, mesh vertex that each split vertex is a copy of; vertices
-    without triangles are included; ``uv_indices``: (R,) int32, texture coordinate of each split
-    vertex; ``triangles``: (T, 3) int32, indices into the split vertices.
+    Returns the vertex of the mesh (R,) and the texture coordinate (R,) of each split vertex, those
+    without triangles included, and the triangles (T, 3) as indices of split vertices.
     """
     if mesh.uv_triangles is None or mesh.uvs is None:
         identity = np.arange(mesh.n_vertices, dtype=np.int32)
@@ -249,11 +225,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
 
 
 def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
-    """Return a mesh with one texture coordinate per vertex, for formats that require this.
-
-    Returns ``mesh``: R vertices, split along texture seams; ``sources``: (R,) int32, original
-    vertex of each of these.
-    """
+    """Return a mesh of R vertices split along texture seams, and their original vertices (R,)."""
     sources, uv_indices, triangles = split_seams(mesh)
     return Mesh(
         positions=mesh.positions[sources],
@@ -271,16 +243,7 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
 
 
 def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
-    """Return unit normals averaged over each vertex's triangles, weighted by area.
-
-    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices, counter-clockwise
-    from outside. Returns (V, 3), unit normals; +y for a vertex that has no triangles or only
-    degenerate ones.
-
-    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()
-    [0.0, 0.0, 1.0]
-    """
+    """Return unit normals (V, 3), triangles weighted by area; +y where no triangle has an area."""
     vectors = area_vectors(positions, triangles)
     corners = triangles.ravel()
     columns = [
@@ -295,11 +258,7 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
 
 
 def visible_triangles(mesh: Mesh, hidden: Collection[int]) -> Bools:
-    """Return a mask of the triangles that are not in a hidden part: (T,) bool.
-
-    ``mesh``: with or without parts. ``hidden``: indices of the hidden parts; indices that are not
-    parts of the mesh are ignored.
-    """
+    """Return a mask (T,) of the triangles that are not in a hidden part."""
     shown: Bools = ~np.isin(mesh.part_indices, list(hidden))
     return shown
 
@@ -314,11 +273,7 @@ def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
 
 
 def area_vectors(positions: Floats, triangles: Ints) -> Floats:
-    """Return (b - a) x (c - a) of each triangle: its normal, scaled to twice its area.
-
-    ``positions``: (V, 3), figure units. ``triangles``: (T, 3), vertex indices. Returns (T, 3),
-    squared units.
-    """
+    """Return (b - a) x (c - a) of each triangle (T, 3): its normal, scaled to twice its area."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return np.cross(b - a, c - a)
 

@@ -49,11 +49,9 @@ class MorphTarget:
 def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     """Return a figure with a blend shape for each target: p = p0 + sum_k w_k (target_k - p0).
 
-    Normals are computed with the same formula, before skinning. Joints do not move.
-
-    ``figure``: figure with a mesh; its own blend shapes, if any, come first and must be morphs too.
-    Returns the figure itself if there are no targets. Raises ``RigError`` if a vertex index lies
-    outside the mesh, or the figure has no mesh, or has blend shapes other than morphs.
+    Normals are computed with the same formula, before skinning. Joints do not move. Raises
+    ``RigError`` if a vertex index lies outside the mesh, or the figure has no mesh, or has blend
+    shapes other than morphs.
     """
     if not targets:
         return figure
@@ -91,13 +89,7 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
 
 
 def on_one_joint(figure: Figure) -> Figure:
-    """Bind a mesh without a skeleton to a single fixed joint.
-
-    Weights of blend shapes belong to a pose, and a pose needs a skeleton. The mesh stays in its
-    bind pose.
-
-    ``figure``: figure with a mesh; a skin without a skeleton is replaced.
-    """
+    """Bind a mesh to one fixed joint: a pose, with its shape weights, needs a skeleton."""
     mesh = figure.require_mesh()
     empty = np.zeros(0, dtype=np.int32)
     skeleton = Skeleton(

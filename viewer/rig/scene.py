@@ -241,12 +241,9 @@ class Scene:
 
 
 def scene_points(scene: Scene, show: str = "skin") -> Floats:
-    """Return the points to fit into the view: posed meshes and skeletons of visible actors.
+    """Return the points (N, 3) to fit into the view, at least the origin.
 
     A few outliers far away are clamped to the bounding box of the other 99.9 % of the points.
-
-    ``show``: one of "skin", "skeleton", "both" or "binding", parts that are drawn. Returns (N, 3),
-    scene space; the origin alone if nothing is visible.
     """
     clouds = [actor_points(actor, show) for actor in scene.actors if actor.is_drawn]
     clouds = [cloud for cloud in clouds if len(cloud)]
@@ -267,11 +264,7 @@ def scene_box(scene: Scene, show: str = "skin") -> Floats:
 
 
 def actor_points(actor: Actor, show: str = "skin") -> Floats:
-    """Return the points of the drawn parts of an actor.
-
-    ``show``: one of "skin", "skeleton", "both" or "binding", parts that are drawn; a part that the
-    figure lacks is replaced by one that it has. Returns (N, 3), scene space.
-    """
+    """Return the points (N, 3) of an actor's drawn parts, or of a part that the figure has."""
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
@@ -300,12 +293,10 @@ def _posed_vertices(figure: Figure, pose: Pose | None) -> Floats:
 
 
 def scene_unit(scene: Scene) -> str:
-    """Return the unit of length of the scene: the unit of its first figure with a known one.
+    """Return the unit of the first figure with a known one, a key of ``METRES``; empty if unknown.
 
     A scale that converts the figure's unit into another one, such as a placement's scale, is taken
     into account; any other scale of a pose is assumed to be the user's choice.
-
-    Returns a key of ``viewer.rig.units.METRES``; empty if no unit is known.
     """
     from viewer.rig.units import METRES
 

@@ -66,11 +66,6 @@ def shaped_skeleton(figure: Figure, weights: Floats) -> Skeleton:
 
     Morph targets of glTF and FBX files leave the joints in place, and their sums over large meshes
     are expensive.
-
-    ``figure``: figure with a skeleton, with or without blend shapes. ``weights``: (N,), N <= S;
-    missing weights are 0. Returns the figure's own skeleton if its joints do not follow its shape.
-    Raises ``RigError`` if there is no skeleton, or if the joints follow the shape and there are
-    more weights than blend shapes.
     """
     shapes = figure.blend_shapes
     if figure.joint_regressor is None and (shapes is None or shapes.space is None):
@@ -130,11 +125,7 @@ def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
 
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
-    """Return the rest translations for new joint positions, with unchanged rotations and scales.
-
-    ``joints``: (..., J, 3), new rest positions, figure units. Returns (..., J, 3), translations
-    relative to the parent joint.
-    """
+    """Return rest translations (..., J, 3) for joints at new positions with the same axes."""
     linear = world_matrices(skeleton, _zero_pose(skeleton))[:, :3, :3]
     parents = skeleton.parents
     has_parent = parents >= 0
@@ -158,11 +149,7 @@ def _zero_pose(skeleton: Skeleton) -> Pose:
 
 
 def joint_shifts(figure: Figure, weights: Floats) -> Floats:
-    """Return how far shapes move the rest joints, J(beta) - J(0).
-
-    ``figure``: figure with or without blend shapes. ``weights``: (F, S), weights of F shapes.
-    Returns (F, J, 3), figure units.
-    """
+    """Return how far shapes (F, S) move the rest joints, J(beta) - J(0): (F, J, 3)."""
     shapes = figure.blend_shapes
     if shapes is None or shapes.space is None:
         directions = joint_directions(figure)
@@ -187,11 +174,7 @@ _directions: Memo[Figure, Floats] = Memo()
 
 
 def joint_directions(figure: Figure) -> Floats:
-    """Return the offsets D of the rest joints per blend shape: J(beta) = J(0) + sum_s beta_s D_s.
-
-    ``figure``: figure with or without blend shapes and joint regressor. Returns (S, J, 3), figure
-    units per weight of 1; zeros where joints do not follow the mesh.
-    """
+    """Return the offsets D (S, J, 3) of the rest joints: J(beta) = J(0) + sum_s beta_s D_s."""
     from viewer.rig.blendshapes import regress_joints
 
     regressor, shapes, mesh = figure.joint_regressor, figure.blend_shapes, figure.mesh
@@ -214,10 +197,7 @@ def joint_directions(figure: Figure) -> Floats:
 
 
 def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return the weights of a figure's correctives in a pose.
-
-    ``pose``: DOFs in lengths and radians. Returns (P,), one per row of the correctives.
-    """
+    """Return the weights (P,) of a figure's correctives in a pose, one per row."""
     from viewer.rig.blendshapes import corrective_weights
 
     if correctives.feature is None:
@@ -226,11 +206,7 @@ def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Fl
 
 
 def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:
-    """Return the vertices before skinning: the rest mesh plus the pose correctives.
-
-    ``pose``: DOFs in lengths and radians. ``correct``: whether to add the pose correctives, if the
-    figure has any. Returns (V, 3), in the bind pose.
-    """
+    """Return the vertices (V, 3) before skinning: the rest mesh plus the pose correctives."""
     if not correct or figure.correctives is None or figure.skeleton is None:
         return mesh.positions
     weights = pose_weights(figure.correctives, figure.skeleton, pose)

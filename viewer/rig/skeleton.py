@@ -142,12 +142,7 @@ class Skeleton:
 
 
 def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skeleton:
-    """Return a skeleton of unlimited ball joints without rest rotations.
-
-    ``parents``: (J,), -1 for the root; parents come before their children. ``joints``: (J, 3), rest
-    positions, figure units. Returns a skeleton with three rotation DOFs for every joint, about x, y
-    and z.
-    """
+    """Return unlimited ball joints at (J, 3), with DOFs about x, y and z and no rest rotations."""
     count = len(parents)
     above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
     return Skeleton(
@@ -164,10 +159,7 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
 
 
 def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
-    """Clamp DOF values to their limits.
-
-    ``dofs``: (..., D), lengths or radians. Returns (..., D), the nearest allowed values.
-    """
+    """Clamp DOF values (..., D) to their limits."""
     return np.clip(dofs, skeleton.dof_limits[:, 0], skeleton.dof_limits[:, 1])
 
 
@@ -175,9 +167,8 @@ _labels: Memo[Skeleton, tuple[str, ...]] = Memo()
 
 
 def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return a unique label for every joint.
+    """Return unique labels: "knee", "knee#5" if several have that name, "#5" if unnamed.
 
-    Returns ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` if unnamed.
     Auxiliary joints have the label of the joint that is shown in their place.
     """
     return _labels.get(skeleton, (), lambda: _made_labels(skeleton))
@@ -206,10 +197,7 @@ def shown_joints(skeleton: Skeleton) -> Ints:
 
 
 def shown_joint_of(skeleton: Skeleton) -> Ints:
-    """Return the joint that is shown in place of each joint: (J,) int32.
-
-    The joint itself, or the nearest ancestor of an auxiliary one.
-    """
+    """Return the joint shown for each joint (J,): itself, or an auxiliary one's ancestor."""
     shown: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
     if skeleton.auxiliary is not None:
         for joint in np.flatnonzero(skeleton.auxiliary).tolist():
@@ -227,10 +215,7 @@ def shown_parents(skeleton: Skeleton) -> Ints:
 
 
 def dof_label(skeleton: Skeleton, dof: int) -> str:
-    """Return the label of a DOF, as on the command line: ``"knee.x"``, ``"root.ty"``.
-
-    Returns the joint label, a dot, and the kind from ``DOF_KINDS``.
-    """
+    """Return the label of a DOF, as on the command line: ``"knee.x"``, ``"root.ty"``."""
     return f"{joint_label(skeleton, skeleton.dof_joints[dof])}.{DOF_KINDS[skeleton.dof_kinds[dof]]}"
 
 
@@ -242,11 +227,7 @@ def dof_labels(skeleton: Skeleton) -> list[str]:
 
 
 def find_dof(skeleton: Skeleton, label: str) -> int:
-    """Return the row of the DOF called ``label``.
-
-    ``label``: ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index; case-insensitive. Raises
-    ``RigError`` if there is no such DOF, or several joints have that name.
-    """
+    """Return the row of the DOF "NAME.KIND" or "#INDEX.KIND", case-insensitive."""
     joint_text, dot, kind = label.rpartition(".")
     if not dot or kind.lower() not in DOF_KINDS:
         raise RigError(f'"{label}": expected JOINT.KIND with KIND one of {", ".join(DOF_KINDS)}')
@@ -261,11 +242,7 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
 
 
 def find_joint(skeleton: Skeleton, text: str) -> int:
-    """Return the index of the joint called ``text``.
-
-    ``text``: a joint's name, ``"NAME#INDEX"`` or ``"#INDEX"``; case-insensitive. Raises
-    ``RigError`` if there is no such joint, or several joints have that name.
-    """
+    """Return the joint called "NAME", "NAME#INDEX" or "#INDEX", case-insensitive."""
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:
         joint = int(index)

@@ -77,13 +77,7 @@ class Skin:
 def skin_from_lists(
     influences: Iterable[Iterable[tuple[int, float]]], inverse_bind: Floats
 ) -> Skin:
-    """Build a skin from (joint, weight) pairs per vertex; meant for small, hand-made figures.
-
-    ``inverse_bind``: (J, 4, 4), bind-space-to-joint matrices.
-
-    >>> skin_from_lists([[(0, 1.0)], []], np.eye(4)[None]).starts.tolist()
-    [0, 1, 1]
-    """
+    """Build a skin from (joint, weight) pairs per vertex; meant for small, hand-made figures."""
     rows = [list(row) for row in influences]
     pairs = [pair for row in rows for pair in row]
     return Skin(
@@ -114,10 +108,7 @@ def weight_sums(skin: Skin) -> Floats:
 
 
 def has_influence(skin: Skin) -> Bools:
-    """Return a mask of the vertices with at least one non-zero weight: (V,) bool.
-
-    The others stay at their bind position; an empty sum would move them to the origin.
-    """
+    """Return a mask (V,) of vertices with a non-zero weight; others stay where bound."""
     counts = influence_counts(skin)
     zero = skin.weights == 0.0
     if not zero.any():
@@ -126,10 +117,7 @@ def has_influence(skin: Skin) -> Bools:
 
 
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
-    """Return the joints without influence, in ascending order: (N,) int32.
-
-    Influences of auxiliary joints of the skeleton are assigned to the joints shown in their place.
-    """
+    """Return joints (N,) without influence; those of auxiliary joints count for shown ones."""
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
     if skeleton is not None and skeleton.n_joints == skin.n_joints:
         used, shown = shown_joint_of(skeleton)[used], shown_joints(skeleton)
@@ -139,12 +127,7 @@ def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
 def skin_from_entries(
     n_vertices: int, vertices: Ints, joints: Ints, weights: Floats, inverse_bind: Floats
 ) -> Skin:
-    """Build a skin from the entries of a sparse matrix, in any order.
-
-    ``vertices``, ``joints``: (N,), row and column of each weight; the order within a vertex is
-    preserved. ``weights``: (N,), as stored. ``inverse_bind``: (J, 4, 4), bind-space-to-joint
-    matrices.
-    """
+    """Build a skin from entries (N,) of a sparse matrix; their order within a vertex is kept."""
     order = np.argsort(vertices, kind="stable")
     counts = np.bincount(vertices, minlength=n_vertices)
     return Skin(
@@ -166,13 +149,10 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
 
 
 def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
-    """Return each vertex's sum over joints of |weight|, after adding up entries of the same joint.
+    """Return each vertex's sum over joints of |weight| (V,), entries of the same joint added first.
 
     For the entries of one skin and the negated entries of another, this is the L1 distance of their
     rows, regardless of the order of influences and of duplicate joints.
-
-    ``vertices``, ``joints``: (N,), row and column of each entry. ``weights``: (N,), signed weights.
-    Returns (V,), 0 for a vertex without entries.
     """
     n_joints = int(joints.max(initial=0)) + 1
     entries, places = np.unique(vertices.astype(np.int64) * n_joints + joints, return_inverse=True)
@@ -188,10 +168,7 @@ def strongest_first(skin: Skin) -> Skin:
 
 
 def limit_influences(skin: Skin, count: int) -> Skin:
-    """Prune the influences of each vertex, as an engine limited to ``count`` influences does.
-
-    Influences of the same joint are merged, then pruned, then scaled to a sum of 1.
-    """
+    """Merge, prune to the ``count`` largest and normalise each vertex's influences."""
     ordered = strongest_first(merged(skin))
     rank = np.arange(len(ordered.joints)) - np.repeat(
         ordered.starts[:-1], influence_counts(ordered)

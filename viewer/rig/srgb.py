@@ -21,11 +21,7 @@ def decode_srgb(colors: Floats) -> Floats:
 
 
 def encode_color(color: Color) -> Color:
-    """Return a linear colour of the scene as sRGB, as in colour pickers.
-
-    >>> [round(part, 3) for part in encode_color((0.0, 0.001, 0.214))]
-    [0.0, 0.013, 0.5]
-    """
+    """Return a linear colour of the scene as sRGB, as in colour pickers."""
     r, g, b = encode_srgb(np.array(color)).tolist()
     return r, g, b
 

@@ -22,24 +22,13 @@ Where two units overlap, the first takes precedence.
 
 
 def is_metres(size: float) -> bool:
-    """Return whether a figure of unknown unit may be in metres, judged by its longest side.
-
-    >>> is_metres(1.7), is_metres(170.0)
-    (True, False)
-    """
+    """Return whether a figure of unknown unit may be in metres, judged by its longest side."""
     low, high = SIZES["m"]
     return low <= size <= high
 
 
 def unit_of_scaled(unit: str, scale: float) -> str:
-    """Return the unit of a figure from the unit of a similar figure and the ratio of their sizes.
-
-    ``scale``: the figure's length over the other's, each in its own unit. Returns the unit; empty
-    if the other unit is unknown, or no unit results in similar sizes.
-
-    >>> unit_of_scaled("m", 1.04), unit_of_scaled("m", 950.0), unit_of_scaled("m", 7.0)
-    ('m', 'mm', '')
-    """
+    """Return the unit of a figure ``scale`` times as long as one in ``unit``; empty if unclear."""
     if unit not in METRES:
         return ""
     # Inches are too close to centimetres to be distinguished by size.

@@ -41,11 +41,7 @@ class ModelParameters:
         return len(self.names)
 
     def apply(self, skeleton: Skeleton, pose: Pose, values: Floats) -> None:
-        """Set the DOFs, translations and scales of a pose in place.
-
-        ``pose``: modified, except for its shape and placement. ``values``: (P,), model parameters.
-        Raises ``RigError`` if the number of values is wrong.
-        """
+        """Set the DOFs, translations and scales of a pose in place from parameters (P,)."""
         if len(values) != self.count:
             raise RigError(f"expected {self.count} model parameters, found {len(values)}")
         joints = (self.transform @ values).reshape(-1, PER_JOINT)
@@ -56,10 +52,7 @@ class ModelParameters:
 
 
 def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
-    """Return the joint and kind of each joint parameter that can be nonzero, except scales.
-
-    ``transform``: (7 J, P), see ``ModelParameters``. Returns (D,) int32, rows of a DOF table.
-    """
+    """Return the joints and kinds, (D,) int32 each, of DOFs that a (7 J, P) transform drives."""
     driven = transform.any(axis=1).reshape(-1, PER_JOINT)[:, :_SCALE]
     joints, kinds = np.nonzero(driven)
     return joints.astype(np.int32), kinds.astype(np.int32)

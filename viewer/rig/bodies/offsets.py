@@ -20,11 +20,7 @@ _FIRST = 64  # rows after which this fraction is estimated
 
 
 class SparseOffsets(Deferred):
-    """Offsets (P, V, 3) that are read block by block on first use, and stored without zeros.
-
-    ``load``: returns the whole array; see ``Deferred``. ``blocks``: yields blocks of consecutive
-    rows, valid until the next one; may raise a ``FormatError``.
-    """
+    """Offsets (P, V, 3) that are read block by block on first use, and stored without zeros."""
 
     __slots__ = ("_blocks", "_entries", "_lock")
 
@@ -114,10 +110,7 @@ class _Entries:
 
 
 class DeferredOffsets(Deferred):
-    """Offsets of blend shapes whose weighted sum does not need the whole array.
-
-    ``load``: returns the array; see ``Deferred``.
-    """
+    """Offsets of blend shapes whose weighted sum does not need the whole array."""
 
     __slots__ = ("total",)
 

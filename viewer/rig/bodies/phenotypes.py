@@ -44,19 +44,12 @@ _ALL = tuple(name for names in VARIATIONS.values() for name in names) + ORIGINS
 
 
 def phenotype_range(name: str) -> tuple[float, float]:
-    """Return the smallest and largest value of a phenotype.
-
-    >>> phenotype_range("muscle")
-    (0.0, 1.0)
-    """
+    """Return the smallest and largest value of a phenotype."""
     return (_NEWBORN if name == "age" else 0.0), 1.0
 
 
 def target_masks(targets: Sequence[Sequence[str]]) -> Bools:
-    """Return which variations each target belongs to.
-
-    Returns (R, N) bool, one column for each of the N variations.
-    """
+    """Return which of the N variations (rows: R) each target belongs to: (R, N) bool."""
     mask = np.zeros((len(targets), len(_ALL)), dtype=np.bool_)
     for row, names in enumerate(targets):
         mask[row, [_ALL.index(name) for name in names]] = True
@@ -64,11 +57,7 @@ def target_masks(targets: Sequence[Sequence[str]]) -> Bools:
 
 
 def weights_of(values: Floats, masks: Bools) -> Floats:
-    """Return the coefficients of targets.
-
-    ``values``: (11,), values of ``PHENOTYPES``, clamped to their ranges. ``masks``: (R, N) bool,
-    from ``target_masks``. Returns (R,), products of the weights of the targets' variations.
-    """
+    """Return coefficients (R,): products of the weights of the variations (R, N) of each target."""
     parts = [
         _anchored(float(value), len(names), phenotype_range(name)[0])
         for value, (name, names) in zip(values[: len(VARIATIONS)], VARIATIONS.items(), strict=True)
@@ -90,11 +79,7 @@ def _fractions(values: Floats) -> Floats:
 
 
 class TargetRows:
-    """Offsets of the base mesh by target, each read on first use and stored without zeros.
-
-    ``load``: returns the vertices (N,) that a target moves and their offsets (N, 3); may raise a
-    ``FormatError``.
-    """
+    """Offsets by target, each read on first use: its vertices (N,) and their offsets (N, 3)."""
 
     def __init__(
         self, count: int, n_points: int, load: Callable[[int], tuple[Ints, Floats]]

@@ -35,15 +35,7 @@ class Feature(Protocol):
         """Number of weights, P."""
 
     def weights(self, skeleton: Skeleton, pose: Pose) -> Floats:
-        """Return the weights of a pose: (P,).
-
-        Parameters
-        ----------
-        skeleton : Skeleton
-            Skeleton of the shaped figure.
-        pose : Pose
-            DOFs in lengths and radians.
-        """
+        """Return the weights (P,) of a pose of the shaped figure's skeleton."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,15 +49,7 @@ class ShapeSpace:
         return " ".join(filter(None, (self.gender, self.model)))
 
     def shares_coefficients(self, other: ShapeSpace) -> bool:
-        """Return whether coefficients of one space are valid in the other, apart from the gender.
-
-        SMPL, SMPL+H and SKEL share their shape directions; other models were trained separately.
-
-        >>> ShapeSpace("SMPL").shares_coefficients(ShapeSpace("SMPL+H"))
-        True
-        >>> ShapeSpace("SMPL+H").shares_coefficients(ShapeSpace("SMPL-X"))
-        False
-        """
+        """Return whether coefficients are valid in the other space, apart from the gender."""
         models = {_SHARED.get(model, model) for model in (self.model, other.model)}
         return "" in models or len(models) == 1
 
@@ -88,12 +80,10 @@ def model_title(text: str) -> str:
 
 
 def model_of_joints(names: Iterable[str]) -> str:
-    """Return the title of the member with these joints, in any order; empty if it is unclear.
-
-    Poses of SMPL-X may lack fingers, but no other body has a face.
-    """
+    """Return the title of the member with these joints, in any order; empty if it is unclear."""
     own = set(names)
     titles = [member.title for member in FAMILY.values() if set(member.names) == own]
+    # Poses of SMPL-X may lack fingers, but no other body has a face.
     return titles[0] if titles else "SMPL-X" if own & set(_FACE) and "pelvis" in own else ""
 
 
@@ -127,11 +117,7 @@ FAMILY = {
 
 
 def member_of(parents: tuple[int, ...]) -> Member | None:
-    """Return the member with exactly this hierarchy; None for any other model.
-
-    >>> member_of((-1, 0, 1, 1, 1)).title
-    'FLAME'
-    """
+    """Return the member with exactly this hierarchy; None for any other model."""
     member = FAMILY.get(len(parents))
     return member if member is not None and member.parents == parents else None
 
@@ -194,11 +180,7 @@ _ANIMALS = {
 
 
 def animal_of(parents: Sequence[int]) -> Animal | None:
-    """Return the layout with these joints; None if the limbs do not match.
-
-    >>> animal_of([-1, 0, 1]) is None
-    True
-    """
+    """Return the layout with these joints; None if the limbs do not match."""
     animal = _ANIMALS.get(len(parents))
     above: dict[str, int] = {}  # parent of the first joint of each chain
     start = 0
@@ -213,10 +195,7 @@ def animal_of(parents: Sequence[int]) -> Animal | None:
 
 
 def upright_axis(animal: Animal, joints: Floats) -> str:
-    """Return the axis along which the root lies above the feet, ``"y"`` or ``"z"``.
-
-    ``joints``: (J, 3), rest positions.
-    """
+    """Return the axis, "y" or "z", along which the rest root lies above the feet."""
     feet = [row for row, name in enumerate(animal.names) if "Foot" in name or "Toe" in name]
     above = joints[0] - joints[feet].mean(axis=0)
     return "z" if abs(above[2]) > abs(above[1]) else "y"

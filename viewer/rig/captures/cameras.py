@@ -113,11 +113,7 @@ class CameraView:
 
 
 def view_at(view: CameraView, seconds: float) -> CameraView:
-    """Return a camera at a given time; the camera itself if it does not move.
-
-    Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Gaps are
-    interpolated too; outside the motion, the first or last frame is used.
-    """
+    """Return a camera at a time; the camera itself if it does not move."""
     motion = view.motion
     if motion is None:
         return view
@@ -125,6 +121,8 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
     first, second, fraction = int(before[0]), int(after[0]), fractions[0]
     if first < 0:
         return view
+    # The rotation is interpolated spherically, the centre -R^T T linearly; gaps too. Outside the
+    # motion, the first or last frame is used.
     ends = motion.rotations[[first, second]]
     centers = -np.einsum("nba,nb->na", ends, motion.translations[[first, second]])
     quaternions = matrix_to_quaternion(ends)
@@ -141,20 +139,13 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
 
 
 def extrinsics(world: Floats) -> tuple[Floats, Floats]:
-    """Return R and T of a camera that looks along -z with y up, without its scale.
-
-    ``world``: (4, 4), camera to scene space.
-    """
+    """Return R and T, without scale, of a camera-to-scene matrix that looks along -z with y up."""
     rotation = _FLIP @ nearest_rotations(world[:3, :3])[0].T
     return rotation, -rotation @ world[:3, 3]
 
 
 def motion_times(view: CameraView, most: int) -> Floats:
-    """Return sample times of a camera's motion, including the first and the last: (T,).
-
-    ``view``: fixed or moving camera; a fixed camera has only the time 0. ``most``: maximum number
-    of times, at least 2.
-    """
+    """Return at most ``most`` sample times (T,) with both ends; only 0 for a fixed camera."""
     if view.motion is None:
         return np.zeros(1)
     timing = view.motion.timing
@@ -165,14 +156,11 @@ def motion_times(view: CameraView, most: int) -> Floats:
 
 
 def placed_view(view: CameraView, placement: Floats) -> CameraView:
-    """Return a camera that is moved together with its scene.
-
-    With the placement X' = s P X + p: R' = R P^T and T' = s T - R' p.
-
-    ``placement``: (4, 4), rotation, uniform scale and translation.
-    """
+    """Return a camera that is moved with its scene by a rotation, uniform scale and translation."""
     scale, place = float(np.linalg.norm(placement[:3, 0])), placement[:3, 3]
     turn = placement[:3, :3] / scale
+    # With the placement X' = s P X + p, R X + T is unchanged up to s for R' = R P^T and T' = s T -
+    # R' p.
     rotation = view.rotation @ turn.T
     translation = scale * view.translation - rotation @ place
     near, far = (None if one is None else scale * one for one in (view.near, view.far))
@@ -200,10 +188,7 @@ class CameraImages(Protocol):
         """Names of the cameras that have images."""
 
     def at(self, camera: str, seconds: float) -> CameraImage | None:
-        """Return the image of a camera at a time of the scene; None if there is none.
-
-        While the image stays the same, the same object is returned. File errors become notes.
-        """
+        """Return a camera's image at a time, the same object while it stays; None if none."""
 
     def size_of(self, camera: str) -> tuple[int, int] | None:
         """Return the width and height of a camera's images, pixels; None if it has no images."""

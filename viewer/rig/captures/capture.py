@@ -72,9 +72,5 @@ class Capture:
 
 
 def capture_rate(requested: float | None, own: float | None, video: float | None) -> float:
-    """Return the first rate that is known, otherwise ``DEFAULT_RATE``, in frames per second.
-
-    >>> capture_rate(None, None, 25.0), capture_rate(None, None, None)
-    (25.0, 30.0)
-    """
+    """Return the first known rate, otherwise ``DEFAULT_RATE``, in frames per second."""
     return requested or own or video or DEFAULT_RATE

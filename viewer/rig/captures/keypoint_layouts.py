@@ -132,14 +132,10 @@ _ALIKE = (
 
 
 def keypoint_layout(count: int, title: str = "") -> PointLayout:
-    """Return the layout of a set of keypoints.
+    """Return the layout of a set of keypoints; ``title`` decides if several have this count.
 
-    ``title``: name of a layout, if several have this count; empty for the default. Returns a layout
-    with names ``point0``, ``point1`` … and no limbs if no layout has this count. Raises
-    ``RigError`` if the named layout does not exist or has a different number of keypoints.
-
-    >>> keypoint_layout(17).title, keypoint_layout(17, "h36m").names[0]
-    ('coco', 'mid_hip')
+    Without any, the names are ``point0``, ``point1`` … and there are no limbs. Raises ``RigError``
+    if the named layout does not exist or has a different number of keypoints.
     """
     known = TITLES.get(count, ())
     if title and title not in known:
@@ -173,11 +169,7 @@ def _part(name: str) -> PointLayout:
 
 
 def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
-    """Return one layout of several sets of keypoints, concatenated.
-
-    A hand that follows a body is attached to the body's wrist: the wrist of the hand is the same
-    point.
-    """
+    """Return one layout of several; a hand is attached to the wrist of the body before it."""
     names: list[str] = []
     limbs: list[tuple[int, int]] = []
     for part in parts:
@@ -185,6 +177,7 @@ def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
         moved = [start + index for index in range(len(part.names))]
         first = part.names[0] if part.names else ""
         wrist = first.replace("hand_wrist", "wrist")
+        # The wrist of a hand is the same point as that of the body before it.
         if first.endswith("_hand_wrist") and wrist in names:
             moved[0] = names.index(wrist)
         limbs += [(moved[a], moved[b]) for a, b in part.limbs.tolist()]
@@ -235,13 +228,10 @@ def _pairs(text: str) -> Pairs:
 
 
 def matching_joints(layout: PointLayout) -> dict[int, str]:
-    """Return the keypoints that correspond to a joint of the SMPL family.
+    """Return the keypoints that correspond to a joint of the SMPL family, as in SMPLify-X.
 
-    The mapping is SMPLify-X's: limbs, fingers, the neck, and the middle of the hips as the pelvis.
-    Eyes, ears, toes and heels lie on the skin, where there is no joint.
-
-    >>> matching_joints(keypoint_layout(25))[8]
-    'pelvis'
+    These are limbs, fingers, the neck, and the middle of the hips as the pelvis. Eyes, ears, toes
+    and heels lie on the skin, where there is no joint.
     """
     if layout.title in _JOINTS:
         return dict(enumerate(layout.names))
@@ -251,10 +241,7 @@ def matching_joints(layout: PointLayout) -> dict[int, str]:
 
 
 def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
-    """Return the body of the person to whom captured keypoints belong, or None.
-
-    Keypoints of untracked people cannot be associated with a body.
-    """
+    """Return the body of the person to whom captured keypoints belong; None if untracked."""
     for actor in actors:
         same = actor.person == points.person and is_tracked(actor.person)
         if same and actor.pose is not None and actor.figure.mesh is not None:
@@ -263,12 +250,7 @@ def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
 
 
 def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
-    """Return the distance from each visible keypoint to the corresponding joint.
-
-    The joints are the model's: regressed from its shaped mesh, then posed.
-
-    Returns a dict of keypoint names to distances in scene units; empty if either actor is absent.
-    """
+    """Return each visible keypoint's distance in scene units to its joint, regressed and posed."""
     layout, skeleton = points.figure.points, body.figure.skeleton
     if layout is None or points.points is None or skeleton is None or body.pose is None:
         return {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def is_tracked(person: int | None) -> bool:
-    """Return whether a number identifies a track that follows one person from frame to frame.
+    """Return whether a number identifies a person from frame to frame.
 
     Capture systems assign the number -1 to detections without a track. Here they are numbered -1,
     -2, -3 … within each frame; in the next frame the same number may belong to a different person.
@@ -24,9 +24,5 @@ def person_name(person: int) -> str:
 
 
 def person_label(person: int) -> str:
-    """Return the name of a person in messages.
-
-    >>> person_label(3), person_label(-2)
-    ('person 3', 'untracked 2')
-    """
+    """Return the name of a person in messages: "person 3", "untracked 2" for -2."""
     return f"person {person}" if is_tracked(person) else person_name(person)

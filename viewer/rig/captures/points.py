@@ -76,11 +76,7 @@ class PointClip:
     def sample(
         self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
     ) -> Samples:
-        """Return the points at times (T,), in seconds; ``interpolate``: also across gaps.
-
-        A point is interpolated linearly between two frames in which it is visible. Otherwise it
-        keeps the position and confidence of the earlier frame until the next frame.
-        """
+        """Return the points at times (T,), in seconds; ``interpolate``: also across gaps."""
         before, after, fraction = self.timing.locate(times, interpolate)
         present = before >= 0
         if not self.n_rows:

@@ -44,13 +44,7 @@ def sample_upright_points(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
 ) -> tuple[SampledPoints, Literal["y", "z"]]:
-    """Sample an actor's points, rotated upright if their world is upside down.
-
-    ``actor``: actor with captured points; its placement in the scene is ignored. ``rate``,
-    ``frames``, ``interpolate``: as for ``viewer.rig.motion.sampled_animation.sample_animation``.
-    Returns ``animation``: the sampled frames; ``up``: up axis of the frames. Raises ``RigError`` if
-    the actor has no motion of points, or no frame in the range.
-    """
+    """Return an actor's sampled points, rotated upright if upside down, and their up axis."""
     motion, layout = actor.clip, actor.figure.points
     if motion is None or motion.points is None or layout is None:
         raise RigError(f"{actor.name} has no motion of points")

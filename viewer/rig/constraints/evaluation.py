@@ -48,14 +48,10 @@ def constrained_matrices(
 def constrained(
     skeleton: Skeleton, rotations: Floats, translations: Floats, scales: Floats
 ) -> Floats:
-    """Return the rotations of joints with all constraints applied, in the skeleton's order.
+    """Return local rotations (J, ..., 4) with all constraints applied, in the skeleton's order.
 
     The result does not depend on the rotations of constrained joints, so the function is
-    idempotent.
-
-    ``rotations``: (J, ..., 4), local rotations, unit quaternions (x, y, z, w). ``translations``,
-    ``scales``: (J, ..., 3), local positions and factors; ``...`` is broadcast. Returns (J, ..., 4),
-    local rotations.
+    idempotent. ``translations`` and ``scales`` are (J, ..., 3), local.
     """
     if not skeleton.constraints:
         return rotations

@@ -55,11 +55,9 @@ class SurfacePoints:
 
 
 class Surface:
-    """A mesh prepared for closest-point queries.
+    """A mesh prepared for closest-point queries; degenerate triangles are segments or points.
 
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Degenerate triangles are
-    treated as segments or points. Raises ``RigError`` if there is no triangle, an index is out of
-    range, or SciPy is missing.
+    Raises ``RigError`` if there is no triangle, an index is out of range, or SciPy is missing.
     """
 
     def __init__(self, positions: Floats, triangles: Ints) -> None:
@@ -78,10 +76,7 @@ class Surface:
         self._all, self._levels = _levels(self._corners)
 
     def closest(self, points: Floats) -> SurfacePoints:
-        """Find the closest point of the surface to each point.
-
-        ``points``: (N, 3), in the mesh's space. Raises ``RigError`` if a coordinate is not finite.
-        """
+        """Return the closest surface points of (N, 3) points; ``RigError`` if one is not finite."""
         points = frozen("points", points, (None, 3)) - self._center
         found = np.zeros(len(points), dtype=np.int32)
         for start in range(0, len(points), _POINTS):
@@ -143,10 +138,7 @@ class Surface:
     def _keep_nearer(
         self, level: _Level, points: Floats, rows: Any, pieces: Any, best: Ints, nearest: Floats
     ) -> None:
-        """Update best and nearest with the closest of some pieces, each tested for a row of points.
-
-        Among equally close pieces, the one with the closest centroid is chosen.
-        """
+        """Update best and nearest with the closest of pieces, each tested for a row of points."""
         offsets = points[rows] - level.centers[pieces]
         apart = _dot(offsets, offsets)
         kept = np.flatnonzero(_may_be_nearer(level, pieces, offsets, apart, nearest[rows]))
@@ -154,6 +146,7 @@ class Surface:
         corners, offsets = self._corners[triangles], points[rows]
         offsets -= np.einsum("nk,nka->na", _barycentric(offsets, corners), corners)
         distances = np.sqrt(_dot(offsets, offsets))
+        # Each point takes the closest piece; of equally close ones, that with the closest centroid.
         order = np.lexsort((apart, distances, rows))
         found, first = np.unique(rows[order], return_index=True)
         winners = order[first]
@@ -163,12 +156,7 @@ class Surface:
 
 
 def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
-    """Interpolate vertex values at points of the surface: x = b0 x_a + b1 x_b + b2 x_c.
-
-    ``triangles``: (T, 3), vertex indices of the same mesh. ``values``: (V, ...) array or (V, J)
-    sparse matrix, one row per vertex of the mesh. Returns (N, ...) array or (N, J) sparse matrix in
-    rows, sparse if ``values`` is sparse.
-    """
+    """Return rows x = b0 x_a + b1 x_b + b2 x_c of values (V, ...), or sparse (V, J), at points."""
     corners = triangles[found.triangles]
     if not isinstance(values, np.ndarray):
         from scipy import sparse
@@ -268,14 +256,12 @@ def _normals(pieces: Floats) -> Floats:
 def _may_be_nearer(
     level: _Level, pieces: Any, offsets: Floats, apart: Floats, nearest: Floats
 ) -> Bools:
-    """Return a conservative mask of the pieces that may be closer than the closest found so far.
-
-    A piece lies in a disc of radius r around its centroid. With the height h of the point above
-    the disc's plane, the distance a from the centroid and s = sqrt(a^2 - h^2), the distance from
-    the disc is sqrt(h^2 + max(0, s - r)^2). For distant points, this excludes all pieces except
-    those below the point, whereas the bounding sphere, a - r, would leave a large circle of
-    candidates.
-    """
+    """Return a conservative mask of the pieces that may be closer than the closest found so far."""
+    # A piece lies in a disc of radius r around its centroid. With the height h of the point above
+    # the disc's plane, the distance a from the centroid and s = sqrt(a^2 - h^2), the distance from
+    # the disc is sqrt(h^2 + max(0, s - r)^2). For distant points, this excludes all pieces except
+    # those below the point, whereas the bounding sphere, a - r, would leave a large circle of
+    # candidates.
     squared_heights = _dot(offsets, level.normals[pieces]) ** 2
     beside = np.sqrt(np.maximum(apart - squared_heights, 0.0))
     beyond = np.maximum(beside - level.radii[pieces] * _SLACK, 0.0)
@@ -300,15 +286,15 @@ def _radii(pieces: Floats) -> Floats:
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:
-    """Return the barycentric coordinates of the closest point of each triangle to a query point.
-
-    If the projection onto the plane lies inside the triangle, s and t solve the 2 x 2 normal
-    equations of |a + s ab + t ac - p|^2; otherwise the closest point is on one of the three edges.
-    """
+    """Return the barycentric coordinates of the closest point of each triangle to a query point."""
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     ap = points - corners[:, 0]
     bb, bc, cc = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
     pb, pc = _dot(ab, ap), _dot(ac, ap)
+    # The projection a + s ab + t ac minimises |a + s ab + t ac - p|^2: the normal equations are
+    # [bb bc; bc cc] (s, t) = (pb, pc), here with s and t times the determinant. If it lies outside
+    # the triangle, the closest point is on one of the three edges. A triangle so narrow that the
+    # determinant is rounding error, bb cc sin^2 of its angle, has only edges.
     determinant = bb * cc - bc * bc
     s, t = cc * pb - bc * pc, bb * pc - bc * pb
     inside: Bools = (s >= 0.0) & (t >= 0.0) & (s + t <= determinant)

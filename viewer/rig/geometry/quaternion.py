@@ -12,14 +12,7 @@ _PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u t
 
 
 def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
-    """Return q = (sin(t/2) r / t, cos(t/2)) of rotation vectors r with angle t = |r|.
-
-    ``vectors``: (..., 3), axis times angle, radians. Returns (..., 4), unit quaternions (x, y, z,
-    w).
-
-    >>> rotation_vector_to_quaternion(np.array([0.0, 0.0, np.pi])).round(12).tolist()
-    [0.0, 0.0, 1.0, 0.0]
-    """
+    """Return q = (sin(t/2) r / t, cos(t/2)) of rotation vectors r (..., 3), t = |r| radians."""
     vectors = np.asarray(vectors, dtype=np.float64)
     half = 0.5 * np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
     # sinc is defined at 0: np.sinc(x) = sin(pi x) / (pi x).
@@ -27,14 +20,10 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
 
 
 def between(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotations from one direction to another: q = (a x b, 1 + a . b) / |q|.
+    """Return the smallest rotations from direction a to b: q = (a x b, 1 + a . b) / |q|.
 
-    ``start``, ``end``: (..., 3), vectors a and b, of any length here; if one is 0, the result is
-    the identity. Returns (..., 4), unit quaternions (x, y, z, w). For opposite vectors, a rotation
-    by 180 degrees about any perpendicular axis.
-
-    >>> between(np.array([0.0, 2.0, 0.0]), np.array([0.0, -1.0, 0.0])).tolist()
-    [0.0, 0.0, -1.0, 0.0]
+    Lengths do not matter; a zero vector gives the identity, opposite vectors a rotation by 180
+    degrees about any perpendicular axis.
     """
     start, end = unit(start), unit(end)
     real = 1.0 + np.einsum("...a,...a->...", start, end)[..., None]
@@ -46,8 +35,6 @@ def between(start: Floats, end: Floats) -> Floats:
 
 def align_signs(quaternions: Floats) -> None:
     """Replace q by -q, the same rotation, where it is nearer to the previous row; in place.
-
-    ``quaternions``: (N, ..., 4), with the real part last or first.
 
     >>> rows = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.6, -0.8]])
     >>> align_signs(rows)
@@ -61,19 +48,12 @@ def align_signs(quaternions: Floats) -> None:
 
 
 def conjugate(quaternions: Floats) -> Floats:
-    """Return the inverses of unit quaternions.
-
-    ``quaternions``: (..., 4), unit quaternions (x, y, z, w). Returns (..., 4), (-x, -y, -z, w).
-    """
+    """Return the inverses (-x, -y, -z, w) of unit quaternions (..., 4)."""
     return quaternions * [-1.0, -1.0, -1.0, 1.0]
 
 
 def multiply(first: Floats, second: Floats) -> Floats:
-    """Return the Hamilton product: the rotation ``second``, followed by ``first``.
-
-    ``first``, ``second``: (..., 4), (x, y, z, w). Returns (..., 4), r(first) R(second) as a
-    quaternion.
-    """
+    """Return the Hamilton product (..., 4): the rotation ``second``, followed by ``first``."""
     a, b = np.broadcast_arrays(np.asarray(first, float), np.asarray(second, float))
     result = np.empty(a.shape)
     result[..., :3] = (
@@ -84,18 +64,10 @@ def multiply(first: Floats, second: Floats) -> Floats:
 
 
 def slerp(start: Floats, end: Floats, fraction: Floats | float) -> Floats:
-    """Interpolate rotations at constant speed along the shorter arc (Shoemake 1985).
+    """Interpolate unit quaternions (..., 4) along the shorter arc (Shoemake 1985).
 
-    q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), with q1 negated if q0 . q1 < 0.
-
-    ``start``, ``end``: (..., 4), unit quaternions (x, y, z, w). ``fraction``: (...), 0 gives
-    ``start``, 1 gives ``end`` (or its negative, the same rotation). Returns (..., 4), unit
-    quaternions.
-
-    >>> half = np.sqrt(0.5)
-    >>> quarter = slerp(np.array([0, 0, 0, 1.0]), np.array([0, 0, 1.0, 0]), 0.5)
-    >>> bool(np.allclose(quarter, [0, 0, half, half]))
-    True
+    q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), with q1 negated if q0 . q1 < 0, so that u = 1
+    gives ``end`` or its negative, the same rotation.
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     cosine = np.einsum("...a,...a->...", start, end)

@@ -26,20 +26,7 @@ class RayHit:
 def first_hit(
     positions: Floats, triangles: Ints, origin: Floats, direction: Floats
 ) -> RayHit | None:
-    """Return the first intersection of a ray with a surface, from either side, or None.
-
-    With edges e1, e2 from corner a, o + t d = a + u e1 + v e2 is solved by determinants
-    (Möller and Trumbore 1997, eq. 6).
-
-    ``positions``: (V, 3), vertices. ``triangles``: (T, 3), vertex indices. ``origin``,
-    ``direction``: (3,), ray in the same space; triangles behind its origin are ignored.
-
-    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    >>> eye, ahead = np.array([0.25, 0.25, 2.0]), np.array([0.0, 0.0, -1.0])
-    >>> hit = first_hit(corners, np.array([[0, 1, 2]]), eye, ahead)
-    >>> hit.distance, hit.barycentric.tolist()
-    (2.0, [0.5, 0.25, 0.25])
-    """
+    """Return the first intersection of a ray with a surface, from either side, or None."""
     best: RayHit | None = None
     for start in range(0, len(triangles), _AT_ONCE):
         hit = _nearest(positions, triangles[start : start + _AT_ONCE], origin, direction)
@@ -54,6 +41,8 @@ def _nearest(
     """Return the nearest hit of a ray among some triangles, or None."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     first, second, away = b - a, c - a, origin - a
+    # With edges e1, e2 from corner a, o + t d = a + u e1 + v e2 is solved by determinants
+    # (Möller and Trumbore 1997, eq. 6).
     # The paper's vectors P and Q.
     p, q = np.cross(direction, second), np.cross(away, first)
     determinant = np.einsum("na,na->n", first, p)

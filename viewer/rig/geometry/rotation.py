@@ -10,13 +10,7 @@ _SMALL = 1e-8  # squared angle below which the Taylor series are exact to the la
 
 
 def axis_rotations(axis: int, angles: Floats) -> Floats:
-    """Return the matrices of right-handed rotations about one coordinate axis.
-
-    ``angles``: (...), radians. Returns (..., 3, 3), matrices for column vectors.
-
-    >>> bool(np.allclose(axis_rotations(2, np.array(np.pi / 2)) @ [1, 0, 0], [0, 1, 0]))
-    True
-    """
+    """Return right-handed rotations (..., 3, 3) about one axis by angles (...), radians."""
     cosines, sines = np.cos(angles), np.sin(angles)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     matrices = np.zeros((*np.shape(angles), 3, 3))
@@ -28,18 +22,7 @@ def axis_rotations(axis: int, angles: Floats) -> Floats:
 
 
 def quaternion_to_matrix(quaternions: Floats) -> Floats:
-    """Return the rotation matrices of quaternions.
-
-    With q = (x, y, z, w) of any non-zero length, R v = q v q* / |q|^2 (Shoemake 1985).
-
-    ``quaternions``: (..., 4), (x, y, z, w); they need not be of unit length. Returns (..., 3, 3),
-    matrices for column vectors.
-
-    >>> half = np.sqrt(0.5)
-    >>> rotated = quaternion_to_matrix(np.array([0, 0, half, half])) @ [1, 0, 0]
-    >>> bool(np.allclose(rotated, [0, 1, 0]))
-    True
-    """
+    """Return the matrices of quaternions of any length, R v = q v q* / |q|^2 (Shoemake 1985)."""
     quaternions = np.asarray(quaternions, dtype=np.float64)
     x, y, z, w = (quaternions[..., number] for number in range(4))
     scale = 2.0 / (x * x + y * y + z * z + w * w)
@@ -57,24 +40,15 @@ def quaternion_to_matrix(quaternions: Floats) -> Floats:
 
 
 def rotation_vector_to_matrix(vectors: Floats) -> Floats:
-    """Return the matrices of rotation vectors: R = I + a K + b K^2 with K = [r]x (Rodrigues).
-
-    a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 are accurate at any angle t, whereas
-    (1 - cos t) / t^2 suffers from cancellation near 0.
-
-    ``vectors``: (..., 3), axis times angle, radians. Returns (..., 3, 3), matrices for column
-    vectors.
-
-    >>> rotated = rotation_vector_to_matrix(np.array([0, 0, np.pi / 2])) @ [1, 0, 0]
-    >>> bool(np.allclose(rotated, [0, 1, 0]))
-    True
-    """
+    """Return R = I + a K + b K^2, K = [r]x (Rodrigues), of rotation vectors r in radians."""
     vectors = np.asarray(vectors, dtype=np.float64)
     squares = np.einsum("...a,...a->...", vectors, vectors)
     angles = np.sqrt(squares)
     is_small = squares < _SMALL
     divisor = np.where(is_small, 1.0, angles)
     first = np.where(is_small, 1.0 - squares / 6.0, np.sin(angles) / divisor)
+    # a = sin(t) / t and b = 2 sin^2(t / 2) / t^2 are accurate at any angle t, whereas
+    # (1 - cos t) / t^2 suffers from cancellation near 0.
     half = np.sin(0.5 * angles) / divisor
     second = np.where(is_small, 0.5 - squares / 24.0, 2.0 * half * half)
     cross = np.zeros((*squares.shape, 3, 3))
@@ -85,13 +59,7 @@ def rotation_vector_to_matrix(vectors: Floats) -> Floats:
 
 
 def matrix_to_quaternion(matrices: Floats) -> Floats:
-    """Return the unit quaternions of rotation matrices, w >= 0 (Shepperd 1978).
-
-    ``matrices``: (..., 3, 3), rotations for column vectors. Returns (..., 4), (x, y, z, w).
-
-    >>> matrix_to_quaternion(np.eye(3)).tolist()
-    [0.0, 0.0, 0.0, 1.0]
-    """
+    """Return the unit quaternions of rotation matrices (..., 3, 3), w >= 0 (Shepperd 1978)."""
     m = np.asarray(matrices, dtype=np.float64)
     diagonal = np.moveaxis(np.diagonal(m, axis1=-2, axis2=-1), -1, 0)
     trace = diagonal.sum(axis=0)
@@ -123,14 +91,7 @@ def matrix_to_quaternion(matrices: Floats) -> Floats:
 
 
 def matrix_to_rotation_vector(matrices: Floats) -> Floats:
-    """Return the rotation vectors of rotation matrices: axis times angle, 0 to pi.
-
-    ``matrices``: (..., 3, 3), rotations for column vectors. Returns (..., 3), radians.
-
-    >>> vector = np.array([0.3, -0.2, 0.1])
-    >>> bool(np.allclose(matrix_to_rotation_vector(rotation_vector_to_matrix(vector)), vector))
-    True
-    """
+    """Return the rotation vectors of rotation matrices: axis times angle, 0 to pi radians."""
     quaternions = matrix_to_quaternion(matrices)
     sines = np.linalg.norm(quaternions[..., :3], axis=-1)
     # 2 atan2 is accurate at 0 and at pi, unlike 2 acos(w).
@@ -141,16 +102,11 @@ def matrix_to_rotation_vector(matrices: Floats) -> Floats:
 
 
 def matrix_to_euler(matrices: Floats) -> Floats:
-    """Return Euler angles about x, y and z with R = Rz Ry Rx, x applied first.
+    """Return Euler angles (..., 3) about x, y and z with R = Rz Ry Rx, x applied first, radians.
 
-    In gimbal lock (y = +-90 degrees) x and z rotate about the same axis, so only their sum or
-    difference is determined. The angles returned still reproduce R exactly.
-
-    ``matrices``: (..., 3, 3), rotations for column vectors. Returns (..., 3), radians; x and z from
-    -pi to pi, y from -pi / 2 to pi / 2.
-
-    >>> bool(np.allclose(matrix_to_euler(axis_rotations(1, np.array(0.5))), [0, 0.5, 0]))
-    True
+    x and z are from -pi to pi, y from -pi / 2 to pi / 2. In gimbal lock (y = +-90 degrees) x and z
+    rotate about the same axis, so only their sum or difference is determined. The angles returned
+    still reproduce R exactly.
     """
     m = np.asarray(matrices, dtype=np.float64)
     z = np.arctan2(m[..., 1, 0], m[..., 0, 0])
@@ -164,12 +120,7 @@ def matrix_to_euler(matrices: Floats) -> Floats:
 
 
 def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
-    """Split matrices into rotation and stretch, M = R P (polar decomposition by SVD).
-
-    ``matrices``: (..., 3, 3), matrices to split; a reflection results in a stretch with a negative
-    determinant. Returns ``rotations``: (..., 3, 3), the proper rotations nearest to the matrices;
-    ``stretches``: (..., 3, 3), R^T M.
-    """
+    """Return proper R and P of M = R P (polar decomposition); det P < 0 for reflections."""
     # M = U S V^T yields R = U V^T, with the last column of U negated if that is a reflection.
     left, _, right = np.linalg.svd(matrices)
     signs = np.ones((*left.shape[:-2], 3))

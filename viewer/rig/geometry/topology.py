@@ -27,11 +27,7 @@ _HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two co
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
-    """Return triangles with coincident vertices merged, so that seams are closed.
-
-    ``positions``: (V, 3), vertices at exactly equal positions are represented by the first of them.
-    ``triangles``: (T, 3), or any other shape, vertex indices.
-    """
+    """Return triangles with vertices at equal positions merged, so that seams are closed."""
     # Sorting rows as three keys is several times faster than np.unique over rows.
     order = np.lexsort(positions.T)
     ordered = positions[order]
@@ -62,10 +58,7 @@ class Edges:
 
 
 def edges_of(corners: Indices) -> Edges:
-    """Return the edges of triangles; those between equal vertices are excluded from the pairs.
-
-    ``corners``: (T, 3), vertex indices.
-    """
+    """Return the edges of triangles (T, 3); pairs exclude those between equal vertices."""
     start = corners.ravel().astype(np.int64)
     end = np.roll(corners, -1, axis=1).ravel().astype(np.int64)
     base = int(start.max(initial=0)) + 1
@@ -80,13 +73,9 @@ def edges_of(corners: Indices) -> Edges:
 
 
 def components(count: int, pairs: Indices) -> Indices:
-    """Return the smallest member of each node's component: (count,).
-
-    In each round, every root takes the smallest label across its edges, and labels are followed
-    until they refer to themselves, so the number of rounds is logarithmic in the number of nodes.
-
-    ``pairs``: (P, 2), pairs of connected nodes.
-    """
+    """Return the smallest member of each node's component: (count,); ``pairs``: (P, 2)."""
+    # In each round, every root takes the smallest label across its edges, and labels are followed
+    # until they refer to themselves, so the number of rounds is logarithmic in the number of nodes.
     labels = np.arange(count)
     while True:
         a, b = labels[pairs[:, 0]], labels[pairs[:, 1]]
@@ -100,16 +89,15 @@ def components(count: int, pairs: Indices) -> Indices:
 
 
 def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
-    """Return which triangles must be flipped to orient neighbours consistently.
+    """Return component, flips that orient it consistently, and whether it is not orientable.
 
-    Every triangle is represented by two nodes, unflipped and flipped; edges connect consistent
-    nodes. If both are in one component, the surface is non-orientable (Moebius).
-
-    Returns ``component``: (count,), smallest triangle of each triangle's component; ``flipped``:
-    true for the smaller part of each component; of two equal parts, for the one without the first
-    triangle; ``one_sided``: triangles of components that are not orientable.
+    ``component``: smallest triangle of each triangle's component. ``flipped``: true for the smaller
+    part; of two equal parts, for the one without the first triangle. All have one entry per
+    triangle.
     """
     a, b = edges.pairs[:, 0], edges.pairs[:, 1]
+    # Every triangle is represented by two nodes, unflipped and flipped; edges connect consistent
+    # nodes. If both are in one component, the surface is non-orientable (Moebius).
     flip = np.where(edges.agree, 0, count)
     nodes = np.concatenate(
         [np.stack([a, b + flip], axis=1), np.stack([a + count, b + count - flip], axis=1)]
@@ -144,11 +132,10 @@ class Shell:
 
 
 def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
-    """Return a mesh as a shell; None if its surface is not closed.
+    """Return a mesh as a shell; None if its surface is not closed, or has over 500,000 triangles.
 
-    ``skin``: vertices at the same position must have the same influences. The result is None if
-    edges belong to more than two triangles, if neighbours have opposite orientations, if a
-    connected part is clockwise or open, or if the mesh has more than 500,000 triangles.
+    Vertices at the same position must have the same influences. A shell has no edge of more than
+    two triangles, no neighbours of opposite orientation, and no part that is clockwise or open.
     """
     if not 0 < mesh.n_triangles <= _MOST_TRIANGLES:
         return None
@@ -185,12 +172,12 @@ def _move_together(skin: Skin, copies: Ints, originals: Ints) -> bool:
 
 
 def _has_long_borders(corners: NDArray[np.int64], n_vertices: int) -> bool:
-    """Return whether more than ``_MOST_OPEN`` vertices certainly lie on openings; avoids a sort.
-
-    Around a vertex in the interior, each neighbour follows it in one triangle and precedes it in
-    another, so any numbers of the neighbours cancel out. As many unpaired edges begin as end at a
-    vertex, so at least one begins at each vertex where the numbers do not cancel out.
-    """
+    """Return whether more than ``_MOST_OPEN`` vertices certainly lie on openings; avoids a sort."""
+    # Around a vertex in the interior, each neighbour follows it in one triangle and precedes it in
+    # another, so any numbers of the neighbours cancel out. As many unpaired edges begin as end at a
+    # vertex, so at least one begins at each vertex where the numbers do not cancel out. Random
+    # numbers make it unlikely that those of different neighbours cancel; integers below 2**30 have
+    # exact sums for up to 2**23 of them.
     numbers = _scattered(n_vertices)
     sums = np.zeros(n_vertices)
     for start, end in ((0, 1), (1, 2), (2, 0)):
@@ -201,10 +188,8 @@ def _has_long_borders(corners: NDArray[np.int64], n_vertices: int) -> bool:
 
 
 def _scattered(count: int) -> Floats:
-    """Return pseudo-random integers below 2**30 (splitmix64, Steele et al. 2014).
-
-    Their sums are exact for up to 2**23 numbers. ``numpy.random`` would take longer to import.
-    """
+    """Return pseudo-random integers below 2**30 (splitmix64, Steele et al. 2014)."""
+    # ``numpy.random`` would take longer to import than the rest of this module.
     values = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     values = (values ^ values >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
     values = (values ^ values >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)

@@ -9,13 +9,7 @@ from viewer.rig.geometry.rotation import axis_rotations
 
 
 def translation_matrix(offset: Floats) -> Floats:
-    """Return the matrices that translate by ``offset``.
-
-    ``offset``: (..., 3), lengths. Returns (..., 4, 4), matrices for column vectors.
-
-    >>> float(translation_matrix(np.array([1.0, 2.0, 3.0]))[2, 3])
-    3.0
-    """
+    """Return the matrices (..., 4, 4) that translate by ``offset`` (..., 3)."""
     offset = np.asarray(offset, dtype=np.float64)
     matrices = np.zeros((*offset.shape[:-1], 4, 4))
     matrices[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
@@ -31,11 +25,7 @@ def rotation_transform(axis: int, angle: float) -> Floats:
 
 
 def affine_matrices(linear: Floats, offsets: Floats) -> Floats:
-    """Return [A t; 0 1] for linear maps A (..., 3, 3) and translations t (..., 3): (..., 4, 4).
-
-    >>> affine_matrices(2.0 * np.eye(3), np.ones((5, 3))).shape
-    (5, 4, 4)
-    """
+    """Return [A t; 0 1] for linear maps A (..., 3, 3) and translations t (..., 3): (..., 4, 4)."""
     matrices = np.zeros((*np.broadcast_shapes(linear.shape[:-2], offsets.shape[:-1]), 4, 4))
     matrices[..., :3, :3] = linear
     matrices[..., :3, 3] = offsets
@@ -44,12 +34,5 @@ def affine_matrices(linear: Floats, offsets: Floats) -> Floats:
 
 
 def apply_transform(matrix: Floats, points: Floats) -> Floats:
-    """Transform points: p' = M [p 1].
-
-    ``matrix``: (4, 4), affine matrix. ``points``: (..., 3), points in the space from which the
-    matrix maps. Returns (..., 3), points in the space to which it maps.
-
-    >>> apply_transform(translation_matrix(np.array([1.0, 0.0, 0.0])), np.zeros(3))
-    array([1., 0., 0.])
-    """
+    """Transform points (..., 3): p' = M [p 1]."""
     return points @ matrix[:3, :3].T + matrix[:3, 3]

@@ -11,22 +11,13 @@ _FLAT = 1e-5
 
 
 def unit(vectors: Floats) -> Floats:
-    """Return vectors of length 1; a vector of length 0 stays 0.
-
-    ``vectors``: (..., 3), vectors of any length. Returns (..., 3), unit vectors.
-
-    >>> unit(np.array([0.0, 3.0, 4.0])).tolist()
-    [0.0, 0.6, 0.8]
-    """
+    """Return vectors (..., 3) of length 1; a vector of length 0 stays 0."""
     lengths = np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
     return vectors / np.where(lengths == 0.0, 1.0, lengths)
 
 
 def moved_tangents(tangents: Floats, linear: Floats) -> Floats:
-    """Return tangents transformed by a matrix, t' = A t / |A t|; a reflection changes the signs.
-
-    ``tangents``: (N, 4), direction of u, and the sign s of the direction of v, s n x t. Zeros stay
-    0. ``linear``: (3, 3). Returns (N, 4), unit vectors and signs.
+    """Return tangents (N, 4) moved by A (3, 3), t' = A t / |A t|; reflections change signs.
 
     >>> moved_tangents(np.array([[2.0, 0.0, 0.0, 1.0]]), np.diag([1.0, 1.0, -1.0])).tolist()
     [[1.0, 0.0, 0.0, -1.0]]
@@ -37,17 +28,14 @@ def moved_tangents(tangents: Floats, linear: Floats) -> Floats:
 
 
 def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
-    """Multiply normals by the inverse transpose of matrices, n' = |det A| A^-T n.
-
-    The columns a, b, c of A define the cofactor matrix [b x c, c x a, a x b] = det(A) A^-T, which
-    stays finite if A is singular. Its sign is changed to the sign of the inverse transpose, so that
-    outward normals stay outward under a reflected joint (likewise, glTF 2.0, section 3.7.4,
-    reverses the winding, not the normals). Matrices (3, 3, N) and normals (N, 3) result in normals
-    (N, 3) of any length.
-    """
+    """Multiply normals (N, 3) by inverse transposes of (3, 3, N), n' = |det A| A^-T n."""
     largest = np.abs(matrices).max(axis=(0, 1))
     # Only directions matter, and products of entries near 1 do not overflow or underflow.
     a, b, c = np.swapaxes(matrices / np.where(largest > 0.0, largest, 1.0), 0, 1)
+    # The columns a, b, c of A define the cofactor matrix [b x c, c x a, a x b] = det(A) A^-T, which
+    # stays finite if A is singular. Its sign is changed to the sign of the inverse transpose, so
+    # that outward normals stay outward under a reflected joint (likewise, glTF 2.0, section 3.7.4,
+    # reverses the winding, not the normals).
     cofactors = _cross(b, c), _cross(c, a), _cross(a, b)
     x, y, z = np.ascontiguousarray(normals.T)
     moved = cofactors[0] * x + cofactors[1] * y + cofactors[2] * z

@@ -96,13 +96,10 @@ class Explanation:
 
 
 def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Explanation:
-    """Return all intermediate values of the skinning of one vertex.
+    """Return all intermediate values of the skinning of one vertex, lengths in figure units.
 
     Linear blend skinning: v' = sum_i w_i M_i [p 1]. Dual quaternion skinning: q = sum_i s_i q_i
     w_i / sum_j w_j, v' = (q / |q|) applied to the stretched p.
-
-    ``pose``: DOFs in lengths and radians. Returns lengths in figure units. Raises ``RigError`` if
-    the figure has no skin attached to a skeleton, or no such vertex.
     """
     if not figure.is_attached:
         raise RigError(f"figure {figure.name} has no skin attached to a skeleton")

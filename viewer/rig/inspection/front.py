@@ -56,22 +56,16 @@ def usual_front(up: str) -> Front:
 
 
 def front_axes(up: str) -> tuple[Front, ...]:
-    """Return the four horizontal fronts for an up axis.
-
-    >>> front_axes("y")
-    ('+x', '-x', '+z', '-z')
-    """
+    """Return the four horizontal fronts for an up axis, as '+x' for "y"."""
     return tuple(front for front in FRONTS if front[1] != up)
 
 
 def guess_front(scene: Scene) -> Front:
-    """Estimate the front of a scene; ``usual_front`` if the evidence is weak.
+    """Estimate the front of a posed scene; ``usual_front`` if the evidence is weak.
 
     Each actor votes by its posed joints (left and right, toes, face, head and tail) and the
     direction of its motion, or by the shape of its feet if it has neither joints nor captured
     points. The votes of actors that face opposite directions cancel out.
-
-    ``scene``: posed scene; not modified.
     """
     up = np.zeros(3)
     up["xyz".index(scene.up)] = 1.0
@@ -163,11 +157,7 @@ def _path(actor: Actor) -> Floats:
 
 
 def _from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
-    """Return evidence from left and right: the front is left x up.
-
-    ``places``: (J, 3), their positions. ``up``: (3,), unit vector. Returns (3,), mean of the unit
-    vectors of all pairs.
-    """
+    """Return evidence from left and right joints: the mean of the pairs' unit vectors left x up."""
     # With y up and left along +x, left x up is x cross y = z, the front; the same in any axes.
     found: dict[str, dict[str, list[Floats]]] = {}
     for (side, word), place in zip(sided_words(names), places, strict=True):
@@ -196,10 +186,7 @@ def _by_word(
 
 
 def _from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
-    """Return evidence from the ends of an animal: the head is in front, the tail behind.
-
-    A head directly above the centre, as in people, is no evidence.
-    """
+    """Return evidence from the ends of an animal: the head is in front, the tail behind."""
     words = [word for _, word in sided_words(names)]
     heads = [j for j, word in enumerate(words) if word.startswith("head")]
     tails = [j for j, word in enumerate(words) if word.startswith("tail")]
@@ -210,16 +197,13 @@ def _from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     middle = places[others or slice(None)].mean(axis=0)
     ahead = places[heads].mean(axis=0) - middle if heads else np.zeros(3)
     behind = places[tails].mean(axis=0) - middle if tails else np.zeros(3)
+    # A head directly above the centre, as in people, has no horizontal part: no evidence.
     way = _horizontal(ahead - behind, up) / (_CLEAR * size)
     return way / max(float(np.linalg.norm(way)), 1.0)
 
 
 def _from_travel(places: Floats, size: float, up: Floats) -> Floats:
-    """Return evidence from a motion: figures usually move forwards.
-
-    ``places``: (F, 3), positions of the figure, in time order. ``up``: (3,), unit vector. Returns
-    (3,), total displacement divided by path length; shorter if the path is shorter than the figure.
-    """
+    """Return evidence from positions (F, 3) over time: figures usually move forwards."""
     # A straight walk has a displacement as long as its path: length 1. Walking in a circle, or to
     # and fro, returns to the start: near 0. A path shorter than the figure is no travel but
     # balancing.
@@ -229,11 +213,7 @@ def _from_travel(places: Floats, size: float, up: Floats) -> Floats:
 
 
 def _from_soles(positions: Floats, up: Floats) -> Floats:
-    """Return evidence from a mesh alone: two symmetric soles that extend in front of the ankles.
-
-    ``positions``: (V, 3), rest vertices. ``up``: (3,), the unit vector of an axis. Returns (3,), 0
-    unless the mesh has exactly one mirror plane and stands on feet on both sides of the plane.
-    """
+    """Return evidence from a mesh alone: two symmetric soles that extend in front of the ankles."""
     # People are symmetric, so the front lies in the mirror plane; which of its two directions it is
     # show the feet: the middle of the soles (the lowest 1.5 % of the height) is in front of the
     # middle of the ankles (5 to 9 %). Both sides of the plane need a sole: a vase has one in the

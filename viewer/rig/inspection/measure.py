@@ -33,10 +33,7 @@ class Measures:
 
 
 def measure(figure: Figure) -> Measures:
-    """Measure the rest mesh of a figure whose blend shapes have been applied.
-
-    Raises ``RigError`` if the figure has no mesh.
-    """
+    """Measure the rest mesh of a figure whose blend shapes have been applied."""
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to measure")
     box = bounding_box(figure.mesh.positions)

@@ -26,11 +26,7 @@ from viewer.rig.skinning import Skinning, skin_used, skinned
 def deform_vertices(
     figure: Figure, pose: Pose | None, skinning: Skinning, vertices: Ints
 ) -> tuple[Floats, Floats]:
-    """Skin a selection of vertices, with the same result as ``viewer.rig.skinning.deform``.
-
-    ``pose``: none for the pose stored in the file. ``vertices``: (N,), indices. Returns (N, 3),
-    figure units; unit length. Raises ``RigError`` if the figure has no such vertices.
-    """
+    """Skin vertices (N,) with the same result as ``viewer.rig.skinning.deform``: two of (N, 3)."""
     check_vertices(figure, vertices)
     if pose is not None:
         figure = shaped(figure, pose.shape_weights)
@@ -47,11 +43,7 @@ def deform_vertices(
 
 
 def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = True) -> Floats:
-    """Return some vertices before skinning: the rest mesh plus the pose correctives.
-
-    ``pose``: DOFs in lengths and radians. ``vertices``: (N,), indices. ``correct``: whether to add
-    the pose correctives, if the figure has any. Returns (N, 3), vertices in the bind pose.
-    """
+    """Return vertices (N, 3) before skinning: the rest mesh plus, if wanted, the correctives."""
     rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
         return rest
@@ -60,10 +52,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
 
 
 def check_vertices(figure: Figure, vertices: Ints) -> None:
-    """Check that indices refer to vertices of a figure.
-
-    Raises ``RigError`` if an index is out of range; the message states the index and the range.
-    """
+    """Raise ``RigError`` if an index does not refer to a vertex of the figure."""
     count = 0 if figure.mesh is None else figure.mesh.n_vertices
     wrong = vertices[(vertices < 0) | (vertices >= count)]
     if count == 0:
@@ -102,11 +91,7 @@ class VertexFacts:
 def vertex_facts(
     figure: Figure, pose: Pose | None, skinning: Skinning, vertex: int, triangle: int = -1
 ) -> VertexFacts:
-    """Return the properties of a vertex.
-
-    ``pose``: none for the pose stored in the file, or for a figure without a skeleton. Raises
-    ``RigError`` if the figure has no such vertex or triangle.
-    """
+    """Return the properties of a vertex; without a pose, in that of the file."""
     chosen = np.array([vertex], dtype=np.int32)
     check_vertices(figure, chosen)
     mesh, parts, skin = figure.require_mesh(), figure.body_parts, figure.skin
@@ -135,11 +120,7 @@ def vertex_facts(
 
 
 def nearest_corner(positions: Floats, triangle: Ints, point: Floats) -> int:
-    """Return the vertex of a triangle that is closest to a point on it.
-
-    ``positions``: (3, 3), positions of the triangle's corners. ``triangle``: (3,), indices of these
-    vertices. ``point``: (3,), in the same space.
-    """
+    """Return the vertex of a triangle (3,) with corners (3, 3) that is closest to a point on it."""
     return int(triangle[np.linalg.norm(positions - point, axis=1).argmin()])
 
 

@@ -66,10 +66,7 @@ class _Quantity:
         return self.about == "joint"
 
     def shown(self, low: float, high: float) -> tuple[float, float]:
-        """Return the values at the ends of the colour map, given the lowest and highest value.
-
-        Sequential ranges include 0, diverging ones are symmetric about 0.
-        """
+        """Return the ends of the colour map: 0 is included, or the centre if diverging."""
         if self.kind == "diverging":
             most = max(-low, high) or 1.0
             return -most, most
@@ -117,11 +114,7 @@ SCALARS = {
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """Split a quantity's name into its key and the joint or field after the colon, if any.
-
-    ``name``: ``"stretch"``, ``"weight:left_knee"``. Raises ``RigError`` if there is no such
-    quantity, or a joint or field is given for a quantity without one.
-    """
+    """Split "weight:left_knee" into key and joint or field; ``RigError`` if that is invalid."""
     key, colon, about = name.partition(":")
     if key not in SCALARS:
         raise RigError(f'no scalar quantity "{key}"; {name_hint(key, SCALARS)}')
@@ -131,19 +124,14 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 def find_quantity(name: str) -> _Quantity:
-    """Return the quantity with a name, which may include a joint or field.
-
-    Raises ``RigError``: as in ``split_name``.
-    """
+    """Return the quantity with a name, which may include a joint or field."""
     return SCALARS[split_name(name)[0]]
 
 
 def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) -> Floats:
-    """Return the values of a scalar quantity.
+    """Return the values (V,) of a scalar quantity; without a pose, in the bind pose.
 
-    ``name``: a key of ``SCALARS``, with a joint or field if the quantity has one. ``pose``: none
-    for the mesh in the bind pose. Returns (V,), values in figure units or the quantity's own unit;
-    if the figure lacks the part that the quantity needs, 0, or -1 for categorical quantities.
+    If the figure lacks the part that the quantity needs, they are 0, or -1 for categorical ones.
     Raises ``RigError`` if the quantity is unknown, or the figure lacks its joint or field.
     """
     key, about = split_name(name)
@@ -178,10 +166,7 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
 
 
 def menu_title(key: str, skinning: Skinning) -> str:
-    """Return the label of a quantity in menus, with the number of influences on which it depends.
-
-    ``key``: a key of ``SCALARS``.
-    """
+    """Return the label of a quantity in menus, with the limit of influences it depends on."""
     if key != "pruning":
         return SCALARS[key].title
     count = influences_kept(skinning)
@@ -189,10 +174,7 @@ def menu_title(key: str, skinning: Skinning) -> str:
 
 
 def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
-    """Return the title of a quantity of a figure: ``"Weight of left_knee"``.
-
-    Raises ``RigError`` if the quantity is unknown.
-    """
+    """Return the title of a quantity of a figure: ``"Weight of left_knee"``."""
     quantity, (key, about) = find_quantity(name), split_name(name)
     title = menu_title(key, skinning)
     if missing_part(name, figure):
@@ -204,10 +186,7 @@ def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
 
 
 def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
-    """Return the factor to a quantity's displayed unit, and that unit's name.
-
-    Raises ``RigError`` if the quantity is unknown.
-    """
+    """Return the factor to a quantity's displayed unit, and that unit's name."""
     quantity, (key, about) = find_quantity(name), split_name(name)
     field = field_of(figure, about, key == "class") if quantity.about == "field" else None
     unit = quantity.unit if field is None else field.unit
@@ -215,10 +194,7 @@ def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
 
 
 def missing_part(name: str, figure: Figure) -> str:
-    """Return the name of the part that a figure lacks for a quantity; empty if none is missing.
-
-    Raises ``RigError`` if the quantity is unknown.
-    """
+    """Return the name of the part that a figure lacks for a quantity; empty if none is missing."""
     quantity, (key, about) = find_quantity(name), split_name(name)
     lacks = _missing(quantity.needs, figure)
     if lacks or not quantity.about:
@@ -275,10 +251,7 @@ def _informative_field(figure: Figure) -> str:
 
 
 def informative_quantity(key: str, figures: Iterable[Figure]) -> str:
-    """Return the name of a quantity with the first joint or field that is not 0 everywhere.
-
-    For quantities without a joint or field, the key is already the name.
-    """
+    """Return the name of a quantity with the first joint or field that is not 0 everywhere."""
     for figure in figures:
         if key == "weight" and (joint := most_influential(figure)) >= 0:
             return f"weight:{joint_text(figure, joint)}"
@@ -288,11 +261,7 @@ def informative_quantity(key: str, figures: Iterable[Figure]) -> str:
 
 
 def joint_of(figure: Figure, text: str) -> int:
-    """Return the joint of a case-insensitive name, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
-
-    Without a skeleton, the joints of a skin have indices only. Raises RigError if there is no such
-    joint, with suggestions, or if several joints have that name.
-    """
+    """Return the joint called "NAME", "NAME#INDEX", "#INDEX" or "INDEX", case-insensitive."""
     skeleton = figure.skeleton
     count = 0 if figure.skin is None else figure.skin.n_joints
     index = text.removeprefix("#")
@@ -324,7 +293,7 @@ def length_unit(figure: Figure) -> tuple[float, str]:
 
 
 def length_text(figure: Figure, length: float) -> str:
-    """Format a length with three digits: ``"12.3 mm"``, ``"2.31 m"`` or ``"1.5 % of the size"``.
+    """Format a length with three digits: "12.3 mm", "2.31 m" or "1.5 % of the size".
 
     Rounding errors are 0, and other lengths are at least 0.001 mm, or 0.001 % of the size.
     """

@@ -35,10 +35,7 @@ class Asked:
 
     @property
     def skin(self) -> Skin:
-        """The effective influences: as stored, or pruned and normalised as requested.
-
-        Influences of auxiliary joints are assigned to the joints that are shown in their place.
-        """
+        """Influences as stored, or pruned and normalised; auxiliary joints count as those shown."""
         skin, skeleton = skin_used(self.figure.require_skin(), self.skinning), self.figure.skeleton
         if skeleton is None or skeleton.auxiliary is None:
             return skin

@@ -26,10 +26,7 @@ _edges: Memo[Figure, Ints] = Memo()
 
 
 def stretch(asked: Asked) -> Floats:
-    """Return the largest relative change of length among each vertex's edges: (V,), percent.
-
-    100 (posed length / rest length - 1), with its sign; 0 for a vertex without edges.
-    """
+    """Return each vertex's largest change of edge length, 100 (posed / rest - 1) %: (V,)."""
     figure = asked.figure
     edges, changes = _edge_changes(asked)
     longest, shortest = np.zeros((2, figure.require_mesh().n_vertices))
@@ -51,10 +48,7 @@ def stretch_mean(asked: Asked) -> Floats:
 
 
 def area(asked: Asked) -> Floats:
-    """Return the relative change in area of the triangles around each vertex: (V,), percent.
-
-    100 (sum of posed areas / sum of rest areas - 1); 0 if all of them are degenerate at rest.
-    """
+    """Return the change of the area around each vertex, 100 (posed / rest - 1) %: (V,)."""
     figure = asked.figure
     mesh = figure.require_mesh()
     corners = mesh.triangles

@@ -29,10 +29,7 @@ def weight(asked: Asked) -> Floats:
 
 
 def dominant(asked: Asked) -> Floats:
-    """Return the joint with the largest weight at each vertex: (V,), integral; -1 for none.
-
-    Among equal weights, the joint listed first is chosen.
-    """
+    """Return the joint with the largest weight, the first of equal ones: (V,); -1 for none."""
     skin = asked.skin
     strongest = limit_influences(skin, 1)
     found = np.full(skin.n_vertices, -1.0)
@@ -57,11 +54,7 @@ def sums(asked: Asked) -> Floats:
 
 
 def entropy(asked: Asked) -> Floats:
-    """Return the entropy of each vertex's weights, H = -sum_i p_i log2 p_i: (V,), bits.
-
-    p_i = |w_i| / sum_j |w_j| (Shannon 1948): 0 bits for a single joint, 1 bit for two equal
-    weights, 2 bits for four; 0 without influence.
-    """
+    """Return H = -sum_i p_i log2 p_i of p_i = |w_i| / sum_j |w_j| (Shannon 1948): (V,), bits."""
     skin = merged(asked.skin)
     vertices, sizes = owners(skin), np.abs(skin.weights)
     totals = np.bincount(vertices, sizes, skin.n_vertices)

@@ -163,12 +163,7 @@ def skinned(
     skinning: Skinning,
     vertices: Ints | None = None,
 ) -> tuple[Floats, Floats]:
-    """Transform vertices by skinning matrices.
-
-    ``rest``: (N, 3), vertices in the bind pose, with pose correctives. ``palette``: (J, 4, 4),
-    skinning matrices. ``vertices``: (N,), indices of the vertices to transform; all if omitted.
-    Returns (N, 3), figure units, before the figure's own scale and translation; unit length.
-    """
+    """Transform rest vertices (N, 3), by default all, by a palette: positions and unit normals."""
     from viewer.rig.skin import skin_rows
 
     used, normals = skin_used(skin, skinning), mesh.normals
@@ -241,11 +236,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
 
 
 def file_method(figures: Iterable[Figure]) -> tuple[str, float | None]:
-    """Return the method and blend factor of ``Skinning`` that the files of some figures ask for.
-
-    >>> file_method([])
-    ('lbs', 0.5)
-    """
+    """Return the method and blend factor that the files of some figures ask for; LBS by default."""
     skins = [each.skin for each in figures if each.skin is not None]
     wanted = [np.zeros(1) if s.dqs_fractions is None else s.dqs_fractions for s in skins]
     if not any(fractions.any() for fractions in wanted):
@@ -273,11 +264,7 @@ def skin_used(skin: Skin, skinning: Skinning) -> Skin:
 
 
 def posed_mesh(figure: Figure, pose: Pose | None) -> Mesh:
-    """Return a figure's mesh with the positions and normals of a pose.
-
-    ``figure``: a figure with a mesh; without a skin, its mesh is returned as it is. ``pose``: pose
-    of the figure; that of the file if omitted. Raises ``RigError`` if the figure has no mesh.
-    """
+    """Return a figure's mesh in a pose, or that of the file; unchanged without a skin."""
     mesh = figure.require_mesh()
     if not figure.is_attached:
         return mesh

@@ -10,11 +10,9 @@ from viewer.rig.skin import Skin
 
 
 def rigid_vertices(skin: Skin, palette: Floats) -> Bools:
-    """Return which vertices have only joints that rotate, up to one common scale: (V,).
+    """Return which vertices (V,) have only joints that rotate, up to one common scale.
 
-    Their normals follow the blended matrix. Those of all others, whose joints scale or shear,
-    follow its inverse transpose. A joint has no effect on normals of vertices that it does not
-    influence.
+    Their normals follow the blended matrix, others the inverse transpose.
     """
     sizes = rigid_sizes(palette)
     rigid = np.ones(skin.n_vertices, dtype=np.bool_)

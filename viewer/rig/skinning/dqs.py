@@ -58,11 +58,7 @@ def deform(
 
 
 def linear_maps(skin: Skin, palette: Floats) -> Floats:
-    """Return the linear part of each vertex's motion: the rotation after the stretch.
-
-    ``palette``: (J, 4, 4), skinning matrices, bind to posed. Returns (V, 3, 3), the identity for a
-    vertex without influence.
-    """
+    """Return the linear part (V, 3, 3) of each vertex's motion: the rotation after the stretch."""
     skin = strongest_first(skin)
     maps = np.tile(np.eye(3), (skin.n_vertices, 1, 1))
     for chosen, blended, stretch in _blended(skin, *split_palette(palette, bind_positions(skin))):
@@ -71,11 +67,10 @@ def linear_maps(skin: Skin, palette: Floats) -> Floats:
 
 
 def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
-    """Split skinning matrices into a rigid motion after a stretch about each joint, M = D S.
+    """Split skinning matrices (J, 4, 4) into rigid motions after stretches about joints, M = D S.
 
-    ``palette``: (J, 4, 4), bind to posed. ``centers``: (J, 3), bind positions of the joints, the
-    fixed points of the stretches. Returns ``duals``: (J, 8), unit dual quaternions (x, y, z, w) of
-    D: the real part, then the dual part; ``stretches``: (J, 3, 4), affine matrices S.
+    Returns the unit dual quaternions (J, 8) of D, real part first, (x, y, z, w) each, and the
+    affine matrices S (J, 3, 4), whose fixed points are the bind positions ``centers`` (J, 3).
     """
     linear = palette[:, :3, :3]
     rotations = linear.copy()

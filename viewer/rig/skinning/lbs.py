@@ -54,14 +54,10 @@ def deform(
 def move(
     positions: Floats, skin: Skin, palette: Floats, normals: Floats | None = None
 ) -> tuple[Floats, Floats | None]:
-    """Transform positions, and normals if given, by blended matrices.
+    """Transform positions (V, 3), and normals if given, by blended matrices; not normalised.
 
     Frames of a clip are best transformed one by one: their matrices stay in the processor's cache,
     which is twice as fast as one large product (``tests/bench/bench_deform.py``).
-
-    ``positions``: (V, 3), in the bind pose. ``palette``: (J, 4, 4), skinning matrices. ``normals``:
-    (V, 3), normals, optional because they double the work. Returns ``positions``: (V, 3), figure
-    units; ``normals``: (V, 3) or None, not normalised.
     """
     moved = np.empty(positions.shape)
     rotated = None if normals is None else np.empty(positions.shape)
@@ -81,11 +77,7 @@ def move(
 
 
 def blended_matrices(skin: Skin, palette: Floats) -> Floats:
-    """Sum each vertex's joint matrices by weight: sum_i w_i M_i, identity without influence.
-
-    ``palette``: (J, 4, 4), skinning matrices. Returns (V, 3, 4), the affine part of the blended
-    matrices.
-    """
+    """Return the affine part (V, 3, 4) of sum_i w_i M_i, the identity without influence."""
     result = np.empty((skin.n_vertices, 3, 4))
     for rows, matrices in _blended(skin, palette):
         result[rows] = matrices.transpose(2, 0, 1)
