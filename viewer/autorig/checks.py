@@ -30,10 +30,8 @@ def newly_outside(
 ) -> tuple[int, ...]:
     """Return the joints that lie inside the template but outside the target.
 
-    ``posed``: (V, 3), posed vertices of the template. ``joints``: (J, 3) or None, joint positions
-    in the target's frame; None if they are the template's. ``transferred``: (J,) bool or None,
-    joints that are expected to be inside, unlike joints of a part that the target lacks; None for
-    all.
+    ``joints``: (J, 3) in the target's frame, by default the template's. ``transferred``: (J,), the
+    joints expected to be inside, unlike those of parts that the target lacks; by default all.
     """
     own = joint_matrices(template, pose)[:, :3, 3]
     before = outside(posed, template.require_mesh().triangles, own)
@@ -44,10 +42,7 @@ def newly_outside(
 
 
 def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> float:
-    """Return the largest distance of a reposed figure from the target, over the target's size.
-
-    ``placement``: (4, 4), figure space to the target's frame.
-    """
+    """Return the largest distance of a reposed figure from the target, over the target's size."""
     again = apply_transform(placement, deform(figure, pose)[0])
     size = box_size(bounding_box(target.positions))
     return float(np.linalg.norm(again - target.positions, axis=1).max(initial=0.0)) / size
@@ -56,11 +51,7 @@ def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> 
 def check_lines(
     figure: Figure, guarded: Bools, out: tuple[int, ...], residual: float
 ) -> list[Diagnostic]:
-    """Return messages about the results of the checks.
-
-    ``guarded``: (V,) bool, result of ``invert_skinning``. ``out``: result of ``newly_outside``.
-    ``residual``: result of ``residual_of``.
-    """
+    """Return messages about the results of ``invert_skinning`` and of the checks above."""
     lines = []
     if out:
         skeleton = figure.skeleton

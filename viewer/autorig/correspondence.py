@@ -97,11 +97,7 @@ class Matches:
 
 
 class Template:
-    """The template's surface, to which targets are matched, aligned with the target.
-
-    ``positions``: (V, 3), positions in the target's space. ``triangles``: (T, 3), vertex indices.
-    Raises ``RigError`` if there is no triangle, or SciPy is missing.
-    """
+    """The template's surface, aligned with the targets to match; ``RigError`` without triangles."""
 
     def __init__(self, positions: Floats, triangles: Ints) -> None:
         self.surface = Surface(positions, triangles)
@@ -116,10 +112,7 @@ class Template:
 
 
 def sheet_normals(mesh: Welded) -> Floats:
-    """Return the unit normal of each vertex, 0 if there is none.
-
-    Returns (W, 3), 0 for vertices without triangles, and if the two sides of a sheet cancel out.
-    """
+    """Return unit normals (W, 3), 0 without triangles and where two sides of a sheet cancel out."""
     a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
     vectors = np.cross(b - a, c - a)
     corners, count = mesh.triangles.ravel(), len(mesh.positions)
@@ -133,11 +126,7 @@ def sheet_normals(mesh: Welded) -> Floats:
 
 
 def match(template: Template, target: Welded, size: float, settings: MatchSettings) -> Matches:
-    """Match the vertices of a target that lie on the template.
-
-    ``template``: positions in the target's space. Vertices without a normal are judged by distance
-    alone.
-    """
+    """Match the vertices of a target that lie on the template."""
     points = _closest(template, target)
     normals = sheet_normals(target)
     angles = _angles(template, points, normals)
@@ -187,11 +176,7 @@ def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
 
 
 def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoints:
-    """Return the closest points on triangles that face approximately the same way.
-
-    Directions are grouped by the 26 directions of a cube's faces, edges and corners; each is within
-    28 degrees of one of them. Each group is searched in its own subset of triangles.
-    """
+    """Return the closest points on triangles that face approximately the same way."""
     count = len(positions)
     triangles, distances = np.zeros(count, dtype=np.int32), np.full(count, np.inf)
     barycentric, found = np.tile([1.0, 0.0, 0.0], (count, 1)), positions.copy()
@@ -199,6 +184,8 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
     directions = unit(grid)
     a, b, c = (template.positions[template.triangles[:, corner]] for corner in range(3))
     faces = unit(np.cross(b - a, c - a))
+    # Directions are grouped by the 26 directions of a cube's faces, edges and corners; each is
+    # within 28 degrees of one of them. Each group is searched in its own subset of triangles.
     group = (normals @ directions.T).argmax(axis=1) if count else np.zeros(0, dtype=int)
     for number in np.unique(group):
         inside = np.nonzero(group == number)[0]
@@ -238,12 +225,7 @@ _FEW = 10_000  # number of points below which starting threads costs more time t
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
-    """Return the template's vertex that corresponds to each vertex of the target, -1 for none.
-
-    ``template``, ``target``: meshes in the same space, with U and W vertices. ``distances``: (W,),
-    distances of the target's vertices from the template's surface. Returns (W,) int64, indices; no
-    vertex of the template occurs twice.
-    """
+    """Return the template's vertex at each vertex of the target (W,), -1 for none; none twice."""
     there, far = _nearest(template.positions, target.positions)
     back, _ = _nearest(target.positions, template.positions)
     links, count = edges(target.triangles), len(there)
@@ -263,12 +245,7 @@ def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
 def at_vertices(
     points: SurfacePoints, positions: Floats, corners: Ints, places: Floats, same: Ints
 ) -> SurfacePoints:
-    """Return points of a surface, some of them snapped to vertices.
-
-    ``positions``: (W, 3), the query points. ``corners``: (T, 3), the surface's triangles, as
-    indices of its U vertices. ``places``: (U, 3), positions of the U vertices. ``same``: (W,), the
-    vertex to which a point is snapped, or -1.
-    """
+    """Return points of a surface, some of them snapped to the vertex in ``same`` (W,), or -1."""
     rows = np.flatnonzero(same >= 0)
     used, first = np.unique(corners, return_index=True)
     place = np.full(len(places), -1)
@@ -300,12 +277,7 @@ def _keys(pairs: Ints, template: Welded) -> Ints:
 
 
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
-    """Return the vertices of parts whose triangles should be reversed.
-
-    ``facing_away``: (I,), islands that face away from the template's surface. Returns (V,) bool,
-    vertices of islands with a negative volume, sum a . (b x c) / 6 about their middle, that are
-    closed except for small holes, or have more than half of the area.
-    """
+    """Return the vertices (V,) of parts whose triangles should be reversed."""
     count = target.n_islands
     of = target.islands[target.triangles[:, 0]]
     corners = target.positions[target.triangles]
@@ -313,6 +285,9 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     sums = [np.bincount(of, corners[:, :, k].mean(axis=1), minlength=count) for k in range(3)]
     middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
     a, b, c = (corners[:, k] - middle[of] for k in range(3))
+    # An island that is wound backwards encloses a negative volume, sum a . (b x c) / 6 about its
+    # middle. The sign is reliable if it is closed except for small holes, or has more than half of
+    # the area.
     volumes = np.bincount(of, np.einsum("ta,ta->t", a, np.cross(b, c)), minlength=count)
     areas = np.bincount(of, np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
     is_whole = _border_edges(target, of) ** 2 <= _CLOSED * members
@@ -323,10 +298,7 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
 
 
 def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
-    """Return a mesh with the triangles at some vertices reversed, and with matching normals.
-
-    ``vertices``: (V,) bool, vertices of whole parts.
-    """
+    """Return a mesh with the triangles at vertices (V,) reversed, and with matching normals."""
     rows = np.logical_or.reduce(vertices[mesh.triangles], axis=1)
     if not rows.any():
         return mesh

@@ -53,12 +53,10 @@ def transfer(
     settings: TransferSettings | None = None,
     name: str = "rigged",
 ) -> Rigged:
-    """Rig a mesh with the rig of another figure.
+    """Rig a mesh with the rig of another figure, whose pose ``Rigged.pose`` reproduces the mesh.
 
-    ``target``: mesh to rig, not modified; the new figure, posed by ``Rigged.pose``, reproduces it.
-    ``settings``: settings; the robust method with its default limits if omitted. Raises
-    ``RigError`` if the template lacks a part, the target has no surface, no part of it meets the
-    template, or SciPy is missing.
+    Raises ``RigError`` if the template lacks a part, the target has no surface, no part of it meets
+    the template, or SciPy is missing.
     """
     how = settings or TransferSettings()
     if not template.is_attached:
@@ -81,10 +79,7 @@ def transfer(
 
 
 def robust(template: Figure, pose: Pose, target: Mesh, how: TransferSettings, name: str) -> Rigged:
-    """Transfer a rig; see ``transfer``, which checks the arguments.
-
-    ``pose``: pose without shape weights. ``how``: all settings except the method.
-    """
+    """Transfer a rig; see ``transfer``, which checks the arguments."""
     with part_of_work(span=(0.0, 0.4)):
         met = align_posed(template, pose, target, how.alignment, how.fits)
     alignment, pose, posed = met.alignment, met.pose, met.positions

@@ -76,10 +76,7 @@ def with_fields(rigged: Rigged) -> Rigged:
 
 
 def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
-    """Return a clip of the template for the rigged figure; see ``transfer_clip``.
-
-    Raises ``RigError`` if the clip is for a different skeleton.
-    """
+    """Return a clip of the template for the rigged figure; see ``transfer_clip``."""
     skeleton = rigged.figure.require_skeleton()
     return transfer_clip(
         clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale

@@ -32,8 +32,6 @@ def nearest(template: Figure, pose: Pose, target: Mesh, name: str) -> Rigged:
 
     As in the original, pose correctives are neither removed nor added back. Only nearly singular
     blended matrices are replaced by the nearest rotation, which is reported.
-
-    ``pose``: pose without shape weights.
     """
     _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]
@@ -103,17 +101,10 @@ def _figure(template: Figure, skin: Skin, target: Mesh, rest: Floats, name: str)
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:
-    """Return the map that aligns the bounding boxes of two sets of points.
+    """Return the scale and shift (4, 4) that map one bounding box to another, as Tex-An Mesh does.
 
-    p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is the rule of
-    Tex-An Mesh; an axis along which both boxes are flat keeps its scale.
-
-    ``positions``: (N, 3), points to move: the target mesh. ``onto``: (M, 3), points whose box is
-    the target: the posed template. Returns (4, 4), diagonal scale and shift. Raises ``RigError`` if
-    only one of the boxes is flat along an axis.
-
-    >>> align_boxes(np.array([[0.0, 0, 0], [2, 1, 1]]), np.array([[1.0, 1, 1], [2, 2, 2]])).tolist()
-    [[0.5, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]]
+    p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. An axis along which both
+    boxes are flat keeps its scale; ``RigError`` if only one of them is.
     """
     box, other = bounding_box(positions), bounding_box(onto)
     extents, wanted = box[1] - box[0], other[1] - other[0]

@@ -199,11 +199,7 @@ def _filled(sentence: str, values: Mapping[str, Any], texts: Mapping[str, Shown 
 
 
 def frame_range(first: int, last: int) -> Phrase:
-    """Return the phrase for one frame, or for a range that includes its last frame.
-
-    >>> str(frame_range(3, 3)), str(frame_range(3, 5))
-    ('frame 3', 'frames 3 to 5')
-    """
+    """Return the phrase "frame 3", or "frames 3 to 5" for a range that includes its last frame."""
     if first == last:
         return Phrase("frame {frame}", frame=first)
     return Phrase("frames {first} to {last}", first=first, last=last)
@@ -213,9 +209,7 @@ class Collector:
     """Collects the diagnostics of readers and operations.
 
     Repeated warnings are dropped, as are warnings after the first hundred; all errors are kept.
-
-    ``keeps_errors``: whether a reader continues after an error in order to find all errors.
-    Otherwise the first one is raised where it is recorded.
+    Without ``keeps_errors``, the first error is raised where it is recorded.
     """
 
     def __init__(self, keeps_errors: bool = False) -> None:
@@ -286,11 +280,7 @@ def _joined(alike: list[Diagnostic]) -> Diagnostic:
 
 
 def described(found: Diagnostic) -> dict[str, Any]:
-    """Return all data of a diagnostic, worded as for the command line.
-
-    Returns the code, key, severity, message, file, line (or None), JSON pointer, part, count,
-    values as returned by ``plain``, the first 100 indices, and the number of indices.
-    """
+    """Return all data of a diagnostic, worded as for the command line, with at most 100 indices."""
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     with as_data():
         return {
@@ -310,11 +300,7 @@ def described(found: Diagnostic) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a message value as JSON data.
-
-    File bytes and non-finite numbers become strings, phrases become their text and values, and
-    lists are truncated after 100 items.
-    """
+    """Return a value as JSON data: bytes and non-finite numbers as text, at most 100 items."""
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, Phrase):

@@ -51,10 +51,7 @@ def is_recorded() -> bool:
 
 
 def note_found(found: Diagnostic | str, severity: Severity = "warning") -> bool:
-    """Record a warning or note; return whether a run is being recorded.
-
-    ``severity`` applies to plain texts.
-    """
+    """Record a warning or note, a text with ``severity``; return whether a run is recorded."""
     if _current is None:
         return False
     if isinstance(found, Diagnostic):

@@ -53,12 +53,8 @@ def lint_files(
 ) -> tuple[Scene, list[Finding]]:
     """Open files together and run all checks; files that cannot be opened become findings too.
 
-    All errors for which the viewer would reject a file are recorded, and everything else in the
-    file is checked if possible.
-
-    ``paths``: as for ``viewer.loading.load``. ``max_size``: larger files, in bytes, are not read.
-    Returns ``scene``: contents of all files that could be opened; findings refer to its actors;
-    ``findings``: messages of readers, then results of checks, each with its file if known.
+    Files above ``max_size`` bytes are not read. Returns the scene of all others, and findings about
+    it: messages of readers, then results of checks, each with its file if known.
     """
     size = MAX_SIZE if max_size is None else max_size
     opened = open_files(paths, settings, size)
@@ -86,11 +82,7 @@ def open_files(
     settings: MotionSettings | None = None,
     max_size: int = MAX_SIZE,
 ) -> Opened:
-    """Read files and assemble those that match; never fails because of their contents.
-
-    ``paths``: as for ``viewer.loading.load``. ``max_size``: size in bytes above which files are not
-    read.
-    """
+    """Read files and assemble those that match; never fails because of their contents."""
     distinct = {resolved(Path(path)): Path(path) for path in reversed(paths)}
     refusals: dict[Path, ViewerError] = {}
     contents = read_files([*reversed(distinct.values())], max_size, settings, refusals)
@@ -136,10 +128,7 @@ def of_diagnostic(found: Diagnostic) -> Finding:
 
 
 def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
-    """Read the parts of a file that load lazily, so that their errors are known now.
-
-    Parts that cannot be read are reported, and dropped from the figure.
-    """
+    """Read a figure's deferred parts; those that cannot be read are reported, and dropped."""
     try:
         if figure.blend_shapes is not None:
             figure.blend_shapes.direction_values()
@@ -227,10 +216,7 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 
 
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
-    """Return the file that an error is about, or the last file read if the error has none.
-
-    The result is None if the file was not read here.
-    """
+    """Return the file of an error, or the last file read; None if it was not read here."""
     paths = [path for path, _ in contents.items()]
     found = problem.diagnostic
     if found is None or found.path is None:
@@ -315,10 +301,7 @@ def _with_actors(opened: Opened, scene: Scene) -> list[Finding]:
 
 
 def located_in(remark: Finding, actor: Actor, part: str) -> Finding | None:
-    """Return a reader's finding with its locations in an actor, or None if there are none.
-
-    ``part``: one of "mesh", "skeleton" or "clip", part of the actor.
-    """
+    """Return a reader's finding with its locations in a part of an actor, or None."""
     if part == "mesh":
         return _in_mesh(remark, actor)
     if part == "clip":
@@ -371,10 +354,8 @@ def recheck(
     """Check an open scene, and report messages of the readers of its files.
 
     Parts unchanged since opening are reported with file and line, edited parts without them.
-
-    ``paths``: the files that the scene was opened from; if omitted, those of its figures.
-    ``settings``: with which its motions were interpreted. ``since``: time at which it was opened,
-    seconds since the epoch; files changed later are reported.
+    ``paths``: by default those of its figures. ``settings``: with which its motions were
+    interpreted. ``since``: files changed after it, seconds since the epoch, are reported.
     """
     paths = paths or list(
         dict.fromkeys(one.path for actor in scene.actors for one in actor.figure.origins)

@@ -154,10 +154,7 @@ class Finding:
         return replace(self, diagnostic=found)
 
     def place(self, longest: int = 300, is_short: bool = False) -> str:
-        """Return ``file:line`` or ``file#pointer``, or the known part of it.
-
-        ``is_short``: whether the folder is omitted.
-        """
+        """Return ``file:line`` or ``file#pointer``, or what is known; short without the folder."""
         if self.file is None or self.file == Path():
             return ""
         path = printable(self.file.name if is_short else self.file, longest)

@@ -33,10 +33,7 @@ class Places:
 def places_of(
     finding: Finding, scene: Scene, skinning: Skinning | None = None, binding: bool = False
 ) -> Places:
-    """Return the positions that a finding refers to, in the current pose of the scene.
-
-    Findings about frames are best viewed with the scene at ``finding.times[0]``.
-    """
+    """Return the positions that a finding refers to, in the current pose of the scene."""
     if finding.actor is None or finding.actor >= len(scene.actors):
         return Places()
     actor = scene.actors[finding.actor]
@@ -100,12 +97,7 @@ def _middle(actor: Actor) -> Floats:
 
 
 def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> Floats:
-    """Return the points of a scene that a finding refers to, in the current pose.
-
-    ``places``: result of ``places_of``, if already computed. Returns (N, 3), scene space: vertices,
-    or else corners of triangles, or else joints; the actor's position if the finding refers to none
-    of these, or none is present; empty without an actor.
-    """
+    """Return a finding's vertices, or else corners, joints or actor, in scene space: (N, 3)."""
     if finding.actor is None or finding.actor >= len(scene.actors):
         return np.zeros((0, 3))
     if not _names_places(finding):

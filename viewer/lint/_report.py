@@ -23,11 +23,7 @@ def worst_first(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def finding_text(finding: Finding) -> str:
-    """Return one finding in the format of compilers, so that editors can jump to file and line.
-
-    The actor is named if the file does not identify it: one of several people, or a clip. One of
-    several animations is named too.
-    """
+    """Return one finding in the format of compilers, so that editors can jump to file and line."""
     place, names = "", [finding.motion]
     if finding.file is not None and finding.file != Path():
         place = finding.place()
@@ -44,10 +40,7 @@ def finding_text(finding: Finding) -> str:
 
 
 def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
-    """Return the number of findings of each severity: ``1 error, 0 warnings, 3 notes in 2 files``.
-
-    ``n_files``: number of files checked; 0 if none.
-    """
+    """Return the numbers by severity: ``1 error, 0 warnings, 3 notes in 2 files``."""
     counts = Counter(finding.severity for finding in findings)
     parts = [counted(counts[kind], kind) for kind in reversed(SEVERITIES)]
     return ", ".join(parts) + (f" in {counted(n_files, 'file')}" if n_files else "")

@@ -51,11 +51,9 @@ def lint_scene(
     options: LintOptions | None = None,
     invalid: Sequence[Mapping[str, Ints]] = (),
 ) -> list[Finding]:
-    """Run all checks on an open scene.
+    """Run all checks on an open scene: findings by actor, in the order of ``CHECKS``.
 
-    ``scene``: scene to check; not modified. ``invalid``: data of each actor that must not be
-    checked; see ``Subject``. Returns findings by actor, in the order of ``CHECKS``, then findings
-    about its figure's other animations; each has its actor and locations.
+    ``invalid``: data of each actor that must not be checked; see ``Subject``.
     """
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)

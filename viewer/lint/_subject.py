@@ -94,10 +94,7 @@ class Subject:
         return f"{rounded(length)} units" + self._relative(length)
 
     def speed(self, speed: float, is_limit: bool = False) -> str:
-        """Return a speed as text: in metres per second if the unit is known.
-
-        Otherwise, a speed that is not a limit is also given as a multiple of the size.
-        """
+        """Return a speed in metres per second if the unit is known, else a multiple of the size."""
         unit = self.actor.figure.unit
         if unit in METRES:
             return f"{rounded(speed * METRES[unit])} m/s"
@@ -106,10 +103,7 @@ class Subject:
         return f"{rounded(speed)} units per second{relative}"
 
     def size(self) -> float:
-        """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.
-
-        Figure units; 0 without either. Distant stray vertices are ignored.
-        """
+        """Return the diagonal of the mesh without strays, or else of the rest joints, or 0."""
         figure = self.actor.figure
         if figure.mesh is None:
             return 0.0 if figure.skeleton is None else box_size(bounding_box(rest_joints(figure)))
@@ -314,10 +308,7 @@ def _size(subject: Subject, figure: Figure) -> float:
 
 
 def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:
-    """Return the sampling times of a keyed clip: its frames, and steps between them. (F,).
-
-    Times are seconds on the clip's own clock.
-    """
+    """Return the times of a keyed clip's frames, and steps between them: (F,), on its clock."""
     options = subject.options
     rate = options.frame_rate or clip.frame_rate
     rate *= max(1, math.ceil(options.rate / rate))
@@ -360,11 +351,7 @@ class Counting:
 
 
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
-    """Return a scene's frame numbering: its longest capture's, or from the earliest start.
-
-    ``scene``: scene with or without motions. ``keyed_rate``: frames per second if no motion
-    consists of frames.
-    """
+    """Return a scene's frame numbering: its longest capture's, or from the earliest start."""
     moving = [actor for actor in scene.actors if actor.clip is not None]
     captured = [(each.timing, actor.offset) for actor in moving if (each := actor.captured)]
     if not captured:

@@ -30,10 +30,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]:
-    """Compare the joints' bind positions with those of the skeleton.
-
-    Figures are bound with all DOFs at 0 or in their files' own pose; the closer one is used.
-    """
+    """Compare the joints' bind positions with those of the skeleton."""
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
         return []

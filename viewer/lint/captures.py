@@ -35,10 +35,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Finding]:
-    """Report keypoints that are never visible, and those whose confidence is often low.
-
-    The worst of the latter are reported individually, worst first, and the others together.
-    """
+    """Report keypoints that are never visible, and those whose confidence is often low."""
     rows, first_frame = clip.timing.rows, clip.timing.first_frame
     numbers = np.flatnonzero(rows >= 0)
     if len(numbers) == 0:

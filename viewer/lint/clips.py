@@ -169,10 +169,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
 
 
 def _leaps(speeds: Floats, is_root: Bools) -> Floats:
-    """Return the speeds of roots that are much slower in the two steps before and after: (F, J).
-
-    Two steps, because in files with repeated frames every second step is 0. Other speeds are 0.
-    """
+    """Return (F, J) speeds of roots that are much slower two steps before and after, or 0."""
     steps = speeds[1:]
     around = np.pad(steps, ((2, 2), (0, 0)))
     count = len(steps)

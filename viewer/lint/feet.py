@@ -130,11 +130,7 @@ def _floating(
     height: float,
     may_step: bool,
 ) -> list[Finding]:
-    """Report a body whose lower foot rests above the ground.
-
-    ``height``: height of the figure.
-    ``may_step``: whether it may rest on something that is as high as a step.
-    """
+    """Report a body whose lower foot rests above the ground, or above a step."""
     lowest, size = heights.min(axis=1), track.scale * height
     step = float(track.times[1] - track.times[0])
     rests = resting_frames(lowest, track.present, step, size, limits.RESTS_FOR)
@@ -169,10 +165,7 @@ def _slipped(
     heights: Floats,
     up: int,
 ) -> list[Finding]:
-    """Report a foot that slides along the ground, where feet do not stand.
-
-    Contacts are those that clean-up and retargeting hold, so a planted foot never slides.
-    """
+    """Report a foot that slides along the ground, where feet do not stand."""
     if track.body <= 0.0:  # legs without a length
         return []
     step = float(track.times[1] - track.times[0])
@@ -221,16 +214,11 @@ def _slipped(
 
 
 def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:
-    """Return the frames in which low feet slide: (F, N).
-
-    A foot also swings close to the ground, but while another foot stands, and only after speeding
-    up. So a foot slides if it stood before or stands afterwards and does not speed up much, or if
-    no other foot stands. Starting and landing feet slide only for short times. A foot that stays
-    low and moves for longer than any swing is dragged.
-
-    ``speeds``: (F, N), body sizes per second. ``low``: (F, N), where feet touch the ground but do
-    not stand. ``step``: seconds between frames.
-    """
+    """Return the frames (F, N) in which low feet slide; ``speeds`` are body sizes per second."""
+    # A foot also swings close to the ground, but while another foot stands, and only after speeding
+    # up. So a foot slides if it stood before or stands afterwards and does not speed up much, or if
+    # no other foot stands. Starting and landing feet slide only for short times. A foot that stays
+    # low and moves for longer than any swing is dragged.
     moves = low & (speeds > limits.FAST) & (speeds < limits.SWINGS)
     result = np.zeros_like(moves)
     for foot in range(moves.shape[1]):

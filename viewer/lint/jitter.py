@@ -107,15 +107,7 @@ def _found(
 
 
 def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
-    """Return the noise around each frame: the quadratic mean of its length.
-
-    It is estimated from the smaller fourth differences in a window, which slow motion and jumps
-    hardly change.
-
-    ``positions``: (F, J, 3), positions of joints. ``present``: (F,), frames that have positions;
-    windows do not span gaps. Returns (F, J), in the unit of the positions; 0 where a run of frames
-    is shorter than the window.
-    """
+    """Return the quadratic mean of the noise (F, J); 0 in runs shorter than ``width``."""
     noise = np.zeros(positions.shape[:2])
     for first, stop in runs_of(present):
         for start in range(first, stop, _TOGETHER):

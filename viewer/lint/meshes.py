@@ -224,10 +224,7 @@ def _inside_out(
 
 
 def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
-    """Return each component's number of edges with a single valid triangle: (T,).
-
-    Missing triangles do not close a surface, because it may have had a border there.
-    """
+    """Return each component's number of edges with a single valid triangle: (T,)."""
     alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
     beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
     owners = component[np.concatenate([alone, beside])]
@@ -265,11 +262,7 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
 
 
 def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
-    """Report normals that point to the opposite side of all triangles at their vertex.
-
-    Degenerate triangles have no orientation. The sides of a thin sheet may have separate or shared
-    vertices, whose normals agree with one of the sides.
-    """
+    """Report normals that point to the opposite side of all triangles at their vertex."""
     corners = mesh.triangles[valid]
     a, b, c = (mesh.positions[corners[:, k]] for k in range(3))
     facing = unit(np.cross(b - a, c - a))

@@ -95,14 +95,7 @@ def _weights(
 
 
 def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
-    """Return the difference of each vertex's weights from its counterpart's, with sides swapped.
-
-    The sum over joints of |w(v, j) - w(counterpart of v, counterpart of j)|, for weights normalised
-    to a sum of 1.
-
-    ``symmetry``: (V,), mirror counterpart of each vertex. ``partners``: (J,), mirror counterpart of
-    each joint. Returns (V,).
-    """
+    """Return sum over joints of |w(v, j) - w(v', j')| for mirror counterparts v', j': (V,)."""
     whole = normalized(skin)
     vertices, joints = owners(whole), whole.joints
     # Each influence, and the reflected influence of the counterpart with a minus sign.

@@ -113,10 +113,7 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
 def _cost(
     subject: Subject, skin: Skin, limit: int, crowded: np.ndarray
 ) -> tuple[Phrase, np.ndarray]:
-    """Return the error of pruning, and the vertices with the largest errors first.
-
-    Vertices with unknown errors come last, and are counted.
-    """
+    """Return the error of pruning, and the vertices with the largest errors first."""
     errors, n_poses = _cut_errors(subject, limit)
     is_known = (_posable(subject, skin) & np.isfinite(errors))[crowded]
     known, lost = crowded[is_known], crowded[~is_known]

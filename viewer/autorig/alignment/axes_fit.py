@@ -20,14 +20,8 @@ def fit_axes(
 ) -> Similarity:
     """Fit a separate scale along each axis.
 
-    Each iteration solves for factors f, a shift t and, optionally, a small rotation w that minimise
-    sum (n . (x - q))^2 + 1e-5 |x - q|^2 with x = f R p + f' (w x R p) + t, or with the template's
-    axes x = R f p + w x R f' p + t, where f' are the current factors. This is linear in all
-    unknowns.
-
-    ``template``, ``target``, ``rounds``: as for ``slide``. ``rotations``: whether the rotation is
-    also refined: a rotation found with a single scale is biased towards the stretched target's
-    diagonal. Returns an alignment with factors; the best one so far if the next fit would be a
+    ``rotations`` also refines the rotation: one found with a single scale is biased towards the
+    stretched target's diagonal. Returns the best alignment so far if the next fit would be a
     reflection or too few pairs are left.
     """
     similarity, scales = start, np.full(3, start.scale)
@@ -36,6 +30,10 @@ def fit_axes(
         if len(pairs.points) < FEWEST:
             break
         before = scales
+        # Minimise sum (n . (x - q))^2 + 1e-5 |x - q|^2 over factors f, a shift t and, optionally, a
+        # small rotation w, with x = f R p + f' (w x R p) + t, or with the template's own axes
+        # x = R f p + w x R f' p + t. f' are the current factors: with f there, the products of f
+        # and w would not be linear.
         columns = _columns(pairs.points, similarity.rotation, before, rotations, own)
         found, vector, shift = _solved(pairs, columns)
         if (found <= 0.0).any():

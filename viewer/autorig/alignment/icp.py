@@ -74,10 +74,7 @@ class Cloud:
 
 
 class Triangles:
-    """A mesh as its triangles: an exact search, without pairs on the borders of holes.
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices.
-    """
+    """A mesh as its triangles: an exact search, without pairs on the borders of holes."""
 
     def __init__(self, positions: Floats, triangles: Ints, count: int) -> None:
         self.samples = sample_surface(positions, triangles, count)
@@ -100,11 +97,9 @@ def _size(points: Floats) -> float:
 
 
 def _border_edges(positions: Floats, triangles: Ints) -> Bools:
-    """Return for each corner whether the opposite edge belongs to only one triangle: (T, 3).
-
-    Coincident vertices are treated as one: a texture seam is not a border.
-    """
+    """Return for each corner whether the opposite edge belongs to only one triangle: (T, 3)."""
     _, place = np.unique(positions, axis=0, return_inverse=True)
+    # Coincident vertices are treated as one: a texture seam is not a border.
     corners = place.reshape(-1)[triangles].astype(np.int64)
     edges = np.sort(corners[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
     keys = edges[..., 0] * (int(place.max()) + 1) + edges[..., 1]
@@ -128,14 +123,7 @@ def iterate(
     rounds: int,
     scales: bool,
 ) -> Similarity:
-    """Improve an alignment until it converges.
-
-    Each iteration ignores pairs that are farther apart than three times the median, that have
-    normals more than 60 degrees apart (ignoring their signs), or that lie on the border of a hole.
-
-    ``rounds``: maximum number of iterations; fewer if the relative change of the error is below
-    1e-5. Returns the best alignment so far if too few pairs are left to continue.
-    """
+    """Improve an alignment in at most ``rounds`` iterations, until its error hardly changes."""
     similarity, before = start, np.inf
     for _ in range(rounds):
         pairs = pairs_between(template, target, similarity)
@@ -161,16 +149,7 @@ def slide(
     rounds: int,
     scales: bool,
 ) -> Similarity:
-    """Improve a good alignment by point-to-plane distances, which let surfaces slide.
-
-    Each iteration solves the linearised problem: with x = aligned p, c the mean of all x and
-    x' = x + w x (x - c) + u (x - c) + v, minimise sum (n . (x' - q))^2 + 1e-5 |x' - q|^2 over
-    the rotation w, the shift v and the relative change of scale u. The second term prevents
-    unbounded sliding.
-
-    ``template``, ``target``, ``start``, ``rounds``, ``scales``: as for ``iterate``; factors of the
-    start must be 1. Returns the best alignment so far if too few pairs are left to continue.
-    """
+    """Improve a good alignment by point-to-plane distances, which let surfaces slide."""
     similarity, best, lowest, idle = start, start, np.inf, 0
     for _ in range(rounds):
         pairs = pairs_between(template, target, similarity)
@@ -190,6 +169,9 @@ def slide(
 
 def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> Similarity:
     """Solve one linearised iteration of ``slide``."""
+    # With x = aligned p, c the mean of all x and x' = x + w x (x - c) + u (x - c) + v, minimise sum
+    # (n . (x' - q))^2 + 1e-5 |x' - q|^2 over the rotation w, the shift v and the relative change of
+    # scale u. The first sum alone would let surfaces slide without bound, as along a plane.
     center = moved.mean(axis=0)
     arms = moved - center
     size = float(np.sqrt(np.einsum("na,na->", arms, arms) / len(arms)))
@@ -237,6 +219,8 @@ def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs
 def _kept(
     similarity: Similarity, points: Floats, normals: Floats, targets: Floats, target_normals: Floats
 ) -> Bools:
+    # Pairs of a part that the other mesh lacks are far apart or on surfaces at an angle. Normals
+    # may point inwards in one of the meshes, so their signs do not count.
     distances = np.linalg.norm(similarity.apply(points) - targets, axis=1)
     cosines = np.abs(np.einsum("na,na->n", _rotated(similarity, normals), target_normals))
     return (distances <= _FAR * np.median(distances)) & (cosines >= _SAME_WAY)
@@ -274,10 +258,7 @@ class Gaps:
 
 
 def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
-    """Return the distances of samples from the surface of the other mesh.
-
-    ``template``, ``target``: as for ``iterate``.
-    """
+    """Return the distances of samples from the surface of the other mesh."""
     ours, theirs = template.samples.positions, target.samples.positions
     near = template.find(similarity.undo(theirs))
     towards = theirs - similarity.apply(near.positions)

@@ -51,12 +51,10 @@ def axis_direction(name: str) -> Floats:
 def axis_rotations(
     template_up: str, up: str | None = None, facing: str | None = None
 ) -> list[Floats]:
-    """Return the rotations that map axes to axes: 24, 4 or 1, the identity first if included.
+    """Return the rotations (3, 3) that map axes to axes: 24, 4 or 1, the least angle first.
 
-    ``template_up``: either "y" or "z", up axis of the template. Y-up figures face +z, z-up figures
-    +x. ``up``, ``facing``: axes, from ``AXES``, to which the template's up and forward axes are
-    mapped. Returns a list of (3, 3), proper rotations. Raises ``RigError`` if up and facing are the
-    same or opposite.
+    The template's up axis is mapped to ``up``, its front, +z if y is up and +x if z is up, to
+    ``facing``. Raises ``RigError`` if up and facing are the same or opposite.
     """
     for name in filter(None, (up, facing)):
         if name not in AXES:
@@ -88,20 +86,18 @@ def unit_scale(ratio: float) -> float:
 
 
 def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bool) -> Candidate:
-    """Return the best of the placements that keep the origin fixed.
-
-    ``rotations``: list of (3, 3), from ``axis_rotations``. ``scaled``: whether scales between units
-    are also tried. Returns the first of several candidates with similar errors, so that nothing is
-    rotated unnecessarily: most figures look nearly the same from behind. The error is measured in
-    one direction: a shirt on the body fits, regardless of the parts that it does not cover.
-    """
+    """Return the best placement that keeps the origin fixed; ``scaled`` also tries other units."""
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []
     for unit, rotation in product(_UNITS if scaled else (1.0,), rotations):
         similarity = Similarity(unit, rotation, np.zeros(3), np.ones(3))
+        # Only from the target to the template: a shirt on the body fits, whatever it does not
+        # cover.
         near = similarity.apply(template.find(similarity.undo(few)).positions)
         error = _trimmed_mean(np.linalg.norm(near - few, axis=1)) / target.size
         found.append(Candidate(similarity, error))
+    # The first of several candidates with similar errors, so that nothing is rotated unnecessarily:
+    # most figures look nearly the same from behind.
     enough = min(candidate.error for candidate in found) / _NO_BETTER + 1e-9
     return next(candidate for candidate in found if candidate.error <= enough)
 
@@ -112,13 +108,9 @@ def search(
     rotations: list[Floats],
     scale: float | None,
 ) -> Candidate:
-    """Return the best candidate after a few iterations for each, and more for the best four.
-
-    ``rotations``: list of (3, 3), from ``axis_rotations``. ``scale``: fixed scale; if None, the
-    search starts from the ratio of the mean distances from the centroid, which, unlike box sizes,
-    do not depend on the orientation of a mesh.
-    """
+    """Return the best candidate after a few iterations for each, and more for the best four."""
     ours, theirs = template.samples.positions, target.samples.positions
+    # Unlike box sizes, distances from the centroid do not depend on the orientation of a mesh.
     start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale
     few = [_thinned(side, 300) for side in (template, target)]
     found = []

@@ -98,10 +98,7 @@ def fit_pose(
 ) -> Fitted:
     """Rotate a template's joints and scale its limbs until its surface matches the target's.
 
-    Limbs of a symmetric template are scaled equally on both sides.
-
-    ``pose``: initial pose; not modified. Pose correctives are ignored. ``similarity``: initial map
-    from the posed template to the target; without factors.
+    Limbs of a symmetric template are scaled equally on both sides. Pose correctives are ignored.
     """
     mesh, skeleton, _ = template.attached()
     limbs = limbs_of(template)
@@ -179,11 +176,7 @@ def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fit
 def _rotate_joints(
     skeleton: Skeleton, pose: Pose, similarity: Similarity, rotations: Floats
 ) -> None:
-    """Rotate joints by rotation vectors in the target's frame, in place.
-
-    A joint whose parent has the axes P in the figure, which the alignment rotated by A, is rotated
-    by the vector (A P)^T w within its parent.
-    """
+    """Rotate joints by rotation vectors in the target's frame, in place."""
     parents = skeleton.parents
     within = joint_rotations(skeleton, pose)
     world = within.copy()
@@ -191,6 +184,8 @@ def _rotate_joints(
     for joint in below.tolist():
         # Parents come first, so the parent's axes are already final.
         world[joint] = world[parents[joint]] @ within[joint]
+    # A joint whose parent has the axes P in the figure, which the alignment rotated by A, is
+    # rotated by the vector (A P)^T w within its parent.
     axes = similarity.rotation @ world[parents[below]]
     local = np.einsum("jba,jb->ja", axes, rotations[below])
     turned = rotation_vector_to_matrix(local) @ within[below]
@@ -269,13 +264,7 @@ def solve_step(
     grown: Floats,
     scales: bool,
 ) -> PoseStep:
-    """Solve the linear problem above.
-
-    ``parents``: (J,), -1 for roots. ``rotated``: (J, 3), sum of the rotations of previous
-    iterations, radians. ``grown``: (2, J), sum of the limbs' growths in previous iterations.
-    Returns a step in which no joint rotates by more than 0.3 radians and nothing grows by more than
-    a fifth.
-    """
+    """Solve the linear problem above after rotations (J, 3) and growths (2, J) in total."""
     middle = aligned.positions[pairs.vertices].mean(axis=0)
     frame = _Frame(middle, size, aligned, limbs, parents)
     matrix, right = _equations(frame, pairs.vertices, pairs.targets, pairs.normals)
@@ -297,6 +286,8 @@ def solve_step(
     solved = np.asarray(np.linalg.solve(matrix + np.diag(now), right), dtype=np.float64)
     rotations = np.zeros((n_joints, 3))
     rotations[below] = solved[7 : 7 + 3 * len(below)].reshape(-1, 3)
+    # The linearisation holds for small steps only, so larger ones are cut; the next iteration goes
+    # on.
     angles = np.linalg.norm(rotations, axis=1, keepdims=True)
     rotations = rotations * (_MOST / np.maximum(angles, _MOST))
     growths = np.clip(solved[-2 * n_joints :].reshape(2, -1), -_GROWTH, _GROWTH)
@@ -305,13 +296,11 @@ def solve_step(
 
 
 def _penalties(n_rotating: int, n_joints: int) -> Floats:
-    """Return the penalties on all rotations and growths as a quadratic form.
-
-    Making all limbs thicker, as clothes do, is not penalised, only differences between limbs are.
-    Otherwise the figure as a whole would grow and extend beyond the target.
-    """
+    """Return the penalties on all rotations and growths as a quadratic form."""
     penalties = np.diag(np.repeat([_ROTATED, _GROWN], [3 * n_rotating, 2 * n_joints]))
-    # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised.
+    # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised. All limbs
+    # become thicker under clothes; otherwise the figure as a whole would grow instead, and extend
+    # beyond the target.
     penalties[-n_joints:, -n_joints:] -= _GROWN / n_joints
     return penalties
 

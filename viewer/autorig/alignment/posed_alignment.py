@@ -96,10 +96,8 @@ def align_posed(
 ) -> PosedAlignment:
     """Align a template with a target, rotating its joints if its pose differs.
 
-    ``pose``: pose of the template, without shape weights. ``settings``: known facts about the
-    alignment. With a separate scale per axis, nothing is fitted; with a known scale, only the pose
-    is fitted. Returns an alignment of the unchanged template, unless a fitted template is much
-    better. Raises ``RigError``: see ``align``.
+    With a separate scale per axis, nothing is fitted; with a known scale, only the pose is fitted.
+    Returns an alignment of the unchanged template, unless a fitted template is much better.
     """
     posed = deform(template, pose)[0]
     ours = Posed(posed, template.require_mesh().triangles)

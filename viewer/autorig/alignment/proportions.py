@@ -38,11 +38,7 @@ class Limbs:
 
 
 def limbs_of(figure: Figure) -> Limbs:
-    """Return a figure's limbs.
-
-    An axis points from the joint to those below it, each weighted by its fraction of the mesh,
-    or, for a leaf joint, to the mean of its vertices.
-    """
+    """Return a figure's limbs."""
     mesh, skeleton, skin = figure.attached()
     parents = skeleton.parents
     weights = _dense(skin)
@@ -51,6 +47,8 @@ def limbs_of(figure: Figure) -> Limbs:
         # Children come after their parents, so this joint's own sum is already final.
         if parents[joint] >= 0:
             fractions[:, parents[joint]] += fractions[:, joint]
+    # An axis points from the joint to those below it, each weighted by its fraction of the mesh,
+    # or, for a leaf joint, to the mean of its vertices.
     joints = _bound_joints(skin)
     ways = np.zeros_like(joints)
     below = np.flatnonzero(parents >= 0)
@@ -68,11 +66,7 @@ def limbs_of(figure: Figure) -> Limbs:
 
 
 def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Figure:
-    """Return a figure with scaled limbs: mesh, bind pose and rest skeleton.
-
-    ``lengths``, ``girths``: (J,), factors along and across the limbs. Returns a figure with the
-    same joints and weights; all other vertex data is unchanged.
-    """
+    """Return a figure with limbs (J,) scaled along and across: mesh, bind pose, rest skeleton."""
     mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(
         "ja,jb->jab", limbs.axes, limbs.axes

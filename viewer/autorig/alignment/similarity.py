@@ -70,19 +70,10 @@ class Similarity:
 
 
 def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
-    """Return the similarity that maps points closest to their targets, in the least-squares sense.
+    """Return the similarity that maps points (N, 3) closest to targets, in the least-squares sense.
 
-    With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
-    s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).
-
-    ``points``, ``targets``: (N, 3), pairs, N >= 3. ``scale``: scale; fitted if omitted. Raises
-    ``RigError`` if there are fewer than three pairs, or the points are collinear: any rotation
-    about the line then fits equally well.
-
-    >>> corners = np.eye(3)
-    >>> found = fit_similarity(corners, 2.0 * corners[[1, 2, 0]])
-    >>> round(found.scale, 12), np.allclose(found.rotation[:, 0], [0.0, 1.0, 0.0])
-    (2.0, True)
+    Raises ``RigError`` if there are fewer than three pairs, or the points are collinear: any
+    rotation about the line then fits equally well.
     """
     if len(points) < 3 or len(points) != len(targets):
         raise RigError(
@@ -94,6 +85,8 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
         extents = np.linalg.svd(cloud, compute_uv=False)
         if extents[1] <= _ON_LINE * extents[0]:
             raise RigError("alignment: expected points in a plane or in space, found a line")
+    # With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
+    # s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).
     left, values, right = np.linalg.svd(q.T @ p)
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     rotation = (left * signs) @ right

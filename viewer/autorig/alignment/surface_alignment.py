@@ -134,11 +134,7 @@ class Alignment:
 
 
 def misfit(alignment: Alignment, is_part: bool) -> float:
-    """Return the score by which alignments are compared: the mean of the uneven errors both ways.
-
-    ``is_part``: whether the target is only a part of the template; other parts of the template are
-    then ignored.
-    """
+    """Return the mean of the uneven errors both ways, by which alignments are compared."""
     towards, away = alignment.uneven
     return towards if is_part else 0.5 * (towards + away)
 
@@ -151,13 +147,8 @@ def align(
 ) -> Alignment:
     """Find the similarity that aligns the template with the target.
 
-    A target that is already in place, up to its unit and rotations by multiples of 90 degrees, is
-    not moved: fitting a part (a shirt, an open shell) would only move it away. Otherwise all
-    rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
-    refined on the surfaces.
-
-    ``template_up``: either "y" or "z", the template's up axis. Raises ``RigError`` if a mesh has no
-    area, landmarks are collinear, or axes contradict each other.
+    Raises ``RigError`` if a mesh has no area, landmarks are collinear, or axes contradict each
+    other.
     """
     report_fraction(0.0, "aligning the template")
     samples = settings.samples
@@ -175,6 +166,10 @@ def align(
             report_fraction(0.2, "aligning the template")
             start = iterate(coarse[0], coarse[1], start, _ROUNDS, settings.scale != "none")
         return Alignment.of(ours, theirs, _refined(fine, start, settings), "landmarks")
+    # A target that is already in place, up to its unit and rotations by multiples of 90 degrees, is
+    # not moved: fitting a part (a shirt, an open shell) would only move it away. Otherwise all
+    # rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
+    # refined on the surfaces.
     rotations = axis_rotations(template_up, settings.up, settings.facing)
     stays = in_place(coarse[0], coarse[1], rotations, scaled=settings.scale != "none")
     report_fraction(0.1, "aligning the template")

@@ -17,16 +17,13 @@ _LIGHTEST = 1e-9  # minimum area of a vertex relative to the mean, as areas are 
 
 
 def laplacian(mesh: Welded) -> tuple[Any, Floats]:
-    """Return the Laplace operator of any mesh, and the area of each vertex.
+    """Return the Laplace operator of any mesh, sparse (W, W), and the area of each vertex (W,).
 
-    Islands with non-manifold edges have no cotangent operator: they get the graph
-    Laplacian of their edges, and their vertices all have the mesh's mean area.
-
-    ``mesh``: W vertices. Scale it to size 1 if the areas are to be compared with the operator,
-    which has no unit. Returns ``operator``: sparse (W, W), symmetric and positive semidefinite;
-    rows sum to 0; ``areas``: (W,), squared units, at least 1e-9 of their mean; all 1 if no triangle
-    has an area.
+    The operator is symmetric and positive semidefinite and has no unit: scale the mesh to size 1 if
+    areas are to be compared with it. Areas are at least 1e-9 of their mean; all 1 without area.
     """
+    # Islands with non-manifold edges have no cotangent operator: they get the graph Laplacian of
+    # their edges, and their vertices all have the mesh's mean area.
     broken = np.unique(mesh.islands[non_manifold_edges(mesh.triangles)])
     is_broken: Bools = np.isin(mesh.islands, broken)
     graph_like = is_broken[mesh.triangles[:, 0]]
@@ -43,18 +40,8 @@ def laplacian(mesh: Welded) -> tuple[Any, Floats]:
 def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     """Return the cotangent Laplacian: L_ij = -(cot a + cot b) / 2 on edges, L_ii = -sum_j L_ij.
 
-    a and b are the angles opposite to the edge (Pinkall and Polthier 1993). A triangle with an
-    angle below 0.6 degrees, or without area, is treated as equilateral: it still connects its
-    vertices, and the contribution of each triangle stays positive semidefinite, which clamping
-    large cotangents would not ensure.
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns a sparse (V, V)
-    matrix, dimensionless, with the opposite sign of the Laplacian in calculus.
-
-    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> L = cotangent_laplacian(square, np.array([[0, 1, 2], [0, 2, 3]]))
-    >>> L.toarray().round(12)[0].tolist()
-    [1.0, -0.5, 0.0, -0.5]
+    a and b are the angles opposite to the edge (Pinkall and Polthier 1993); the sign is the
+    opposite of the Laplacian in calculus. Sparse (V, V), dimensionless.
     """
     halves = 0.5 * _steady(_cotangents(positions, triangles))
     # The angle at corner k is opposite the edge between the other two corners.
@@ -63,24 +50,16 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
 
 
 def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
-    """Return the Laplacian of the graph of edges: L_ij = -1, L_ii = number of neighbours.
-
-    ``triangles``: (T, 3), vertex indices. Returns a sparse (V, V) matrix, dimensionless.
-    """
+    """Return the Laplacian of the graph of edges: L_ij = -1, L_ii = number of neighbours."""
     links = edges(triangles)
     return _from_edges(n_vertices, links, np.ones(len(links)))
 
 
 def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
-    """Return the area of the surface nearest to each vertex, "mixed" at obtuse angles.
-
-    In a triangle without an obtuse angle, vertex a owns (|ab|^2 cot c + |ac|^2 cot b) / 8; in an
-    obtuse triangle, the obtuse corner owns half of the area and the others a quarter (Meyer et al.
-    2003, fig. 4).
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns (V,), squared
-    units; the sum is the area of the mesh.
-    """
+    """Return the area of the surface nearest to each vertex (V,), "mixed" at obtuse angles."""
+    # In a triangle without an obtuse angle, vertex a owns (|ab|^2 cot c + |ac|^2 cot b) / 8; in an
+    # obtuse triangle, the obtuse corner owns half of the area and the others a quarter (Meyer et
+    # al. 2003, fig. 4).
     cotangents = _cotangents(positions, triangles)
     corners = positions[triangles]
     # The edge opposite each corner.
@@ -107,6 +86,9 @@ def _cotangents(positions: Floats, triangles: Ints) -> Floats:
 
 
 def _steady(cotangents: Floats) -> Floats:
+    # A triangle with an angle below 0.6 degrees, or without area, is treated as equilateral: it
+    # still connects its vertices, and the contribution of each triangle stays positive
+    # semidefinite, which clamping large cotangents would not ensure.
     thin: Bools = np.abs(cotangents).max(axis=1, initial=0.0) > _STEEPEST
     return np.where(thin[:, None], _EVEN, cotangents)
 

@@ -33,16 +33,11 @@ def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
 
 
 def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSamples:
-    """Return evenly distributed points of a surface, deterministically.
-
-    Positions along the cumulative area are evenly spaced, so every triangle gets points in
-    proportion to its area, rounded up or down. Within a triangle, the point is a (1 - sqrt u) + b
-    sqrt u (1 - v) + c v sqrt u (Turk 1990), with u and v from the R2 sequence (multiples of the
-    plastic number's powers).
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Raises ``RigError`` if
-    no triangle has an area.
-    """
+    """Return evenly distributed points of a surface, deterministically."""
+    # Positions along the cumulative area are evenly spaced, so every triangle gets points in
+    # proportion to its area, rounded up or down. Within a triangle, the point is a (1 - sqrt u) + b
+    # sqrt u (1 - v) + c v sqrt u (Turk 1990), with u and v from the R2 sequence (multiples of the
+    # plastic number's powers).
     chosen = _even_triangles(positions, triangles, count)
     plastic = 1.32471795724474602596  # the real root of x^3 = x + 1
     u, v = (np.arange(1, count + 1) * plastic**-power % 1.0 for power in (1, 2))
@@ -56,11 +51,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
 
 
 def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
-    """Return some vertices of a surface, approximately evenly distributed by area.
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. Returns (N,), sorted
-    vertex indices, each once; N <= count. Raises ``RigError`` if no triangle has an area.
-    """
+    """Return at most ``count`` vertices, sorted, approximately evenly distributed by area."""
     return np.unique(triangles[_even_triangles(positions, triangles, count), 0])
 
 

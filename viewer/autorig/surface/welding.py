@@ -41,10 +41,8 @@ class Welded:
 def weld(positions: Floats, triangles: Ints) -> Welded:
     """Join coincident vertices, drop triangles that collapse to edges, and label the islands.
 
-    ``positions``: (V, 3), any unit. Vertices closer than 1e-4 of the median edge are treated as
-    coincident. ``triangles``: (T, 3), vertex indices. Returns a triangle without area is preserved
-    if its corners differ: it closes a gap at a T-junction, where only one side of an edge has a
-    vertex. Raises ``RigError`` if SciPy is missing.
+    A triangle without area is preserved if its corners differ: it closes a gap at a T-junction,
+    where only one side of an edge has a vertex.
     """
     first, vertices = _joined_exactly(positions)
     tolerance = _NEAR * _median_edge(positions, triangles)
@@ -63,11 +61,7 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
 
 
 def islands(n_vertices: int, triangles: Ints) -> Ints:
-    """Return the connected component of each vertex.
-
-    ``triangles``: (T, 3), vertex indices. Returns (V,) int32, labels from 0, in the order of their
-    first vertices.
-    """
+    """Return each vertex's connected component (V,), numbered in the order of first vertices."""
     from scipy import sparse
     from scipy.sparse import csgraph as graph
 
@@ -111,14 +105,13 @@ def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
 
 
 def _joined_nearby(positions: Floats, tolerance: float) -> Any:
-    """Return a label for each position; positions within the tolerance get the same label.
-
-    Each round merges every position with its nearest neighbour, so the size of clusters at least
-    halves per round; finding all pairs in one pass would take memory quadratic in a cluster's size.
-    """
+    """Return a label for each position; positions within the tolerance get the same label."""
     from scipy import sparse, spatial
     from scipy.sparse import csgraph as graph
 
+    # Each round merges every position with its nearest neighbour, so the size of clusters at least
+    # halves per round; finding all pairs in one pass would take memory quadratic in a cluster's
+    # size.
     labels: Any = np.arange(len(positions))
     kept = labels
     while True:

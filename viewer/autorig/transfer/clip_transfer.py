@@ -20,17 +20,12 @@ def transfer_clip(
     figure_scale: float = 1.0,
     path_scale: float | None = None,
 ) -> Clip | SampledClip:
-    """Return a clip of the template for the rigged target.
-
-    Angles are unchanged; lengths are scaled with the figure, so that a path requires the same
-    number of footsteps. The clip keeps the template's own axes, including its up axis.
+    """Return a clip of the template for the rigged target: angles unchanged, lengths scaled.
 
     ``length_scale``: target units per unit of the template's figure space, 1 if nothing was scaled.
-    ``path_scale``: replaces ``length_scale`` for the figure's translation and its roots, which
-    scale with the length of the legs; None for the same factor. Returns a clip with the same type,
-    name and timing. Shape weights of captures are dropped, as the target has a different shape.
-    Raises ``RigError`` if the clip has a different number of joints, or moves a DOF that does not
-    exist.
+    ``path_scale``: replaces it for the figure's translation and its roots, which scale with the
+    length of the legs. Shape weights of captures are dropped, as the target has a different shape.
+    Raises ``RigError`` if the clip has a different number of joints, or moves a missing DOF.
     """
     path = length_scale if path_scale is None else path_scale
     roots = skeleton.parents < 0

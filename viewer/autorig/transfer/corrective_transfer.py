@@ -26,13 +26,9 @@ def transfer_correctives(
 ) -> Correctives | None:
     """Return correctives interpolated at the closest template point of each vertex, and scaled.
 
-    The closest point of an unmatched vertex may be on a different limb, so
-    correctives fade smoothly to 0 at unmatched vertices.
-
-    ``triangles``: (T, 3), triangles of the template. ``matched``: (V,) bool, vertices that lie on
-    the template. ``positions``: (V, 3), the target's vertices. ``target_triangles``: (F, 3).
-    ``scale``: target units per template unit. The result is None if the result would have more than
-    ``MOST_NUMBERS`` values.
+    The closest point of an unmatched vertex may be on a different limb, so correctives fade
+    smoothly to 0 at unmatched vertices. None if the result would have more than ``MOST_NUMBERS``
+    values.
     """
     offsets = correctives.values()
     if len(offsets) * len(positions) * 3 > MOST_NUMBERS:

@@ -35,18 +35,12 @@ class InvertedSkinning:
 
 
 def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedSkinning:
-    """Undo linear blend skinning: rest = B^-1 (t - d), with sum_j w_j A_j = [B | d].
-
-    Only the 3 x 3 part is inverted. If its smallest singular value is below ``SMALLEST_STRETCH``,
-    the nearest rotation (polar factor) replaces it, as dividing by a tiny value would tear the
-    mesh; a vertex without influences is unchanged.
-
-    ``positions``: (V, 3), posed vertices. ``palette``: (J, 4, 4), skinning matrices of the pose,
-    bind to posed.
-    """
+    """Undo linear blend skinning: rest = B^-1 (t - d), with sum_j w_j A_j = [B | d]."""
     matrices = blended_matrices(skin, palette)
     linear = matrices[:, :, :3]
     guarded = _is_singular(linear)
+    # Dividing by a tiny singular value would tear the mesh; the nearest rotation (polar factor)
+    # replaces such a matrix. A vertex without influences has the identity.
     inverted = linear.copy()
     if guarded.any():
         inverted[guarded] = nearest_rotations(linear[guarded])[0]
@@ -56,12 +50,10 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
 
 
 def _is_singular(linear: Floats) -> Bools:
-    """Return the matrices whose smallest singular value is too small: (V,) bool.
-
-    As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; singular
-    values are computed only if that bound is inconclusive.
-    """
+    """Return the matrices whose smallest singular value is too small: (V,) bool."""
     squares = np.einsum("vab,vab->v", linear, linear)
+    # As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2;
+    # singular values are computed only if that bound is inconclusive.
     bound = 2.0 * np.abs(np.linalg.det(linear)) / np.where(squares > 0.0, squares, 1.0)
     doubtful = np.flatnonzero(bound < SMALLEST_STRETCH)
     singular = np.zeros(len(linear), dtype=np.bool_)
@@ -72,16 +64,7 @@ def _is_singular(linear: Floats) -> Bools:
 
 
 def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> Floats:
-    """Smooth the neighbourhoods of guarded vertices by least squares.
-
-    The result minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices
-    and their two-ring, with all others fixed, with the graph Laplacian L and lambda = 0.01. The
-    problem is linear in x, so one linear system solves it.
-
-    ``inverted``: result of ``invert_skinning``. ``posed``: (V, 3), the vertices t that posing
-    should reproduce. ``triangles``: (T, 3), vertex indices; coincident vertices move together.
-    Returns (V, 3), rest positions, which equal those in ``inverted`` away from guarded vertices.
-    """
+    """Smooth guarded vertices by least squares; others keep their rest positions (V, 3)."""
     if not inverted.guarded.any():
         return inverted.positions
     from scipy import sparse
@@ -95,6 +78,9 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
         touched = links[free[links].any(axis=1)]
         free[touched.ravel()] = True
     own = np.flatnonzero(free)
+    # Minimise sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
+    # two-ring, with all others fixed, the graph Laplacian L and lambda = 0.01. The problem is
+    # linear in x: (B^T B + lambda L^T L) x = B^T (t - d).
     laplacian = _laplacian(count, links)
     normal, right = _normal_equations(inverted, posed, welded.vertices, free)
     # The Laplacian acts on each coordinate separately, hence the Kronecker product.

@@ -36,14 +36,7 @@ def surface_shifts(
     target_triangles: Ints,
     max_distance: float,
 ) -> tuple[Floats, Bools]:
-    """Return the vectors from points to the closest points of a target, and their reliability.
-
-    ``positions``, ``normals``: (V, 3), the template's vertices, aligned with the target.
-    ``target_positions``: (W, 3), the target's vertices. ``target_triangles``: (T, 3).
-    ``max_distance``: maximum distance in the target's unit. Returns ``shifts``: (V, 3), target
-    minus template; ``matched``: (V,) bool, whether the points are close enough, with surfaces at
-    most 60 degrees apart in either orientation.
-    """
+    """Return vectors (V, 3) to the closest points of a target, and which are reliable (V,)."""
     found = Surface(target_positions, target_triangles).closest(positions)
     facing = triangle_normals(target_positions, target_triangles)[found.triangles]
     cosines = np.abs(np.einsum("va,va->v", facing, normals))
@@ -56,8 +49,6 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
 
     A root uses the boundary with its children. Rows are not normalised; a joint without a boundary
     has an empty row.
-
-    ``parents``: (J,), -1 for roots.
     """
     owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
     count = skin.n_joints
@@ -84,18 +75,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
 def transfer_joints(
     joints: Floats, parents: Ints, regressor: JointRegressor, shifts: Floats, matched: Bools
 ) -> TransferredJoints:
-    """Move joints by the displacement of the surface around them.
-
-    J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the vector d_v to the
-    target and the rows k_j of a regressor. As only displacements are regressed, the error of the
-    regressor in a posed mesh cancels out. If less than half of a row is matched, the joint moves
-    with its parent.
-
-    ``joints``: (J, 3), joint positions, posed and aligned with the target. ``parents``: (J,), -1
-    for roots; parents come first. ``regressor``: the model's own regressor, or
-    ``boundary_weights``. ``shifts``: (V, 3), from ``surface_shifts``. ``matched``: (V,) bool,
-    whether each shift is reliable. The result is in the unit of ``joints``.
-    """
+    """Move joints by the displacement of the surface around them."""
     rows, columns, weights = regressor.joints, regressor.vertices, regressor.weights
     count = len(joints)
     used = np.where(matched[columns], weights, 0.0)
@@ -104,6 +84,10 @@ def transfer_joints(
     total = np.bincount(rows, used, minlength=count)
     # Weights of both signs in a row may nearly cancel out, which makes the row unreliable.
     transferred = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
+    # J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the vector d_v to the
+    # target and the rows k_j of a regressor. As only displacements are regressed, the error of the
+    # regressor in a posed mesh cancels out. If less than half of a row is matched, the joint moves
+    # with its parent.
     sums = [np.bincount(rows, used * shifts[columns, axis], minlength=count) for axis in range(3)]
     moves = np.stack(sums, axis=1) / np.where(transferred, total, 1.0)[:, None]
     for joint in np.flatnonzero(~transferred).tolist():
@@ -113,33 +97,23 @@ def transfer_joints(
 
 
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
-    """Return whether joints lie outside a mesh: (J,) bool, also for a mesh that is inside out.
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices. ``joints``: (J, 3), in
-    the same space.
-    """
+    """Return whether joints lie outside a mesh: (J,) bool, also for a mesh that is inside out."""
     outer: Bools = np.abs(winding_numbers(positions, triangles, joints)) < _INSIDE
     return outer
 
 
 def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Floats:
-    """Return the solid angle of a mesh seen from points, over 4 pi.
-
-    A triangle a, b, c seen from the origin covers the angle W with tan(W / 2) = a . (b x c) /
-    (|a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|) (Van Oosterom and Strackee 1983). Holes
-    make the sum a fraction (Jacobson, Kavan, Sorkine-Hornung 2013), negative if the mesh is
-    inside out: compare the absolute value with one half to test for the inside.
-
-    ``positions``: (V, 3), any unit. ``triangles``: (T, 3), vertex indices, counter-clockwise from
-    outside. ``points``: (N, 3), points to test, none of them on the surface. Returns (N,),
-    unitless.
-    """
+    """Return the solid angle of a mesh seen from points (N,), over 4 pi; negative if inside out."""
     total = np.zeros(len(points))
     step = max(1, _BLOCK // max(1, len(points)))
     for first in range(0, len(triangles), step):
         corners = positions[triangles[first : first + step]]
         a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
         la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+        # A triangle a, b, c seen from the origin covers the angle W with tan(W / 2) = a . (b x c) /
+        # (|a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|) (Van Oosterom and Strackee 1983). Holes
+        # make the sum a fraction (Jacobson, Kavan, Sorkine-Hornung 2013): one half separates inside
+        # and outside.
         above = np.einsum("nta,nta->nt", a, np.cross(b, c))
         below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
         total += np.arctan2(above, below).sum(axis=1)

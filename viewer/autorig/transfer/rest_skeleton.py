@@ -51,21 +51,18 @@ def fit_rest_skeleton(
     transferred: Bools | None,
     original: Skeleton | None = None,
 ) -> RestSkeleton:
-    """Find rest offsets that put a posed skeleton's joints at given positions.
+    """Find rest offsets that put a posed skeleton's joints at given positions (J, 3).
 
-    The target's joint j has the world linear part R P_j, where P_j is the joint's linear part in
-    the template's pose and R is the alignment's rotation. So the offset from its parent i is (R
-    P_i)^-1 (p_j - p_i), which includes the scaled translations of the DOFs. The rest root is the
-    template's, scaled like the legs; the figure's translation moves it to the target, and R is
-    included in the root's rotation.
-
-    ``joints``: (J, 3), joint positions in the target's frame. ``transferred``: (J,) bool or None,
-    joints that were measured on the target. A symmetric template then gives a symmetric skeleton:
-    left and right offsets are averaged, or taken from the measured side. None keeps the joints
-    unchanged. ``original``: the template's skeleton before its limbs were scaled; None if they were
-    not. Returns a skeleton with lengths in the target's unit.
+    ``transferred``: (J,), joints that were measured on the target. A symmetric template then gives
+    a symmetric skeleton: left and right offsets are averaged, or taken from the measured side. None
+    keeps the joints unchanged. ``original``: the template's skeleton before its limbs were scaled.
     """
     skeleton, skin = template.require_skeleton(), template.require_skin()
+    # The target's joint j has the world linear part R P_j, where P_j is the joint's linear part in
+    # the template's pose and R is the alignment's rotation. So the offset from its parent i is (R
+    # P_i)^-1 (p_j - p_i), which includes the scaled translations of the DOFs. The rest root is the
+    # template's, scaled like the legs; the figure's translation moves it to the target, and R is
+    # included in the root's rotation.
     scale = similarity.scale * pose.figure_scale
     rotated = world_matrices(skeleton, pose)[:, :3, :3]
     moves = scale * _moves(skeleton, pose)
@@ -114,10 +111,7 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
 
 
 def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Bools) -> Floats:
-    """Return offsets with equal changes left and right, if the template's joints are symmetric.
-
-    The averaged values are changes from the scaled template, in its rest axes.
-    """
+    """Return offsets with equal changes left and right, if the template's joints are symmetric."""
     skeleton = template.require_skeleton()
     try:
         partners = joint_partners(template)
@@ -129,6 +123,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
     rest = world_matrices(skeleton, zero)[:, :3, :3]
     has_parent = skeleton.parents >= 0
     frames = np.where(has_parent[:, None, None], rest[skeleton.parents], np.eye(3))
+    # The averaged values are changes from the scaled template, in its rest axes.
     changes = offsets - scale * skeleton.rest_translations
     straight = np.einsum("jab,jb->ja", frames, changes)
     mirrored = straight[partners] * flip
@@ -182,11 +177,7 @@ def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
 def _rotate_roots(
     skeleton: Skeleton, pose: Pose, rotation: Floats
 ) -> tuple[Skeleton, list[Diagnostic]]:
-    """Rotate the roots by the alignment, in place; ball joints are rotated by their DOFs.
-
-    Limits of a root apply to the template's world, not to the target's: they are
-    widened to include the pose.
-    """
+    """Rotate the roots by the alignment, in place; ball joints are rotated by their DOFs."""
     roots = np.flatnonzero(skeleton.parents < 0)
     wanted = rotation @ joint_rotations(skeleton, pose)[roots]
     rows = rotation_rows(skeleton)[roots]
@@ -200,6 +191,7 @@ def _rotate_roots(
     # for; for other joints, the DOFs are unchanged and the quaternion is solved for.
     angles = _angles_within((np.swapaxes(beneath, 1, 2) @ wanted)[ball], low, high)
     pose.dofs[rows[ball]] = angles
+    # Limits of a root apply to the template's world, not to the target's, so the pose widens them.
     beyond = ((angles < low) | (angles > high)).any(axis=1)
     limits[rows[ball], 0] = np.minimum(low, angles)
     limits[rows[ball], 1] = np.maximum(high, angles)
@@ -218,11 +210,9 @@ def _rotate_roots(
 
 
 def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
-    """Return angles about x, y, z: the triple of the two for a rotation that is within the limits.
-
-    (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
-    """
+    """Return angles about x, y, z: of the two triples of a rotation, the one within limits."""
     first = matrix_to_euler(rotations)
+    # (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
     other = np.stack([first[:, 0] + np.pi, np.pi - first[:, 1], first[:, 2] + np.pi], axis=1)
     other -= 2.0 * np.pi * np.round(other / (2.0 * np.pi))
     excess = [
@@ -241,12 +231,10 @@ def _move_roots(skeleton: Skeleton, pose: Pose, joints: Floats) -> None:
 
 
 def _bind_matrices(parents: Ints, inverse_bind: Floats, longer: Floats, scale: float) -> Floats:
-    """Return the bind matrices of the joints: the template's bind pose with the new lengths.
-
-    Each local bind matrix B_parent^-1 B keeps its linear part; its translation is scaled, and
-    changed by the same amount as the rest offset.
-    """
+    """Return the bind matrices of the joints: the template's bind pose with the new lengths."""
     bind = np.asarray(np.linalg.inv(inverse_bind), dtype=np.float64)
+    # Each local bind matrix B_parent^-1 B keeps its linear part; its translation is scaled, and
+    # changed by the same amount as the rest offset.
     local = bind.copy()
     below = np.flatnonzero(parents >= 0)
     local[below] = inverse_bind[parents[below]] @ bind[below]
@@ -259,15 +247,10 @@ def _bind_matrices(parents: Ints, inverse_bind: Floats, longer: Floats, scale: f
 
 
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
-    """Return the ratio of the heights of two skeletons' roots above the feet, both at rest.
-
-    The root's height above the feet is roughly the leg length, and step length is proportional to
-    it. If limbs were scaled or the whole figure was stretched, root heights and translations
-    therefore scale with the legs.
-
-    ``up``: either "y" or "z", up axis of both skeletons. ``otherwise``: result if there are no
-    legs, as for hands, heads, or a root on the ground.
-    """
+    """Return the ratio of two rest roots' heights above the feet; ``otherwise`` without legs."""
+    # The root's height above the feet is roughly the leg length, and step length is proportional to
+    # it. If limbs were scaled or the whole figure was stretched, root heights and translations
+    # therefore scale with the legs. Hands, heads and a root on the ground have no legs.
     axis = "xyz".index(up)
     heights = _heights(before, axis)
     low, span = heights.min(), np.ptp(heights)

@@ -63,11 +63,7 @@ class WeightTransfer:
 
 
 def nothing_matched(distances: Floats, size: float) -> str:
-    """Return the message for a target that does not meet the template anywhere.
-
-    ``distances``: (V,), distances from the template. ``size``: the target's box diagonal, in the
-    same unit.
-    """
+    """Return the message for a target that does not meet the template anywhere."""
     far = float(np.median(distances)) / size
     return (
         "no vertex of the target meets the template: expected a target aligned with it, found "
@@ -89,11 +85,7 @@ def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
 
 
 def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnostic, ...]:
-    """Return messages about matched, reversed and inpainted parts.
-
-    ``inpainted``: (W,) bool, the vertices that were inpainted. ``method``: solver; "direct" by
-    default.
-    """
+    """Return messages about matched, reversed and inpainted parts."""
     ratio = float(found.matched.mean())
     values = {
         "n": int(found.matched.sum()),

@@ -91,11 +91,9 @@ def transferred_weights(
 ) -> WeightTransfer:
     """Transfer weights by closest points, and inpaint vertices that do not meet the template.
 
-    ``positions``: (V, 3), the target's vertices. ``triangles``: (T, 3), triangles of the target.
-    The weights have rows that sum to 1. No weight of the template is dropped, only inpainted
-    weights below 1e-6, and those of corners with a barycentric coordinate below 1e-6. Raises
-    ``RigError`` if no vertex of the target meets the template, the target is a point, weights of
-    the template are missing, or SciPy is missing.
+    Rows sum to 1. Only inpainted weights, and corners with a barycentric coordinate, below 1e-6 are
+    dropped. Raises ``RigError`` if no vertex of the target meets the template, the target is a
+    point, weights of the template are missing, or SciPy is missing.
     """
     source = weight_matrix(weights, template.triangles)
     size = box_size(bounding_box(positions))
@@ -159,14 +157,7 @@ def _without_residue(points: SurfacePoints) -> SurfacePoints:
 def nearest_weights(
     template: Floats, weights: Skin, positions: Floats, max_distance: float = 0.05
 ) -> WeightTransfer:
-    """Copy the weights of the nearest vertex.
-
-    ``template``: (V_S, 3), the template's vertices, aligned with the target. ``weights``: the
-    template's skin; weights are copied unchanged. ``positions``: (V, 3), the target's vertices.
-    ``max_distance``: fraction of the target's box diagonal up to which a vertex is reported as
-    matched. It does not affect the weights. Returns ``angles`` are all 0: this method does not use
-    them.
-    """
+    """Copy the weights of the nearest vertex unchanged; ``max_distance`` is only reported."""
     vertices, distances = nearest_vertices(template, positions)
     skin = skin_rows(weights, vertices)
     near = distances <= max_distance * box_size(bounding_box(positions))
@@ -234,15 +225,10 @@ def _inpainted(
 def inpaint(
     laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools
 ) -> tuple[Any, str]:
-    """Solve for the weights of unmatched vertices.
+    """Return the weights of unknown vertices, sparse (U, J), and the solver that succeeded.
 
-    ``laplacian``: sparse (W, W), positive semidefinite. ``areas``: (W,), areas of the vertices,
-    positive. ``weights``: sparse (W, J) in rows, weights; only those of matched vertices are read.
-    ``matched``, ``unknown``: (W,) bool, known and unknown vertices; each island of unknown ones
-    must touch a known one. Vertices that are neither are ignored. Returns ``weights``: sparse (U,
-    J) in rows, weights of the unknown vertices, in order. No weight is negative; rows sum to 1;
-    ``method``: solver that succeeded: "direct" unless that failed. Raises ``RigError`` if no method
-    solves the system, or SciPy is missing.
+    ``laplacian``: sparse (W, W), positive semidefinite. Only weights of matched vertices are read;
+    each island of unknown ones must touch one. No result is negative; rows sum to 1.
     """
     from scipy import sparse
 
@@ -350,13 +336,7 @@ def _ratio(a: Floats, b: Floats) -> Floats:
 
 
 def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) -> Any:
-    """Blend weights with the mean of their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours).
-
-    ``weights``: sparse (W, J) in rows, rows that sum to 1 keep that sum. ``triangles``: (F, 3),
-    vertex indices; their edges define neighbours. ``active``: (W,) bool, vertices that change; the
-    others are only read. Returns a sparse (W, J) matrix; in changed rows, new weights below 1e-6
-    are dropped, and rows rescaled to their previous sum.
-    """
+    """Blend active rows with their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours)."""
     from scipy import sparse
 
     links = edges(triangles)
@@ -382,12 +362,7 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) 
 
 
 def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> Bools:
-    """Return the vertices connected to a source by a path of edges no longer than ``reach``.
-
-    ``positions``: (W, 3), any unit. ``triangles``: (F, 3), vertex indices. ``sources``: (W,) bool,
-    vertices at which the paths start. ``reach``: maximum length in the unit of ``positions``.
-    Returns (W,) bool, reached vertices, including the sources.
-    """
+    """Return the vertices (W,) on a path of edges from a source no longer than ``reach``."""
     from scipy import sparse
     from scipy.sparse import csgraph as graph
 
@@ -406,8 +381,7 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:
     """Return a skin's weights as a sparse (V, J) matrix whose rows sum to 1.
 
-    ``skin``: stored weights need not sum to 1; repeated weights for a joint are added, negative
-    ones set to 0. ``triangles``: (T, 3), triangles of the same mesh. Vertices without triangles may
+    Repeated weights for a joint are added, negative ones set to 0. Vertices without triangles may
     have no weights. Raises ``RigError`` if the skin has fewer vertices than the triangles refer to,
     or the weights of a triangle corner sum to 0.
     """
@@ -428,12 +402,7 @@ def weight_matrix(skin: Skin, triangles: Ints) -> Any:
 
 
 def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) -> Skin:
-    """Return a sparse (V, J) matrix of weights as a skin.
-
-    ``rows``: sparse (V, J) in rows, rows that sum to 1. ``inverse_bind``: (J, 4, 4),
-    bind-space-to-joint matrices. ``max_influences``: number of strongest influences kept per
-    vertex, rescaled to a sum of 1; all if omitted.
-    """
+    """Return sparse rows (V, J) as a skin, by default with all influences; rows still sum to 1."""
     rows.sort_indices()
     skin = Skin(rows.indptr, rows.indices, rows.data, inverse_bind)
     return skin if max_influences is None else limit_influences(skin, max_influences)
@@ -473,13 +442,7 @@ def _matrix(skin: Skin) -> Any:
 
 
 def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
-    """Return the nearest vertex of the template for each point.
-
-    ``template``: (V, 3), positions of its vertices, in the points' space. ``points``: (N, 3),
-    positions of the target's vertices. Returns ``vertices``: (N,) int32, ``skin_rows(skin,
-    vertices)`` returns the target's skin; ``distances``: (N,), distance to each of these vertices.
-    Raises ``RigError`` if the template has no vertex, or SciPy is missing.
-    """
+    """Return the template's nearest vertex to each point (N,), and the distances (N,)."""
     if len(template) == 0:
         raise RigError("expected a template with vertices, found none")
     from scipy import spatial
