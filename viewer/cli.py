@@ -33,13 +33,10 @@ _DOWNWARD = ("-y", "-z")  # values of --up and --front; they are not options
 
 @standard_streams()
 def run(arguments: Sequence[str]) -> int:
-    """Run one command.
+    """Run one command, given without the program's name, and return its exit code.
 
-    Signals end the command as they would end the program; afterwards, the caller's handlers are
-    restored.
-
-    ``arguments``: arguments without the program's name. Returns the exit code: 0, the code of the
-    ``ViewerError``, or 128 plus the signal number.
+    The code is 0, that of the ``ViewerError``, or 128 plus the signal number. Signals end the
+    command as they would end the program; afterwards, the caller's handlers are restored.
     """
     try:
         with watched():

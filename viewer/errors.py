@@ -62,10 +62,7 @@ class ViewerError(Exception):
 
 
 class FormatError(ViewerError):
-    """A file is invalid.
-
-    ``diagnostic``: diagnostic with the file, and the line if the format has lines.
-    """
+    """A file is invalid; its diagnostic has the file, and the line if the format has lines."""
 
     diagnostic: Diagnostic
 

@@ -155,14 +155,10 @@ def _mine() -> _Watch | None:
 
 @contextmanager
 def watched() -> Iterator[None]:
-    """Raise signals within the block, except where they are deferred or held.
-
-    The previous handlers are restored afterwards. Outside the main thread, this does nothing,
-    because Python handles signals only in the main thread.
-
-    Raises ``Interrupted``: in the block, or at its beginning if ``watch_program`` has recorded a
-    signal.
-    """
+    """Raise signals within the block as ``Interrupted``, except where deferred or held."""
+    # The previous handlers are restored afterwards. Outside the main thread, this does nothing,
+    # because Python handles signals only in the main thread. A signal that ``watch_program`` has
+    # recorded is raised at the beginning.
     global _current
     outer = _mine()
     if outer is not None or threading.current_thread() is not threading.main_thread():
@@ -193,11 +189,9 @@ def watch_program(received: Sequence[int] = ()) -> None:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Defer signals until the end of the block, for calls into C libraries.
-
-    If no watch is active, because another program uses the package as a library, that program's
-    own handlers are called at the end.
-    """
+    """Defer signals until the end of the block, for calls into C libraries."""
+    # If no watch is active, because another program uses the package as a library, that program's
+    # own handlers are called at the end.
     watch = _mine()
     if watch is not None:
         with _held(watch, True):
@@ -225,10 +219,7 @@ def raising() -> Iterator[None]:
 
 
 class Postponed:
-    """The signals received in a ``postponed`` block.
-
-    ``number``: number of the first signal; 0 if there was none.
-    """
+    """The first signal of a ``postponed`` block; 0 if there was none."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -259,10 +250,8 @@ class Postponed:
 
 @contextmanager
 def postponed() -> Iterator[Postponed]:
-    """Record the first signal in the block; one that follows at least a second later acts as usual.
-
-    Outside the main thread, no signal is received.
-    """
+    """Record the first signal in the block; one at least a second later acts as usual."""
+    # Outside the main thread, no signal is received.
     signals = Postponed()
     is_main = threading.current_thread() is threading.main_thread()
     try:
@@ -296,10 +285,7 @@ def hold() -> None:
 
 
 def poll(in_any_thread: bool = False) -> None:
-    """Raise a deferred signal, at a point between complete units of work.
-
-    Raises ``Interrupted`` if there was a signal.
-    """
+    """Raise a deferred signal, at a point between complete units of work."""
     watch = _current if in_any_thread else _mine()
     if watch is not None:
         watch.poll()

@@ -21,8 +21,6 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
     ``alike``: smallest similarity ratio, as measured by difflib: 1 for equal names. Names that
     contain the text count as having exactly this ratio, unless the text is a single letter.
 
-    >>> near_names("left_kne", ["right_knee", "left_knee", "head"])
-    ['left_knee']
     >>> near_names("knee", ["head", "L_Knee"])
     ['L_Knee']
     """
@@ -43,11 +41,7 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
 
 
 def did_you_mean(text: str, names: Iterable[str], alike: float = 0.6) -> str:
-    """Return a question that offers the nearest names, empty if none is near; see ``near_names``.
-
-    >>> did_you_mean("rendr", ["render", "rig"])
-    'did you mean render?'
-    """
+    """Return a question that offers the nearest names, empty if none is near."""
     return question(near_names(text, names, alike))
 
 
@@ -63,9 +57,7 @@ def question(names: Sequence[str]) -> str:
 
 
 def name_hint(text: str, names: Iterable[str]) -> str:
-    """Return the clause that follows ``no joint is called "x";`` in a message.
-
-    Returns the nearest names; if none is near, all of a short list or the beginning of a long list.
+    """Return the clause that follows ``no joint is called "x";``: near names, else some of all.
 
     >>> name_hint("tail", ["hip", "knee"])
     'there are 2: hip, knee'

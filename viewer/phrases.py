@@ -58,11 +58,9 @@ def in_window() -> Iterator[None]:
 
 @contextmanager
 def as_data() -> Iterator[None]:
-    """Word the messages of this thread for the command line, even while a window is open.
-
-    For JSON and records of runs, which are read elsewhere: programs that compare them find one
-    wording, and ``render --panels`` opens a window's interface without a user in front of it.
-    """
+    """Word the messages of this thread for the command line, even while a window is open."""
+    # For JSON and records of runs, which are read elsewhere: programs that compare them find one
+    # wording, and ``render --panels`` opens a window's interface without a user in front of it.
     before = _is_data.set(True)
     try:
         yield
@@ -86,9 +84,7 @@ def printable(text: object, limit: int = 200) -> str:
 
 
 def quoted(word: bytes | str | None, limit: int = 40) -> Shown:
-    r"""Return a word from a file in double quotes, on one line, truncated if it is long.
-
-    None is the end of the file.
+    r"""Return a word from a file in double quotes, on one line; None is the end of the file.
 
     >>> quoted(b"up\x00"), quoted("left")
     ('"up\\x00"', '"left"')
@@ -132,10 +128,7 @@ def file_size(count: int) -> Shown:
 
 
 def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> Shown:
-    """Return a count with its noun and, if given, the verb that agrees with it.
-
-    ``noun``: singular noun, whose last word is changed to the plural: ``"negative weight"``.
-    ``one``, ``many``: verb for one and for several: ``"is"``, ``"are"``; no verb if omitted.
+    """Return a count with its noun and, if given, the verb for one or many that agrees with it.
 
     >>> counted(1, "vertex", "has", "have"), counted(3, "vertex", "has", "have")
     ('1 vertex has', '3 vertices have')

@@ -70,11 +70,9 @@ def silent() -> AbstractContextManager[None]:
 
 @contextmanager
 def part_of_work(title: str = "", span: tuple[float, float] | None = None) -> Iterator[None]:
-    """Pass progress reported in the block on as that of a part of the work.
-
-    ``title``: stands before the descriptions of its steps. ``span``: fractions of the whole work at
-    which the part begins and ends; its steps then become percentages of the whole.
-    """
+    """Pass progress reported in the block on as that of a part of the work."""
+    # The title stands before the descriptions of its steps. The span is the fractions of the whole
+    # work at which the part begins and ends; its steps then become percentages of the whole.
     outer = _part.get()
     if outer is None:
         yield

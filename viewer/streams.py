@@ -18,11 +18,9 @@ _MOST_LINKS = 40  # the limit of the Linux kernel
 
 
 def is_stdout(path: str | Path) -> bool:
-    """Return whether a path names standard output, or is a link to such a name.
-
-    A file to which the stream is redirected does not count. It must never be replaced, because the
-    caller may append to it.
-    """
+    """Return whether a path names standard output, or is a link to such a name."""
+    # A file to which the stream is redirected does not count. It must never be replaced, because
+    # the caller may append to it.
     text = str(path)
     for _ in range(_MOST_LINKS):
         if text in _STDOUT:
@@ -35,20 +33,13 @@ def is_stdout(path: str | Path) -> bool:
 
 
 def require_stdout(path: str | Path) -> None:
-    """Check a path that names standard output.
-
-    Raises ``OutputError`` if standard output is closed; the message gives the name.
-    """
+    """Check that standard output, which a path names, is not closed."""
     if is_stdout(path) and getattr(sys.stdout, "buffer", None) is None:
         raise OutputError(f"{printable(path, 300)}: standard output is closed")
 
 
 def write_stdout(path: str | Path, data: bytes) -> None:
-    """Write bytes to standard output.
-
-    Raises ``OutputError`` if the stream is closed or not writable, or its disk is full. Raises
-    ``BrokenPipeError`` if the reader has closed the stream.
-    """
+    """Write bytes to standard output."""
     require_stdout(path)
     try:
         sys.stdout.flush()
@@ -68,11 +59,9 @@ def summary_stream(output: str | Path) -> TextIO:
 
 @contextlib.contextmanager
 def standard_streams() -> Iterator[None]:
-    """Ignore errors of messages in the block, and reserve the standard descriptors.
-
-    A message that cannot be written changes neither result nor exit code. If the error stream is
-    closed, messages are dropped; ``print`` would write them into the output.
-    """
+    """Ignore errors of messages in the block, and reserve the standard descriptors."""
+    # A message that cannot be written changes neither result nor exit code. If the error stream is
+    # closed, messages are dropped; ``print`` would write them into the output.
     before = sys.stderr
     with contextlib.ExitStack() as stack:
         if sys.stdin is None or sys.stdout is None or before is None:

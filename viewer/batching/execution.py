@@ -54,10 +54,9 @@ class FunctionJob:
 def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
     """Run one item; a failure becomes a result, and only a signal is raised.
 
-    ``call``: called with the item. An int that it returns is the exit code, where 0 and 1 stand for
-    success; a dict is the values of the result; anything else is ignored. The result has the
-    captured text, recorded diagnostics, values and outputs. Raises ``Interrupted`` if a signal
-    arrives whose handling is not deferred.
+    An int that ``call`` returns is the exit code, where 0 and 1 stand for success; a dict is the
+    values of the result; anything else is ignored. The result also has the captured text, the
+    recorded diagnostics and the outputs.
     """
     out, err = io.StringIO(), io.StringIO()
     start = time.perf_counter()

@@ -48,13 +48,10 @@ def find_inputs(
 
     ``words``: files, folders, patterns such as ``data/**/*.npz`` (a name that exists is not a
     pattern), ``@list.txt`` for a list, and ``-`` for a list on standard input. ``lists``: files
-    with one path per line, or separated by null bytes, as by ``find -print0``; ``-`` for standard
-    input. ``suffixes``: suffixes of the files taken from a folder; by default, those that identify
-    a format. ``keeps_folders``: whether each folder is one input. Otherwise its files are the
-    inputs, except for recordings and models that consist of a folder. ``output``: folder of the
-    outputs. If it is in a searched folder, its files are not used as inputs, which matters when a
-    batch is resumed. Raises ``ViewerError`` if there is no input, a file or list is missing, or a
-    pattern or folder yields nothing.
+    with one path per line, or separated by null bytes, as by ``find -print0``. ``suffixes``: of the
+    files taken from a folder; by default, those that identify a format. ``keeps_folders``: whether
+    each folder is one input, as recordings and models that consist of a folder always are.
+    ``output``: folder of the outputs, whose files are not inputs of a batch that is resumed.
     """
     wanted = {suffix.lower() for suffix in suffixes} or {*SUFFIXES} - {*_AMBIGUOUS}
     search = _Search(wanted, keeps_folders, os.path.abspath(output) if output else "")
@@ -209,10 +206,7 @@ class _Search:
                 self._folders.add(path)
 
     def _inside(self, top: str) -> Iterator[tuple[str, bool]]:
-        """Yield files and recordings in a folder and its subfolders, except hidden ones.
-
-        Each path is paired with whether it is a folder.
-        """
+        """Yield visible files and recordings below a folder, each with whether it is a folder."""
         visited, left = set[tuple[int, int]](), [top]
         while left:  # not recursive: folders may be thousands of levels deep
             folder = left.pop()

@@ -33,12 +33,8 @@ _LONGEST = 300  # maximum length of a name in a message, characters
 
 
 def template_of(output: str, suffix: str) -> str:
-    """Return the template for output names.
-
-    ``suffix``: suffix of the files in such a folder, such as ``bvh``; ``folder`` for outputs that
-    are folders; empty if ``output`` must be a template. Raises ``ViewerError`` if a field is
-    unknown, or neither a field nor a suffix is given.
-    """
+    """Return the template for output names; outputs in a folder get the suffix ``suffix``."""
+    # The suffix is "folder" for outputs that are folders, and empty if a template is required.
     if _fields(output):
         if suffix:
             raise ViewerError(
@@ -90,10 +86,7 @@ def _fields(template: str, option: str = "-o") -> list[str]:
 
 
 def items_of(inputs: Inputs, template: str = "") -> list[Item]:
-    """Return the items of a batch, in the order of the inputs.
-
-    ``template``: template for output names; empty if nothing is written.
-    """
+    """Return the items in the order of the inputs; nothing is written without a template."""
     pieces = list(Formatter().parse(template))
     here = os.getcwd()
     items = []
@@ -152,11 +145,7 @@ def filled(template: str, item: Item) -> str:
 def check_further_outputs(
     option: str, template: str, items: Sequence[Item], more_inputs: Iterable[str] = ()
 ) -> list[Item]:
-    """Check the names of a second output of each item.
-
-    Raises ``ViewerError`` if a field is unknown, or a file would be written twice or replace an
-    input.
-    """
+    """Return the items of a second output of each; refuse names used twice or of an input."""
     _fields(template, option)
     further = [replace(item, output=filled(template, item)) for item in items]
     try:
@@ -167,13 +156,9 @@ def check_further_outputs(
 
 
 def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> None:
-    """Check that no two items have the same output and no output is an input.
-
-    Names that differ only in case refer to the same file on some systems, and results are likely to
-    be copied to one of these.
-
-    Raises ``ViewerError``: the message lists the outputs and their inputs.
-    """
+    """Check that no two items have the same output and no output is an input."""
+    # Names that differ only in case refer to the same file on some systems, and results are likely
+    # to be copied to one of these.
     _check_clashes(items)
     files = [file for item in items for file in item.files] + list(more_inputs)
     real = _RealPaths()
@@ -211,11 +196,7 @@ def _check_clashes(items: Sequence[Item]) -> None:
 def check_summaries(
     files: Mapping[str, str], items: Sequence[Item], more_inputs: Iterable[str] = ()
 ) -> None:
-    """Check that files about the whole batch differ from inputs, outputs and each other.
-
-    ``files``: the file of each option, such as ``--table``; empty for none. Raises ``ViewerError``:
-    the message names the option.
-    """
+    """Check that files about the batch, by option, differ from inputs, outputs and each other."""
     real, here = _RealPaths(), os.getcwd()
     given = {option: path for option, path in files.items() if path}
     if not given:

@@ -53,10 +53,7 @@ _CELL = (240, 320)  # maximum size of a picture, pixels
 
 
 def check_overview(path: str | Path) -> None:
-    """Check, before the batch starts, that a file is a page or a picture.
-
-    Raises ``UnsupportedFormatError`` if the suffix belongs to another kind of file.
-    """
+    """Check, before the batch starts, that a file is a page or a picture."""
     suffix = Path(path).suffix.lower()
     if suffix not in (*PAGES, *_PICTURES):
         known = ", ".join((*PAGES[:1], *_PICTURES))
@@ -75,12 +72,8 @@ def overview_files(path: str, count: int) -> list[str]:
 
 
 def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list[str]:
-    """Write an overview of a batch; return a line about each written file.
-
-    ``path``: a page (``PAGES``), or a picture; several pictures are written if one cannot hold all.
-    Raises ``ViewerError`` if a sheet is requested, but no item has written a picture. Raises
-    ``OutputError`` if a file cannot be written.
-    """
+    """Write a page or pictures about a batch; return a line about each written file."""
+    # Several pictures are written if one cannot hold all.
     path = Path(path)
     check_overview(path)
     if path.suffix.lower() in PAGES:
@@ -371,10 +364,7 @@ def _tag(name: str, content: str, kind: str = "") -> str:
 
 
 def row(cells: Iterable[str], kinds: Sequence[str], head: bool = False) -> str:
-    """Return a row of a table.
-
-    ``kinds``: class of each cell; may be empty.
-    """
+    """Return a row of a table; ``kinds`` are the classes of its cells, empty for none."""
     name = "th" if head else "td"
     pairs = zip(cells, kinds, strict=True)
     return _tag("tr", "".join(_tag(name, cell, kind) for cell, kind in pairs))

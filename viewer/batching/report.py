@@ -77,11 +77,7 @@ class Report:
 
 
 class ReportFile:
-    """A report that is being written.
-
-    ``path``: the file; its folder is created if necessary. Raises ``OutputError`` if it cannot be
-    written.
-    """
+    """A report that is being written; its folder is created if necessary."""
 
     def __init__(self, path: Path, replaces: bool = False) -> None:
         self.path = path
@@ -170,10 +166,7 @@ def _data(value: object) -> object:
 
 
 def read_results(path: Path) -> list[Result]:
-    """Read a report; if an item has several results, the last one is used.
-
-    Raises ``ViewerError`` if it cannot be read, or is not a report.
-    """
+    """Read a report; if an item has several results, the last one is used."""
     results: dict[tuple[str, str], Result] = {}
     n_lines = 0
     try:

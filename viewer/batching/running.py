@@ -83,11 +83,7 @@ class _KeyedJob:
 
 
 def shard_of(items: Sequence[Item], text: str) -> list[Item]:
-    """Return the items of one of several shards: every N-th item, beginning with the I-th.
-
-    ``text``: ``I/N``, with I from 0 to N - 1. Raises ``ViewerError`` if the text is not of this
-    form.
-    """
+    """Return every N-th item, beginning with the I-th, for ``I/N`` with I from 0 to N - 1."""
     first, _, count = text.partition("/")
     if not (first.isdecimal() and count.isdecimal() and 0 < int(count) <= 10**9):
         raise ViewerError(f"--shard: expected I/N, such as 0/8, found {printable(text, 40)}")
@@ -106,14 +102,9 @@ def run_batch(
     on_result: Callable[[Result], None] | None = None,
     on_note: Callable[[str], None] | None = None,
 ) -> Report:
-    """Run the items of a batch; a failed item never stops the others.
-
-    The first signal ends the batch after the running items are finished; a second one cancels them.
-
-    ``job``: called once per item, and again if its worker failed. Raises ``Interrupted`` if a
-    second signal cancels the batch; the report contains the finished items. Raises ``ViewerError``
-    if the batch cannot start. Raises ``OutputError`` if the report cannot be written.
-    """
+    """Run the items of a batch; a failed item never stops the others."""
+    # The first signal ends the batch after the running items are finished; a second one cancels
+    # them and raises Interrupted, and the report contains the finished items.
     start = time.perf_counter()
     earlier = _earlier(settings)
     keyed: Job = job
@@ -197,12 +188,8 @@ def _is_there(result: Result) -> bool:
 
 
 def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
-    """Return the key of an item, which changes whenever its result may change.
-
-    Files that an input refers to, such as textures, are not included.
-
-    Raises ``OSError`` if a file cannot be read, or is a pipe or device.
-    """
+    """Return the key of an item, which changes whenever its result may change."""
+    # Files that an input refers to, such as textures, are not included.
     total = blake2b(digest_size=_SIZE)
     where = item.output or item.name
     for text in (settings, where):

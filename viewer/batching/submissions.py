@@ -82,11 +82,8 @@ def opened(
     """Open a folder or a zip archive; unpacked files are removed at the end.
 
     Links that lead out of the folder count as missing files: a submission can't use the files of
-    others.
-
-    ``expected``, ``alike``: patterns of its files; see ``choose``. ``temporary``: folder for
-    unpacked files; the system's temporary folder if omitted or missing. Raises ``FormatError`` if
-    it is not a readable folder or archive, or the files to compare can't be chosen.
+    others. ``expected``, ``alike``: patterns of its files; see ``choose``. ``temporary``: folder
+    for unpacked files; the system's temporary folder if omitted or missing.
     """
     path = Path(path)
     if path.is_dir():
@@ -141,10 +138,7 @@ def _names_in(folder: Path) -> list[str]:
 def _unpack(
     path: Path, folder: Path, expected: Sequence[str], alike: Sequence[str]
 ) -> tuple[_Chosen, Path]:
-    """Unpack the chosen files of an archive, or of the only archive in it.
-
-    Returns the chosen paths and the folder that they are relative to.
-    """
+    """Unpack the chosen files of an archive, or of the only one in it; return its folder, too."""
     shown = path
     for depth in range(_DEEPEST):
         base = folder / str(depth)
@@ -206,11 +200,9 @@ def is_archive(path: str) -> bool:
 
 
 def find_submissions(paths: Sequence[str | Path]) -> _Found:
-    """Return the submissions that paths refer to, in the order of the paths, then by name.
-
-    ``paths``: if there are several, each is a submission. A single folder is a submission if it
-    directly contains readable files; otherwise, each of its folders and archives is one.
-    """
+    """Return the submissions that paths refer to, in the order of the paths, then by name."""
+    # One of several paths is a submission. A single folder is a submission if it directly contains
+    # readable files; otherwise, each of its folders and archives is one.
     given = [Path(path) for path in paths]
     entries = _entries(given[0]) if len(given) == 1 else []
     inside = [one for one in entries if one.is_dir() or is_archive(one.name)]
@@ -269,14 +261,11 @@ def choose(
     """Return the files of a submission to compare.
 
     The files nearest to the top of the folder are preferred, since submissions often contain
-    build folders, backups and the course's own data.
-
-    ``names``: paths of all files, relative to the submission, with slashes; without junk.
-    ``expected``: patterns of the required files: each matches one file. A pattern with a slash is
-    compared with the whole path, otherwise with the name of the file. ``alike``: patterns from the
-    reference (``patterns_of``), used without ``expected`` unless none matches: then the folder
-    nearest to the top that has readable files is compared. Raises ``FormatError`` if a file is
-    missing, or there are several to choose from.
+    build folders, backups and the course's own data. ``names``: paths relative to the submission,
+    with slashes; without junk. ``expected``: patterns of the required files: each matches one file.
+    A pattern with a slash is compared with the whole path, otherwise with the name. ``alike``:
+    patterns from the reference (``patterns_of``), used without ``expected`` unless none matches:
+    then the folder nearest to the top that has readable files is compared.
     """
     if not expected and not any(_matches(name, one) for one in alike for name in names):
         return (_readable_folder(names, path),)
@@ -436,10 +425,7 @@ class _Archive:
 
 @contextmanager
 def _open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> Iterator[_Archive]:
-    """Open a zip archive whose paths all stay inside it.
-
-    ``is_junk``: whether a path is ignored.
-    """
+    """Open a zip archive whose paths all stay inside it, junk excepted."""
     try:
         storage = StoredFile(Source(path))
         with storage.open() as file, zipfile.ZipFile(file) as archive:
@@ -466,10 +452,7 @@ def _open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> It
 
 
 def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
-    """Return a member's path; some Windows programs write backslashes.
-
-    Raises FormatError if it leads outside the archive.
-    """
+    """Return a member's path inside the archive; some Windows programs write backslashes."""
     parts = PurePosixPath(info.filename.replace("\\", "/")).parts
     windows = PureWindowsPath(info.filename)
     if not parts or parts[0] == "/" or ".." in parts or windows.drive or windows.root:

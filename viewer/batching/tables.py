@@ -41,12 +41,8 @@ def ordered(results: Iterable[Result]) -> list[Result]:
 
 
 def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
-    """Write the table as CSV (RFC 4180, UTF-8); return the number of items.
-
-    ``job``: name of the command, which determines the columns; ``function`` for a function, whose
-    values are columns. ``results``: results in any order; rows are in the order of the inputs. Each
-    has one row; of ``info``, one row per figure. Raises ``OutputError`` if it cannot be written.
-    """
+    """Write results, in the order of inputs, as CSV (RFC 4180, UTF-8); return the items' number."""
+    # The command determines the columns; those of a "function" are its values.
     results = ordered(results)
     values = [dict(_cells_in(result.values)) if job == "function" else {} for result in results]
     names = [*dict.fromkeys(name for one in values for name in one)]
@@ -115,10 +111,7 @@ def comparisons(result: Result) -> list[Mapping[str, Any]]:
 
 
 def worst_measure(result: Result, group: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
-    """Return the largest measure of a group, relative to each figure's size, and its actor.
-
-    ``result``: result of an item of ``diff``. ``group``: a key of ``MEASURES``.
-    """
+    """Return a result's largest measure of a group of ``MEASURES`` relative to size; its actor."""
     pairs = [
         (measure, actor)
         for comparison in comparisons(result)
@@ -195,10 +188,8 @@ def _lint_rows(result: Result) -> list[list[Cell]]:
 
 
 def _info_rows(result: Result) -> list[list[Cell]]:
-    """Return a row per figure, so that each cell holds one value; one empty row if there is none.
-
-    A capture of two people has two rows, and a column of numbers stays one for pandas.
-    """
+    """Return a row per figure, so that each cell holds one value; one empty row if none."""
+    # A capture of two people has two rows, and a column of numbers stays one for pandas.
     rows = [[*figure.values()] for figure in figures_of(result)]
     return rows or [[None] * len(_FIGURE)]
 

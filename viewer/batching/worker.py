@@ -15,10 +15,7 @@ def name_worker(name: object) -> None:
 
 
 def worker_rank() -> int | None:
-    """Return the rank of this worker, which determines its graphics card.
-
-    The result is None in the process that runs the batch. Replacement workers get new ranks.
-    """
+    """Return this worker's rank, which selects its graphics card; None in the main process."""
     if not _name and multiprocessing.parent_process() is None:
         return None
     number = re.search(r"\d+$", _name or multiprocessing.current_process().name)

@@ -30,10 +30,7 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
-    """Return the requested clean-up, which is empty for a command without these options.
-
-    Raises ViewerError if the frames are not a range.
-    """
+    """Return the requested clean-up, which is empty for a command without these options."""
     if "resample" not in arguments:
         return CleanUp()
     frames = None

@@ -57,12 +57,7 @@ class Numbering:
         return self.first + self.count - 1
 
     def time_of(self, frame: int, option: str = "--frame") -> float:
-        """Return the time of a frame in seconds.
-
-        ``frame``: number of the frame.
-        ``option``: the option that gave it, for messages.
-        Raises ViewerError if there is no such frame.
-        """
+        """Return the time of a frame in seconds; ``option`` gave it."""
         last = _LAST_NUMBER if self.runs_on else self.last
         if not self.first <= frame <= last:
             wanted = f"{self.first} or more" if frame < self.first and self.runs_on else ""
@@ -72,13 +67,9 @@ class Numbering:
         return self.start + (frame - self.first) / self.rate
 
     def checked_time(self, time: float) -> float:
-        """Return a time within the motions.
-
-        A capture's last frame is extended by half a frame's duration, because users rarely enter
-        its exact time.
-
-        Raises ViewerError if the time is outside the captures.
-        """
+        """Return a time within the motions."""
+        # A capture's last frame is extended by half a frame's duration, because users rarely enter
+        # its exact time.
         if self.runs_on:
             return time
         if not self.holds and self.is_outside(time):
@@ -93,10 +84,7 @@ class Numbering:
         return not self.start - half <= time <= self.end + half
 
     def span(self, asked: Range | None) -> tuple[int, int]:
-        """Return the first frame of a range and the frame after its last, counted from 0.
-
-        Raises ViewerError if the range begins outside the motions, or exceeds a capture.
-        """
+        """Return the first frame of a range and the frame after its last, counted from 0."""
         if asked is None:
             return 0, self.count
         first = 0 if asked.first is None else asked.first - self.first
@@ -110,14 +98,9 @@ class Numbering:
 
 
 def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numbering:
-    """Return the frame numbering of some actors' motions.
-
-    The longest capture defines it: at its own rate, frames have the numbers in its files. At
-    another rate, or if there are only keyframed clips, frames count from 0.
-
-    ``actors``: actors with or without motions.
-    ``rate``: frames per second; if omitted, the rate of the longest capture, or 30.
-    """
+    """Return the frame numbering of some actors' motions at a rate, frames per second."""
+    # The longest capture defines it: at its own rate, which is the default, frames have the numbers
+    # in its files. At another rate, or if there are only keyframed clips, frames count from 0.
     from viewer.rig.motion.evaluation import scene_rate, time_span
     from viewer.rig.motion.timing import frame_at
 
@@ -191,8 +174,6 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
 def parse_range(text: str, option: str = "--frames", *, steps: bool = True) -> Range:
     """Parse ``A:B`` or, if steps are allowed, ``A:B:STEP``; A and B may be omitted.
 
-    ``option`` is for messages.
-
     >>> parse_range("10:20:2"), parse_range(":5")
     (Range(first=10, stop=20, step=2), Range(first=None, stop=5, step=1))
     """
@@ -210,13 +191,8 @@ def parse_range(text: str, option: str = "--frames", *, steps: bool = True) -> R
 
 
 def apply_time(scene: Scene, frames: Frames) -> list[str | Diagnostic]:
-    """Pose every actor that has a motion at the requested frame or time, in place.
-
-    A scene without a motion has one pose, which is its frame 0 and the pose at all times.
-
-    Returns: messages about times outside the motions.
-    Raises ViewerError if there is no such frame, or the time is outside the captures.
-    """
+    """Pose all actors at the requested frame or time, in place; return messages."""
+    # A scene without a motion has one pose, which is its frame 0 and the pose at all times.
     if not frames.is_one:
         return []
     from viewer.rig.motion.evaluation import pose_actors

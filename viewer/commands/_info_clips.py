@@ -89,11 +89,9 @@ def gaps_of(timing: Timing) -> list[list[int]]:
 
 
 def describe_animations(actor: Actor) -> list[dict[str, Any]]:
-    """Return the names and ranges of a figure's animations as JSON data, without their keys.
-
-    An animation with invalid keys has an ``"error"``. Keys whose place in the file is unknown take
-    long to read, and are checked by ``lint`` only.
-    """
+    """Return the names and ranges of a figure's animations as JSON data, without their keys."""
+    # An animation with invalid keys has an "error". Keys whose place in the file is unknown take
+    # long to read, and are checked by ``lint`` only.
     found: list[dict[str, Any]] = [
         {
             "number": index + 1,

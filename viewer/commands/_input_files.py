@@ -11,11 +11,10 @@ from viewer.phrases import all_of
 
 
 def input_files(text: str) -> list[Path]:
-    """Return the files that one argument refers to.
+    """Return the files that one argument refers to: ``A``, ``A+B``, or a folder.
 
-    ``text``: a file; several joined by ``+``; a folder in a known format (PIG, EasyMocap); or
-      any folder with rig files, all opened together, such as a student's submission.
-    Raises FormatError for a folder without a readable file.
+    A folder is in a known format (PIG, EasyMocap), or has rig files that are all opened together,
+    such as a student's submission.
 
     >>> input_files("arm.skel+arm.skin") == [Path("arm.skel"), Path("arm.skin")]
     True

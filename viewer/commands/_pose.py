@@ -89,11 +89,7 @@ def use_file_method(scene: Scene, skinning: Skinning, given: Collection[str]) ->
 
 
 def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Diagnostic]:
-    """Shape and pose a scene as requested.
-
-    Returns: messages about what could not be applied exactly.
-    Raises ViewerError if an option does not apply to the scene.
-    """
+    """Shape and pose a scene; return messages about what could not be applied exactly."""
     notes = apply_time(scene, frames)
     if pose.hands:
         _apply_hands(scene, pose.hands)
@@ -222,11 +218,7 @@ def _mirror(scene: Scene) -> None:
 
 
 def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
-    """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint.
-
-    Returns: messages about clamped values, and about which of several figures was posed.
-    Raises ViewerError if the text, the joint or the value is invalid.
-    """
+    """Set DOFs given as ``NAME.X=VALUE`` on the first actor with such a joint; return messages."""
     notes: list[str] = []
     for asked in settings:
         label, equals, text = asked.partition("=")
@@ -324,10 +316,7 @@ def _has_only_morphs(figure: Figure) -> bool:
 
 
 def _morph_record(figure: Figure, values: Floats) -> PoseRecord:
-    """Return a record that sets the first N morphs to ``values``, (N,), and the others to 0.
-
-    Raises ViewerError if it has fewer; the message names them.
-    """
+    """Return a record that sets the first N morphs to ``values``, (N,), and the others to 0."""
     from viewer.rig.posing.pose_record import PoseRecord
 
     names = () if figure.blend_shapes is None else figure.blend_shapes.names
@@ -341,13 +330,7 @@ def _morph_record(figure: Figure, values: Floats) -> PoseRecord:
 
 
 def _named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
-    """Return the first actor that has all shapes named in the text, and a record that sets them.
-
-    Returns ``actor``: actor with a pose.
-    Returns ``record``: sets the named shapes and keeps the others.
-    Raises ViewerError if the text is invalid, or no actor has these shapes; the message lists the
-      existing ones.
-    """
+    """Return the first actor that has all named shapes, and a record that keeps the others."""
     wanted = [_pair(part) for part in text.strip().removesuffix(",").split(",")]
     shaped = [actor for actor in scene.actors if actor.pose is not None and actor.figure.n_shapes]
     if not shaped:

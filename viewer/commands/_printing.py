@@ -9,11 +9,7 @@ from typing import TextIO
 
 
 def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> None:
-    """Print one line.
-
-    ``*parts``: consecutive strings, some with a rich style such as ``"red"``.
-    ``file``: standard output if omitted; plain text if it is not a terminal.
-    """
+    """Print consecutive strings, some with a rich style such as ``"red"``, on one line."""
     stream = sys.stdout if file is None else file
     if stream is None or not stream.isatty():
         print("".join(part if isinstance(part, str) else part[0] for part in parts), file=stream)
@@ -25,10 +21,7 @@ def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> Non
 
 
 def table_lines(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> list[str]:
-    """Lay out cells in columns as wide as their contents.
-
-    ``rows``: all of the same length.
-    ``right``: columns that are right-aligned.
+    """Lay out rows of equal length in columns as wide as their cells; some are right-aligned.
 
     >>> table_lines([["", "joints"], ["walk", "0.5"]], right=[1])
     ['      joints', 'walk     0.5']

@@ -55,12 +55,7 @@ def _quantity_name(text: str) -> str:
 
 
 def set_scalar(options: DisplayOptions, given: Collection[str], values: str | None) -> None:
-    """Show the requested scalar quantity.
-
-    ``options``: as stated. ``given``: the fields that were stated. ``values``: the range.
-    Raises ViewerError if options need a scalar quantity and none is given, or the range is
-    invalid.
-    """
+    """Show the requested scalar quantity; ``given`` are the stated fields, ``values`` the range."""
     if "scalar" in given:
         options.shading = "scalar"
     needing = {
@@ -94,10 +89,8 @@ def _parse_range(text: str) -> tuple[float, float]:
 
 
 def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Choose a joint or field if the quantity needs one; return a message about the joint.
-
-    The choice is the joint with the most influence, or the first field that is not 0 everywhere.
-    """
+    """Choose a joint or field if the quantity needs one; return a message about the joint."""
+    # The choice is the joint with the most influence, or the first field that is not 0 everywhere.
     key, about = split_name(options.scalar)
     if options.shading != "scalar" or about:
         return []
@@ -109,11 +102,7 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return a message if no figure has the data of the scalar quantity.
-
-    Raises ViewerError if the quantity names a joint or field that no figure has; the message
-      suggests similar names.
-    """
+    """Return a message if no figure has the quantity's data; raise if it names an unknown joint."""
     if options.shading != "scalar" or not scene.actors:
         return []
     figures = [actor.figure for actor in scene.actors]

@@ -125,11 +125,7 @@ def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT
 
 
 def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
-    """Add FILES and the options that locate them.
-
-    ``parser``: parser of a command.
-    ``default``: default if no files are given, for the help; empty if files are required.
-    """
+    """Add FILES, which are required if ``default`` is empty, and the options that locate them."""
     group = parser.add_argument_group("files")
     group.add_argument(
         "files",
@@ -146,11 +142,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
 
 
 def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
-    """Add the options that control how captures and BVH are read.
-
-    ``parser``: parser of a command.
-    ``gaps``: how the command handles gaps, see ``add_gap_arguments``.
-    """
+    """Add the options that control how captures and BVH are read."""
     group = parser.add_argument_group("captures and BVH")
     add_settings(group, MotionSettings, "model", "gender")
     add_settings(group, SceneOptions, "motion_files")
@@ -171,11 +163,7 @@ def _source_rest(text: str) -> int | str:
 
 
 def scene_options(arguments: argparse.Namespace) -> SceneOptions:
-    """Return the requested files, and how they are opened and posed.
-
-    Raises ViewerError if there are both a video and a folder of images, or a joint map cannot be
-    read.
-    """
+    """Return the requested files, and how they are opened and posed."""
     if arguments.video is not None and arguments.images is not None:
         raise ViewerError("--video and --images: expected one of them, found both")
     options = settings_of(SceneOptions, arguments, files=arguments.files)
@@ -205,10 +193,7 @@ def _joint_map(options: SceneOptions) -> JointMap | None:
 
 
 def parse_bytes(text: str, option: str = "--max-size") -> int:
-    """Return the number of bytes that an option specifies, such as ``2G``.
-
-    Raises ViewerError if the text is not such a number.
-    """
+    """Return the number of bytes that an option specifies, such as ``2G``."""
     found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
     if not found:
         raise ViewerError(f'{option}: expected a number with k, M or G, found "{text}"')
@@ -216,10 +201,7 @@ def parse_bytes(text: str, option: str = "--max-size") -> int:
 
 
 def inputs_of(options: SceneOptions, scene: Scene | None = None) -> list[Path]:
-    """Return all files that are read: the named files, and those they refer to.
-
-    ``scene``: the opened scene; if omitted, only the named files are returned.
-    """
+    """Return the named files and, if the scene is given, those they refer to."""
     motion = options.motion
     model = [] if motion.model is None else named_files(motion.model, motion.gender)
     more: list[str | Path] = [*options.pose.files, *model, *motion.motions]
@@ -308,11 +290,8 @@ def _with_models(problem: FormatError, files: Sequence[str | Path]) -> ViewerErr
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warning") -> None:
-    """Print one line per warning or note to the error stream, unless the run is recorded.
-
-    Plain strings have the severity ``plain``; errors in a file that was opened nevertheless are
-    warnings.
-    """
+    """Print a line per warning or note, ``plain`` for strings, unless the run is recorded."""
+    # Errors in a file that was opened nevertheless are warnings.
     for warning in warnings:
         if not note_found(warning, plain):
             severity = warning.severity if isinstance(warning, Diagnostic) else plain
@@ -322,11 +301,10 @@ def print_warnings(warnings: Iterable[str | Diagnostic], plain: Severity = "warn
 def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
     """Add ``--gaps``, and deprecated options for its values, which are hidden in the help.
 
-    ``group``: options of a command.
-    ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``.
-    Parsing sets ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps
-      are interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, frames as an
-      integer or seconds as a float, or None.
+    ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``. Parsing sets
+    ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps are
+    interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, frames as an integer or
+    seconds as a float, or None.
     """
     group.add_argument("--gaps", action=_Gaps, metavar=_METAVAR[use], help=_WHAT[use], const=use)
     hidden = argparse.SUPPRESS

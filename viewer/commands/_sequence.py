@@ -36,12 +36,7 @@ class Turntable:
 
 
 def parse_turntable(text: str) -> Turntable:
-    """Parse ``6``, ``6s``, ``90deg`` or an empty string.
-
-    >>> parse_turntable(""), parse_turntable("4s"), parse_turntable("-90deg")
-    (Turntable(degrees=360.0, seconds=None), Turntable(degrees=360.0, seconds=4.0), \
-Turntable(degrees=-90.0, seconds=None))
-    """
+    """Parse ``6``, ``6s``, ``90deg`` or an empty string."""
     if not text:
         return Turntable(_FULL, None)
     found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+))(s|deg)?", text.strip(), re.ASCII)
@@ -114,10 +109,7 @@ class Request:
 def recording_of(
     request: Request, frames: Frames, pose: PoseOptions, scene: Scene, options: DisplayOptions
 ) -> tuple[Recording, list[str]]:
-    """Return the frames of a scene to draw, without their camera, and messages.
-
-    Raises ViewerError if nothing moves, or there are no frames or too many.
-    """
+    """Return the frames of a scene to draw, without their camera, and messages."""
     from viewer.rendering.recorder import Recording
 
     is_still = frames.is_one

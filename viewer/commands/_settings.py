@@ -43,10 +43,7 @@ def add_settings(
     *names: str,
     **changes: Any,
 ) -> None:
-    """Add the options of some fields, by default all, in the order of the names or of the fields.
-
-    ``changes`` are metadata that differ for this command.
-    """
+    """Add options of fields, by default all; ``changes``: metadata that differ for this command."""
     known = _options(kind)
     for name in names or known:
         each = known[name]
@@ -68,10 +65,7 @@ def add_settings(
 
 
 def settings_of(kind: type[_Settings], arguments: argparse.Namespace, **given: Any) -> _Settings:
-    """Return the settings that options state; ``given`` are fields that no option states alone.
-
-    Raises ``ViewerError`` for a value outside its limits.
-    """
+    """Return the settings that options state; ``given`` are fields that no option states alone."""
     values = dict(given)
     for name, each in _options(kind).items():
         value = getattr(arguments, _destination(each), None)

@@ -46,22 +46,15 @@ class Parser(argparse.ArgumentParser):
         return self.formatter_class(prog=self.prog, width=self._width)  # type: ignore[call-arg]
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
-        """Print the help, or raise if it cannot be printed; ``argparse`` ignores that.
-
-        ``argparse`` would also print to the error stream if the output is closed.
-        """
+        """Print the help, or raise if it cannot be printed."""
+        # ``argparse`` ignores that, and prints to the error stream if the output is closed.
         print(self.format_help(), end="", file=file)
         if sys.stdout is not None:
             sys.stdout.flush()  # argparse exits next
 
     def check_options(self, arguments: Iterable[str]) -> None:
-        """Raise for an unknown option.
-
-        ``argparse`` would first report a missing argument, possibly the mistyped one.
-
-        ``arguments``: arguments before ``--``.
-        Raises ViewerError with the nearest options.
-        """
+        """Raise for an unknown option before ``--``, naming the nearest options."""
+        # ``argparse`` would first report a missing argument, possibly the mistyped one.
         from viewer.near_names import near_names, question
 
         known = self._option_string_actions  # argparse has no public name for this table
@@ -90,12 +83,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
-    """Return the parser of a command with all its options.
-
-    ``name``: a key of ``COMMANDS``. ``words``: the arguments, for commands with ``parser_of``,
-    whose options depend on the first one. Raises ``ViewerError`` if the first argument selects no
-    options.
-    """
+    """Return the parser of a command; the first word selects the options of ``parser_of``."""
     module = import_module(f"viewer.commands.{name}")
     own: Parser | None = module.parser_of(words) if words and hasattr(module, "parser_of") else None
     if own is not None:
@@ -106,11 +94,7 @@ def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
 
 
 def check_command(word: str) -> None:
-    """Raise for a word that is not a file but resembles a command.
-
-    ``word``: first argument of the command line.
-    Raises ViewerError with the nearest command.
-    """
+    """Raise for a first argument that is not a file but resembles a command."""
     from viewer.models import resolve
     from viewer.near_names import did_you_mean
 
@@ -125,10 +109,7 @@ def check_command(word: str) -> None:
 
 
 def require_files(files: Sequence[str], body: bool, command: str) -> None:
-    """Raise if no files are given to a command that does not default to the bundled figure.
-
-    Raises ViewerError if there are neither files nor ``--body``.
-    """
+    """Raise if no files are given to a command that does not default to the bundled figure."""
     if not files and not body:
         raise ViewerError(
             f"expected FILES, found none (viewer {command} --help lists what can be opened)"

@@ -215,10 +215,7 @@ def look_through_video(view: ViewOptions, motion: MotionSettings, scene: Scene) 
 def camera_notes(
     view: ViewOptions, motion: MotionSettings, scene: Scene, options: DisplayOptions
 ) -> list[str]:
-    """Return messages about calibrated cameras: their images, and lens distortion.
-
-    Raises ViewerError if there is no such camera, or its files lack the size of its images.
-    """
+    """Return messages about calibrated cameras: their images, and lens distortion."""
     seen = None if view.view is None else _find_view(scene, view.view)
     drawn = scene.views if options.cameras else [] if seen is None else [seen]
     notes: list[str] = []
@@ -260,10 +257,7 @@ def follow_notes(view: ViewOptions, scene: Scene) -> list[str]:
 
 
 def hide_parts(view: ViewOptions, scene: Scene, options: DisplayOptions) -> None:
-    """Hide parts of meshes, and body parts of the first figure that has any, by name.
-
-    Raises ViewerError if no part has one of the names; the message lists the known ones.
-    """
+    """Hide parts of meshes, and body parts of the first figure that has any, by name."""
     from viewer.near_names import name_hint
 
     if not view.hide_part:

@@ -70,11 +70,9 @@ def _is_motion(key: str, frames: Frames, output: Path, scene: Scene) -> bool:
 
 
 def _keeps_keys(key: str, frames: Frames, output: Path, scene: Scene) -> bool:
-    """Return whether animations are written with their own keys instead of as frames.
-
-    This is the case for formats with keys, unless frames, a rate or a single pose is requested, or
-    a figure has another motion.
-    """
+    """Return whether animations are written with their own keys instead of as frames."""
+    # This is the case for formats with keys, unless frames, a rate or a single pose is requested,
+    # or a figure has another motion.
     kinds = [EXPORTERS[key]] if key else exporters_at(output)
     if not any("clips" in kind.stores for kind in kinds) or frames.gaps:
         return False
@@ -103,12 +101,10 @@ def export_options(
 def selected(
     asked: SceneOptions, options: ExportOptions, scene: Scene, output: Path
 ) -> tuple[Selection, ExportOptions, list[Diagnostic]]:
-    """Return what is written of a scene, how, and notes about what was chosen.
-
-    Animations keep their own keys where the format holds them; other motions are sampled. Without
-    a motion, or if one pose is requested, the current poses are written: as a motion of one frame
-    if the format holds nothing else. Raises ``ViewerError`` if there is nothing to write.
-    """
+    """Return what is written of a scene, how, and notes about what was chosen."""
+    # Animations keep their own keys where the format holds them; other motions are sampled. Without
+    # a motion, or if one pose is requested, the current poses are written: as a motion of one frame
+    # if the format holds nothing else.
     frames = asked.frames
     if _keeps_keys(options.kind, frames, output, scene):
         is_chosen = bool(asked.motion.animation)
@@ -144,10 +140,8 @@ def _clips(
 def _motions(
     frames: Frames, scene: Scene, output: Path, options: ExportOptions
 ) -> tuple[Selection, ExportOptions, list[Diagnostic]]:
-    """Select every actor's motion; a file that holds several also gets the figures at rest.
-
-    If one pose is requested, or nothing moves, a motion of one frame is written.
-    """
+    """Select every actor's motion; a file that holds several also gets the figures at rest."""
+    # If one pose is requested, or nothing moves, a motion of one frame is written.
     options.kind = key = _exporter(options.kind, frames, output, scene)
     actors = _written_actors(frames, output, scene)
     is_pose = _asks_one_pose(frames, output, scene)
@@ -213,10 +207,7 @@ def check_kind(kind: str, output: Path) -> None:
 
 
 def check_numbered(has_frames: bool, output: Path) -> None:
-    """Check the name pattern of numbered files.
-
-    Raises ViewerError if one file contains the whole motion, or all names would be the same.
-    """
+    """Refuse a name pattern if one file contains the whole motion, or all names are the same."""
     is_numbered = any(kind.is_numbered for kind in exporters_at(output))
     if "{frame" not in output.name and not (has_frames and is_numbered):
         return
@@ -239,10 +230,7 @@ def check_numbered(has_frames: bool, output: Path) -> None:
 
 
 def check_frame_options(frames: Frames) -> None:
-    """Check that a range of frames and a single one are not both given.
-
-    Raises ViewerError if both are given.
-    """
+    """Check that a range of frames and a single one are not both given."""
     for option in ("frame", "time"):
         if frames.frames is not None and getattr(frames, option) is not None:
             raise ViewerError(f"--frames and --{option}: expected one of them, found both")
@@ -264,11 +252,8 @@ def _posed_actors(scene: Scene) -> list[Actor]:
 def _part_of_pose(
     frames: Frames, key: str, options: ExportOptions, scene: Scene, actor: Actor
 ) -> Part:
-    """Return an actor's current pose as a motion of one frame, for an exporter.
-
-    The frame has the number that ``--frame`` uses; between two frames, it is that of the displayed
-    frame.
-    """
+    """Return an actor's pose as a motion of one frame, with the number that ``--frame`` uses."""
+    # Between two frames, it is that of the displayed frame.
     numbering = numbering_of(scene.actors, frames.fps)
     time = numbering.start if scene.time is None else scene.time
     number = numbering.first + frame_at(time - numbering.start, numbering.rate)
@@ -328,20 +313,14 @@ def _pose_or_point_actors(scene: Scene) -> list[Actor]:
 
 
 def _written_actors(frames: Frames, output: Path, scene: Scene) -> list[Actor]:
-    """Return the actors whose motion is written, or whose pose is written as a one-frame motion.
-
-    Raises RigError if there are none.
-    """
+    """Return the actors whose motion is written, or whose pose is written as a one-frame motion."""
     if _asks_one_pose(frames, output, scene):
         return _posed_actors(scene)
     return _moving_actors(scene)
 
 
 def _moving_actors(scene: Scene) -> list[Actor]:
-    """Return the actors whose motions are written: bodies, or captured points if there are none.
-
-    Raises RigError if nothing moves.
-    """
+    """Return the actors whose motions are written: bodies, or captured points if there are none."""
     moving = [actor for actor in scene.actors if actor.clip is not None]
     bodies = [actor for actor in moving if not actor.moves_points]
     if not moving:
@@ -387,10 +366,7 @@ def bake_springs(bakes: bool, fps: float | None, scene: Scene, output: Path) -> 
 
 
 def add_vrm_arguments(parser: argparse.ArgumentParser, upgrades: bool = False) -> None:
-    """Add the options that name a character, its authors and its licence.
-
-    ``upgrades``: whether the command can convert VRM 0.x to 1.0.
-    """
+    """Add the options that name a character, its authors and its licence."""
     group = parser.add_argument_group("writing VRM characters")
     names = "name", "authors", "licence", "upgrades"
     add_settings(group, VrmMeta, *(names if upgrades else names[:-1]))

@@ -51,11 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def parser_of(words: Sequence[str]) -> Parser | None:
-    """Return the parser of a job with the options of its command; None if no job is named.
-
-    ``words``: the arguments.
-    Raises ViewerError for a word that is not a job.
-    """
+    """Return the parser of a job with the options of its command; None if no job is named."""
     word = next(iter(words), "-")
     if word in JOBS:
         return job_parser(word)

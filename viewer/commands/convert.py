@@ -180,10 +180,7 @@ def _check_suffix(asked: SceneOptions, options: ExportOptions, output: Path, for
 def _saving_joint_map(
     path: Path | None, asked: SceneOptions, scene: Scene, output: Path, force: bool
 ) -> Iterator[None]:
-    """Write the requested joint map before the block; remove it if the block fails.
-
-    Raises OutputError if a file may not be written, RigError if no motion drives a figure.
-    """
+    """Write the requested joint map before the block; remove it if the block fails."""
     if path is None:
         yield
         return
@@ -214,12 +211,8 @@ def _saving_joint_map(
 def convert_streamed(
     asked: SceneOptions, options: ExportOptions, output: Path
 ) -> list[Diagnostic] | None:
-    """Convert a long, regular file part by part; print warnings and return the notes.
-
-    ``output``: the requested file, which may be replaced.
-    Returns None, and leaves the file unchanged, if the files or options need the whole motion in
-    memory.
-    """
+    """Convert a long, regular file part by part; print warnings and return the notes."""
+    # None if the files or options need the whole motion in memory; the output is then unchanged.
     if not _is_streamable(asked, options.kind, output):
         return None
     from viewer.formats.bvh.streaming import Irregular
@@ -249,10 +242,8 @@ def convert_streamed(
 
 
 def _is_streamable(asked: SceneOptions, kind: str, output: Path) -> bool:
-    """Return whether the options can be applied to parts, and the output is a ``.bvh`` file.
-
-    Options that involve other files, or pose the figure, need the whole motion.
-    """
+    """Return whether the options can be applied to parts, and the output is a ``.bvh`` file."""
+    # Options that involve other files, or pose the figure, need the whole motion.
     motion = asked.motion
     files = asked.body, motion.model, motion.motions, asked.joint_map, motion.video, motion.images
     if any(files) or asked.model_path is not None or asked.pose != PoseOptions():

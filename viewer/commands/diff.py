@@ -277,15 +277,13 @@ _RULES: tuple[Callable[[Actor, Actor], bool], ...] = (
 
 
 def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> _Pairing:
-    """Pair the actors of two scenes, and the motions of paired actors.
+    """Pair the actors of a reference and another scene, and the motions of paired actors.
 
     People of captures are paired by their number. Actors with the same name are paired first, of
     the same kind if there are several; then actors of the same kind, such as skinned figures; then
     the remaining ones, in order. Keyframed clips are assigned to any skeleton they fit when files
     are opened, so a clip with the same name as the other actor's clip takes precedence, then the
     actor's own, then one assigned to an unpaired actor.
-
-    ``first``, ``second``: actors of the reference and of the other scene; not modified.
     """
     found: dict[int, int] = {}
     taken: set[int] = set()
@@ -334,12 +332,8 @@ def _lone_actors(actors: Sequence[Actor], clips: Sequence[Clip]) -> tuple[Phrase
 def _with_clips(
     actors: Sequence[Actor], lone: Sequence[Actor], partners: Sequence[Motion | None]
 ) -> tuple[list[Actor], list[Clip]]:
-    """Return actors with the keyframed clips to compare, and the remaining clips.
-
-    ``actors``: the paired actors.
-    ``lone``: the unpaired actors of the same scene; their clips may belong to paired actors.
-    ``partners``: the motion of each actor's counterpart.
-    """
+    """Return actors with the keyframed clips to compare, and the remaining clips."""
+    # The clips of unpaired actors may belong to paired ones, whose counterparts have ``partners``.
     pool = [c for actor in (*actors, *lone) if (c := actor.clip) is not None and c.kind == "curves"]
     if not pool:
         return list(actors), []
@@ -532,11 +526,7 @@ class _Heat:
 
 
 def _heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> _Heat | None:
-    """Return the heat map of a comparison; None if no mesh was compared.
-
-    ``name``: name of the compared files, for the legend.
-    ``posed``: the reference's actors in their worst poses.
-    """
+    """Return the heat map of the reference's actors in their worst poses; None without a mesh."""
     actors, most = [], 0.0
     for actor, difference in posed:
         measure = next((one for one in difference.measures if one.name in _COLORED), None)
@@ -552,11 +542,7 @@ def _heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> _Heat | No
 
 
 def _save_heat(heats: Sequence[_Heat], output: Path, skinning: Skinning) -> str:
-    """Write one image, a sheet with a common scale for several heat maps; return a summary line.
-
-    Raises ViewerError if there is nothing to colour, or too many heat maps for one sheet.
-    Raises OutputError if it cannot be written.
-    """
+    """Write one image, or a sheet of several with a common scale; return a summary line."""
     from viewer.formats import save_image
     from viewer.media.picture_sinks import SheetSink
     from viewer.rendering.offscreen import render

@@ -263,11 +263,8 @@ class Measured:
 
 
 def measured() -> Iterator[Measured]:
-    """Yield durations as they are measured, medians of several repetitions.
-
-    Raises ``RenderError`` if drawing is impossible; raised after the measurements that need no
-    drawing.
-    """
+    """Yield durations as they are measured, medians of several repetitions."""
+    # Those that need no drawing come first, in case it is impossible.
     yield from _starts()
     yield from _frames()
     yield from _parts()

@@ -370,11 +370,7 @@ def _point(values: list[float], finest: float) -> str:
 
 
 def _describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
-    """Return the properties of a body model as JSON data; empty for a plain rig.
-
-    ``actor``: shaped and posed.
-    ``skinning``: the skinning method and its options.
-    """
+    """Return the properties of a shaped and posed body as JSON data; empty for a plain rig."""
     figure, pose = actor.figure, actor.pose
     facts = {heading: str(fact) for heading, fact in figure.facts}
     model: dict[str, Any] = {"facts": facts} if facts else {}

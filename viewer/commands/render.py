@@ -176,10 +176,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_overlay(arguments: argparse.Namespace) -> None:
-    """Let an overlay be a video that is seen through its camera.
-
-    Raises ViewerError if other options contradict that.
-    """
+    """Let an overlay be a video that is seen through its camera."""
     if arguments.overlay is None:
         return
     for name in ("video", "images", "view", *VIEWS):
@@ -190,10 +187,7 @@ def _check_overlay(arguments: argparse.Namespace) -> None:
 
 
 def _overlay_size(is_chosen: bool, scene: Scene) -> tuple[int, int] | None:
-    """Return the size of the video, unless another one is requested.
-
-    Raises ViewerError if no file is a capture.
-    """
+    """Return the size of the video, unless another one is requested."""
     if scene.images is None:
         raise ViewerError("--overlay: expected a capture with a camera, found none")
     return None if is_chosen else scene.images.size_of(scene.images.cameras[0])
@@ -280,10 +274,8 @@ def draw_scene(
     device: int | None = None,
     is_chosen: bool = False,
 ) -> Bytes:
-    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed.
-
-    The default quality is lowered if drawing it in software would take long.
-    """
+    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed."""
+    # The default quality is lowered if drawing it in software would take long.
     from viewer.rendering.gpu.context import thread_graphics
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.sampling import limit_passes, time_note
@@ -343,10 +335,7 @@ def _add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
 def _complete(
     request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
 ) -> None:
-    """Set the kind of the requested output and its range of frames.
-
-    Raises ViewerError if options conflict, or the name of numbered images has no frame field.
-    """
+    """Set the kind of the requested output and its range of frames."""
     output = request.output
     request.range = None if frames.frames is None else parse_range(frames.frames)
     asks = request.range is not None or request.turntable is not None
@@ -447,11 +436,7 @@ def _check_picture(output: Path) -> None:
 
 
 def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:
-    """Draw and write all frames; return a line about the written files.
-
-    Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
-    Raises OutputError if a file already exists, or cannot be written.
-    """
+    """Draw and write all frames; return a line about the written files."""
     from viewer.commands._progress import shown_progress
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import (

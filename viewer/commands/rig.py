@@ -305,15 +305,7 @@ def _show(rigged: Rigged, target: Figure) -> None:
 
 
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
-    """Read pairs of points.
-
-    ``source``: the file.
-    ``template``: figure with the joints that the file refers to.
-    ``pose``: pose of the template.
-    Returns (N, 2, 3): the template's point and the target's for each pair.
-    Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
-      if there are fewer than three pairs, or if no scale fits them.
-    """
+    """Read at least three pairs of points: on the posed template and on the target, (N, 2, 3)."""
     skeleton = template.require_skeleton()
     joints = joint_matrices(template, pose)[:, :3, 3]
     pairs = []
@@ -404,14 +396,7 @@ def _read_clips(
     figure: Figure,
     fps: float | None,
 ) -> list[_TransferredClip]:
-    """Return the motions named by ``--clip``, before any work is done.
-
-    ``clips``: their files.
-    ``template``: the template's files.
-    ``figure``: the template.
-    Raises ViewerError if there is no output to write next to, a file contains no motion of the
-    template, or two output files would have the same name.
-    """
+    """Return the template's motions named by ``--clip``, before any work is done."""
     if not clips:
         return []
     if output is None:
@@ -437,13 +422,7 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
 
 
 def _write_clips(rigged: Rigged, clips: list[_TransferredClip]) -> list[Diagnostic]:
-    """Write the template's motions for the rigged figure; return notes about the files.
-
-    ``rigged``: the result of the rig transfer.
-    ``clips``: from ``_read_clips``.
-    Raises RigError if a clip is for a different skeleton.
-    Raises OutputError if a file cannot be written.
-    """
+    """Write the template's motions for the rigged figure; return notes about the files."""
     notes: list[Diagnostic] = []
     for each in clips:
         actor = Actor(rigged.figure, figure_pose(rigged.figure), clip_for(rigged, each.clip))

@@ -16,14 +16,9 @@ from viewer.rig.scene import Actor
 
 
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:
-    """Apply poses and images to an actor that is already open.
-
-    ``contents``: figures and clips in it are ignored. ``actor``: its pose is changed; the actor
-    itself is replaced only if its texture changes. Returns ``actor``: a new one with the same pose,
-    if its texture changes; ``notes``: messages about data that could not be applied exactly. Raises
-    ``FormatError`` if a pose does not match; the actor is then unchanged. Raises ``RigError`` if a
-    texture image cannot be applied, or there is nothing to pose.
-    """
+    """Apply poses and images to an open actor; return it, or a new one with another texture."""
+    # Figures and clips in the contents are ignored. If a pose does not match, the actor is
+    # unchanged.
     notes: list[Diagnostic] = []
     trial = actor.copy()
     for path, pixels in contents.pictures:
@@ -44,12 +39,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
 def apply_pose(
     path: Path, record: PoseRecord, actor: Actor, drop_excess: bool = True
 ) -> list[Diagnostic]:
-    """Apply a pose record from a file to an actor; return messages about inexact data.
-
-    ``drop_excess``: see ``apply_record``.
-
-    Raises ``FormatError`` if it does not match; the actor is then unchanged.
-    """
+    """Apply a file's pose record, if it matches, to an actor; return messages on inexact data."""
     assert actor.pose is not None  # checked by the callers
     try:
         misfit = space_misfit(record.shape_space, actor.figure)

@@ -67,12 +67,8 @@ def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scen
 def begin(
     contents: Contents, settings: MotionSettings | None = None, checks: bool = True
 ) -> tuple[Scene, list[Builder]]:
-    """Create a scene that can be shown, and return the captures that are still to be read.
-
-    Returns ``scene``: posed at the start of its motions; ``builders``: captures whose first frames
-    are in the scene; people who appear later are added during reading. Raises ``FormatError,
-    RigError``: see ``load``.
-    """
+    """Create a scene posed at the start of its motions; return the captures still to be read."""
+    # Their first frames are in the scene; people who appear later are added during reading.
     contents = _lone_poses_as_motions(contents)
     figures = contents.figures
     draft = SceneDraft([])
@@ -135,11 +131,8 @@ def _faults(contents: Contents, actors: Sequence[Actor]) -> list[Diagnostic]:
 
 
 def _lone_poses_as_motions(contents: Contents) -> Contents:
-    """Return contents in which poses of bodies of the SMPL family are motions of one frame.
-
-    They are then shown like all captured bodies, with the user's model or the bundled body. The
-    contents are returned unchanged if there is a figure or a motion, or a pose of anything else.
-    """
+    """Return contents in which lone poses of bodies of the SMPL family are one-frame motions."""
+    # They are then shown like all captured bodies, with the user's model or the bundled body.
     if contents.figures or contents.has_motion or contents.morphs or not contents.poses:
         return contents
     found = [(path, _lone_motion(path, record)) for path, record in contents.poses]
@@ -280,10 +273,8 @@ def _has_bare_motion(draft: SceneDraft) -> bool:
 
 
 def _animate(draft: SceneDraft, wanted: str) -> None:
-    """Let actors without a motion play an animation of their file.
-
-    ``wanted``: see ``chosen_animation``; figures of files without it keep their rest pose.
-    """
+    """Let actors without a motion play their file's animation, as ``chosen_animation`` says."""
+    # Figures of files without it keep their rest pose.
     from viewer.rig.motion.animation_choice import NONE, chosen_animation
 
     files = _files(draft)
@@ -427,10 +418,7 @@ def _note_unused_options(contents: Contents, draft: SceneDraft, settings: Motion
 def _assembled_in(
     contents: Contents, settings: MotionSettings | None, builders: Sequence[Builder], space: str
 ) -> Scene:
-    """Return the scene with captured people in another space, where their files contain it.
-
-    ``builders``: captures of the scene that is replaced; their reading ends.
-    """
+    """Return the scene with captured people in another space; ends the reading of ``builders``."""
     captures = [
         (path, capture if capture.in_space is None else capture.in_space(space))
         for path, capture in contents.captures

@@ -24,14 +24,11 @@ def has_joints(figure: Figure, names: Sequence[str]) -> bool:
 
 
 def with_joints(body: Figure, names: Sequence[str]) -> Figure:
-    """Return a body without its mesh that has all joints of a motion, to drive other figures.
-
-    Joints that the body lacks, such as the fingers of SMPL+H, are at the positions of their
-    parents. Bones without a length have no direction: the joints that they drive keep the shape
-    of their own hand, and get the rotations relative to a flat one.
-
-    ``names``: joints of the motion; those of no member of the family are ignored.
-    """
+    """Return a body without its mesh that has all joints of a motion, to drive other figures."""
+    # Joints that the body lacks, such as the fingers of SMPL+H, are at the positions of their
+    # parents. Bones without a length have no direction: the joints that they drive keep the shape
+    # of their own hand, and get the rotations relative to a flat one. Names of no member of the
+    # family are ignored.
     skeleton = body.require_skeleton()
     own, parents = [*skeleton.names], [*skeleton.parents.tolist()]
     for member in FAMILY.values():
@@ -61,11 +58,7 @@ def body_drive(
     joint_map: JointMap | None = None,
     plants_feet: bool = True,
 ) -> Drive:
-    """Return the motion of a body as one that drives other figures, in the world of the body.
-
-    ``body``: body model that ``clip`` moves. ``up``: one of "y", "z", "-y" or "-z", up axis of the
-    motion's world, which driven figures keep.
-    """
+    """Return a body's motion as one that drives figures; ``up`` is the axis of its world."""
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
     return Drive(
         SkeletonMotion(moving, clip),

@@ -27,11 +27,9 @@ _HIP = "left_hip"
 
 
 def is_body(figure: Figure) -> bool:
-    """Return whether a figure can show captured bodies: it has the family's root and a mesh.
-
-    A VRM character cannot, even with the same joint names: its rest pose and origin differ. The
-    root of Unreal's characters and of animals has the family's name, too, but their legs do not.
-    """
+    """Return whether a figure can show captured bodies: it has the family's root and a mesh."""
+    # A VRM character cannot, even with the same joint names: its rest pose and origin differ. The
+    # root of Unreal's characters and of animals has the family's name, too, but their legs do not.
     skeleton = figure.skeleton
     if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
         return False
@@ -64,12 +62,11 @@ class Choice:
 
 @dataclass(slots=True, eq=False)
 class BodyModels:
-    """Chooses figures for bodies, each of which is read once.
+    """Chooses figures for bodies, each of which is read once."""
 
-    A body is shown by the model of ``--model``, else by a body model among the files, which is then
-    not a separate actor, else by the model of the model folder that has the joints and gender of
-    the body, else by the bundled body.
-    """
+    # A body is shown by the model of ``--model``, else by a body model among the files, which is
+    # then not a separate actor, else by the model of the model folder that has the joints and
+    # gender of the body, else by the bundled body.
 
     draft: SceneDraft
     settings: MotionSettings
@@ -83,11 +80,7 @@ class BodyModels:
         return replace(space, gender=self.settings.gender or space.gender)
 
     def choose(self, path: Path, space: ShapeSpace, joint_names: Sequence[str] = ()) -> Choice:
-        """Return the figure for a body.
-
-        ``joint_names``: joints of its motion, the root first, if they are known. Raises
-        ``FormatError`` if the file of ``--model`` cannot be read, or is no figure.
-        """
+        """Return the figure for a body; ``joint_names`` of its motion begin with the root."""
         space, has_parameters = self.wanted(space), space.model == "MHR"
         named = self.named(space.gender)
         if named is not None:
@@ -154,10 +147,8 @@ class BodyModels:
     def _of_folder(
         self, path: Path, space: ShapeSpace, use: str
     ) -> tuple[Figure | None, tuple[Diagnostic, ...]]:
-        """Return the model in the model folder, if it has a readable one, and messages.
-
-        ``use``: ``"model"`` if it is shown, ``"carrier"`` if it moves the figure of ``--model``.
-        """
+        """Return the model folder's model, if readable, and messages."""
+        # The use is "model" if it is shown, "carrier" if it moves the figure of ``--model``.
 
         def note(message: str, **values: object) -> tuple[Diagnostic, ...]:
             return (Diagnostic(message, path, values=values),)

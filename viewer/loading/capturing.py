@@ -113,11 +113,9 @@ class Builder:
         return self._parts
 
     def read_some(self) -> tuple[list[Actor], list[Diagnostic]]:
-        """Read the next part; return new actors and messages.
-
-        For captures that are read to the end before they are shown: the motions of driven figures
-        are computed once, at the end.
-        """
+        """Read the next part; return new actors and messages."""
+        # For captures that are read to the end before they are shown: the motions of driven figures
+        # are computed once, at the end.
         part = next(self.parts(), None)
         if part is None:
             self.is_cut = True
@@ -129,11 +127,7 @@ class Builder:
             self._grows = True
 
     def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
-        """Add one part to the actors.
-
-        Returns ``new``: people who appear for the first time; posed at the start; ``notes``:
-        messages, each reported once. Raises ``RigError`` if the bodies do not match the model.
-        """
+        """Add one part; return people who are new, posed at the start, and new messages."""
         new: list[Actor] = []
         notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
@@ -226,10 +220,8 @@ class Builder:
         return [] if self.defers else self.finish(self.final_motions())
 
     def final_motions(self) -> list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]:
-        """Return the final motions of driven people once everything has been read.
-
-        They can be computed in another thread while nothing else changes the builder.
-        """
+        """Return the final motions of driven people once everything has been read."""
+        # They can be computed in another thread while nothing else changes the builder.
         is_left = self.plants_feet or self._is_behind
         if not (self.is_done and is_left and self.target is not None):
             return []
@@ -332,10 +324,7 @@ class Builder:
         return bool(self._bodies)
 
     def place(self, up: str) -> None:
-        """Rotate all people upright, including later ones, if the up axis is negative.
-
-        ``up``: one of "y", "z", "-y" or "-z", the axis that points up in the capture.
-        """
+        """Rotate all people upright, including later ones, if the capture's up axis is negative."""
         self.up = "z" if up.endswith("z") else "y"
         for actor in self._points.values():
             actor.figure = replace(actor.figure, up=self.up)
@@ -346,11 +335,8 @@ class Builder:
                 actor.placement = self.placement.copy()
 
     def carry_to(self, target: Figure) -> list[Diagnostic]:
-        """Let the bodies, also later ones, move another figure; ``place`` must be called first.
-
-        Returns messages about matched joints. Raises RigError if too few match; nothing changes
-        then.
-        """
+        """Let bodies, once placed, move another figure; return messages about matched joints."""
+        # Nothing changes if too few joints match.
         notes: list[Diagnostic] = []
         clips: list[tuple[Actor, SampledClip, Drive]] = []
         for actor in self._bodies.values():

@@ -40,11 +40,7 @@ _SAME = 0.25  # maximum distance between two tracks of one person, relative to t
 
 
 def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
-    """Clean up the captured motions of a scene, in place, and pose it again.
-
-    Raises ``RigError`` if there is no captured motion, a person to be merged is missing or is a
-    different person, or no frame is in the range.
-    """
+    """Clean up the captured motions of a scene, in place, and pose it again."""
     if wanted.is_empty:
         return []
     if not any(isinstance(actor.clip, Captured) for actor in scene.actors):
@@ -420,10 +416,7 @@ def _apart(
     second: Captured,
     both: Ints,
 ) -> float:
-    """Return the median distance of two tracks in their common frames.
-
-    Raises RigError if it is too large for two tracks of one person.
-    """
+    """Return the median distance of two tracks in their common frames; raise if it is too large."""
     if not len(both):
         return 0.0
     places = [_places(kept.figure, first, both), _places(other.figure, second, both)]

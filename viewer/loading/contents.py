@@ -337,10 +337,7 @@ def _reader_options(settings: MotionSettings) -> dict[str, str]:
 
 
 def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
-    """Return a figure textured with one image.
-
-    Raises ``RigError`` if it has no texture coordinates.
-    """
+    """Return a figure, which must have texture coordinates, textured with one image."""
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None:
         values = {"figures": all_of([figure.name])}

@@ -53,11 +53,7 @@ _SAME_RATE = 0.005  # maximum relative difference of equal frame rates, such as 
 
 
 def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> None:
-    """Assign every motion to an actor, or to a new one if none matches.
-
-    Raises ``FormatError`` if the model cannot be read. Raises ``RigError`` if a clip matches no
-    skeleton, or bodies or a BVH do not match the model.
-    """
+    """Assign every motion to an actor, or to a new one if none matches."""
     for path, clip in contents.clips:
         _give_clip(path, clip, draft, contents)
         draft.note_motions(path)
@@ -228,10 +224,7 @@ def _judged_up(path: Path, actors: Sequence[Actor], draft: SceneDraft, usual: st
 def _carried(
     path: Path, actor: Actor, up: str, target: Figure, draft: SceneDraft, settings: MotionSettings
 ) -> Actor:
-    """Return an actor of a figure with other joints that a body moves.
-
-    Raises RigError if too few joints match.
-    """
+    """Return an actor of a figure with other joints that a body moves."""
     assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
     drive = body_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
     try:
@@ -345,10 +338,7 @@ def _model_of(
 
 
 def _carry(builder: Builder, draft: SceneDraft, target: Figure | None, drives: bool) -> None:
-    """Let captured bodies drive a figure with other joints: the requested one, or an open one.
-
-    Raises RigError if too few joints of the requested figure match.
-    """
+    """Let captured bodies drive a figure with other joints: the requested one, or an open one."""
     if target is not None:
         try:
             draft.diagnostics += builder.carry_to(target)
@@ -379,14 +369,9 @@ def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:
 def filmed(
     capture: Capture, views: Sequence[CameraView], settings: MotionSettings, rate: float
 ) -> tuple[list[CameraView], CameraImages | None, list[Diagnostic]]:
-    """Return the cameras of a capture and their images, from the requested video or folder.
-
-    ``capture``: the capture. Without a camera, people in camera space get one with the size of the
-    images. ``views``: its cameras. A camera without a size gets that of its images. ``rate``:
-    frames per second of the capture. Returns ``images``: images of one of them; ``notes``: messages
-    about assumptions. Raises ``RigError`` if the capture has no camera, or several of which none
-    has the video's name.
-    """
+    """Return the cameras of a capture, their images, and messages about assumptions."""
+    # Without a camera, people in camera space get one with the size of the images. A camera without
+    # a size gets that of its images.
     found = [*views]
     if settings.video is not None:
         first = capture.first_frame / rate

@@ -14,11 +14,7 @@ from viewer.rig.figure import Figure
 def joined_figures(
     figures: Sequence[tuple[Path, Figure]],
 ) -> list[tuple[tuple[int, ...], Figure]]:
-    """Attach skins to their skeletons; return each figure with the indices of its parts.
-
-    ``figures``: sequence of (Path, Figure), figures and parts of figures, with their files. Raises
-    ``FormatError, RigError`` if a skin does not fit its skeleton.
-    """
+    """Attach skins to their skeletons; return each figure with the indices of its parts."""
     pairs = _pairs([figure for _, figure in figures])
     return [(pair, _join([figures[index] for index in pair])) for pair in pairs]
 

@@ -36,22 +36,16 @@ def _turn(turned: Actor | Builder, up: str, world_up: str) -> None:
 
 
 def placed_like(scene: Scene, actor: Actor) -> list[Diagnostic]:
-    """Rotate and scale an actor that is added to a scene; a note states a change of unit.
-
-    Its figure's up axis becomes that of the scene, and its unit that of the scene if both are
-    known.
-    """
+    """Rotate and scale an actor to a scene's up axis and unit; a note states a change of unit."""
     unit = scene_unit(scene)
     _turn(actor, actor.figure.up, scene.up)
     return scale_to_unit(actor, unit)
 
 
 def scale_to_one_unit(draft: SceneDraft) -> None:
-    """Scale actors whose unit differs from that of the scene; a note names each of them.
-
-    The unit of the scene is that of the first actor whose motion determines its position, or else
-    of the first actor with a known unit. Actors with an unknown unit are not scaled.
-    """
+    """Scale actors whose unit differs from that of the scene; a note names each of them."""
+    # The unit of the scene is that of the first actor whose motion determines its position, or else
+    # of the first actor with a known unit. Actors with an unknown unit are not scaled.
     order = sorted(range(len(draft.actors)), key=lambda index: not draft.placed[index])
     unit = next((found for index in order if (found := known_unit(draft.actors[index]))), "")
     for actor in draft.actors:
@@ -61,10 +55,7 @@ def scale_to_one_unit(draft: SceneDraft) -> None:
 
 
 def place_side_by_side(draft: SceneDraft) -> None:
-    """Move actors without their own position to the right of the actors before them.
-
-    Actors of one group of figures are moved together.
-    """
+    """Move actors without their own position to the right of the actors before them, by groups."""
     loose = _by_group(draft)
     placed = [a for a, placed in zip(draft.actors, draft.placed, strict=True) if placed]
     if not loose or len(loose) + len(placed) < 2:

@@ -57,11 +57,8 @@ def give_skeleton_motion(
     settings: MotionSettings,
     model: Figure | None,
 ) -> Lone | None:
-    """Apply a motion to the model, or else to the first figure that has its joint names, if any.
-
-    Returns the separate skeleton, if the motion drives no figure. Raises ``RigError`` if it does
-    not match the model.
-    """
+    """Apply a motion to the model, else to the first figure with its joint names."""
+    # Returns the separate skeleton, if the motion drives no figure.
     motion = as_asked(motion, settings)
     for note in motion.up_notes:
         draft.note(
@@ -133,13 +130,12 @@ def drive_somebody(
     placement: Floats,
     among: Sequence[Actor] | None = None,
 ) -> tuple[bool, str | Diagnostic]:
-    """Assign a motion to the first matching figure with a mesh and no clip, if any.
+    """Assign a motion to the first matching figure with a mesh and no clip.
 
-    ``draft``: the figure's actor gets the clip. If none matches, the first one keeps the drive
-    without a clip. ``placement``: (4, 4), applied to that actor. ``among``: actors of the draft
-    that may be moved; all if omitted. Returns ``is_driving``: whether there is such a figure;
-    ``refusal``: reason why the first figure does not match; empty if there is no figure. Raises
-    ``RigError`` if no figure matches, although a joint map is given.
+    If none matches, the first one keeps the drive without a clip. ``placement``: (4, 4), applied to
+    that actor. ``among``: actors of the draft that may be moved; all if omitted. Returns whether a
+    figure matches, and why the first figure does not, empty without a figure. With a joint map, the
+    reason is raised as a ``RigError``.
     """
     refusal: RigError | None = None
     refused: Actor | None = None
@@ -163,11 +159,7 @@ def drive_somebody(
 
 
 def model_refusal(problem: RigError, path: Path | None) -> RigError:
-    """Return the error for a requested model that does not match.
-
-    ``problem``: reason why it does not match; returned unchanged if it refers to a file, such as a
-    joint map.
-    """
+    """Return the error for a requested model that does not match; one about a file is unchanged."""
     cause = problem.cause
     if isinstance(cause, Diagnostic) and cause.path is not None:
         return problem
@@ -192,12 +184,8 @@ def map_refusal(problem: RigError, path: Path | None) -> RigError:
 
 
 def agree_on_units(draft: SceneDraft, lone: list[Lone]) -> None:
-    """Scale separate skeletons to metres if other actors have another unit; record the estimates.
-
-    A lone skeleton, or one among others in the same unit, keeps the values of its file.
-
-    ``draft``: the scene, without people who appear later; actors of scaled skeletons are replaced.
-    """
+    """Scale separate skeletons to metres if other actors have another unit; record estimates."""
+    # A lone skeleton, or one among others in the same unit, keeps the values of its file.
     chosen = [one for one in lone if _is_odd(one, draft.actors)]
     for one in lone:
         if one in chosen:
@@ -238,11 +226,7 @@ def _is_otherwise(actor: Actor, unit: str) -> bool:
 
 
 def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
-    """Return the motion of a file that was passed as a motion.
-
-    ``wanted``: the animation, see ``chosen_animation``. Raises ``FormatError`` if it has no motion
-    of a skeleton. Raises ``RigError`` if there is no such animation.
-    """
+    """Return the motion of a file passed as one; ``wanted`` as for ``chosen_animation``."""
     if isinstance(content, SkeletonMotion):
         return content
     figures = content.figures if isinstance(content, FigureGroup) else (content,)
@@ -263,14 +247,9 @@ def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
 
 
 def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -> bool:
-    """Let skeletons with animations, but without a mesh, move figures that have no motion.
-
-    A skeleton that moves another figure is not shown itself. It does not move figures of its own
-    file, which is a scene and not a motion. Returns whether any skeleton moves a figure.
-
-    ``wanted``: the animation, see ``chosen_animation``. Raises ``RigError`` if no figure matches,
-    although a joint map is given.
-    """
+    """Let skeletons with animations, but without a mesh, move figures that have no motion."""
+    # A skeleton that moves another figure is not shown itself. It does not move figures of its own
+    # file, which is a scene and not a motion. Returns whether any skeleton moves a figure.
     found = False
     for actor in [*draft.actors]:
         figure = actor.figure

@@ -39,11 +39,7 @@ _LINK = re.compile(r"\[([^\]]+)\]\((\w+)\.md\)")
 
 
 def page_text(topic: str) -> str:
-    """Return a page as Markdown, without pictures, and with topics in place of links.
-
-    ``topic``: a key of ``PAGES``. Raises ``ViewerError`` if there is no such page; the message
-    offers the nearest topic and lists all.
-    """
+    """Return a page of ``PAGES`` as Markdown, without pictures and with topics instead of links."""
     if topic not in PAGES:
         near = did_you_mean(topic, PAGES)
         offer = f"{near} " if near else ""

@@ -84,10 +84,8 @@ def cache_use() -> tuple[int, int]:
 
 
 def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
-    """Return the location of an array in the cache; None if caching is not worthwhile or disabled.
-
-    ``kind``: kind of result, part of the file name; must change whenever the conversion changes.
-    """
+    """Return where the cache keeps an array; None if caching is not worthwhile or disabled."""
+    # The kind of result is part of the file name, and must change whenever the conversion changes.
     if not _LEAST <= end - start <= _LARGEST // 2:
         return None
     folder = cache_folder()
@@ -97,10 +95,7 @@ def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
 
 
 class Slot:
-    """Location of one array in the cache.
-
-    ``content``: the bytes that the array is computed from.
-    """
+    """Location of one array in the cache; ``content`` is the bytes that it is computed from."""
 
     __slots__ = ("_content", "path")
 
@@ -109,10 +104,7 @@ class Slot:
         self.path = folder / f"{zlib.crc32(content):08x}-{len(content):x}-{kind}{_SUFFIX}"
 
     def load(self, kind: str, n_axes: int) -> NDArray[Any] | None:
-        """Return the array, which is writable; None if there is no valid entry.
-
-        ``kind``: either "<f8" or "|u1", type of its items.
-        """
+        """Return the array of "<f8" or "|u1" items, writable; None if there is no valid entry."""
         try:
             number = os.open(self.path, _READING)
             with open(number, "rb", buffering=0) as stream:  # noqa: PTH123
@@ -149,10 +141,7 @@ class Slot:
         return values
 
     def store(self, values: NDArray[Any]) -> None:
-        """Store an array; failures are ignored, because the cache is optional.
-
-        ``values``: (...) float64 or uint8, at most three axes.
-        """
+        """Store float64 or uint8, at most three axes; failures are ignored: a cache is optional."""
         values = np.ascontiguousarray(values)
         total = _HEADER.size + len(self._content) + values.nbytes
         if total > _LARGEST:

@@ -47,11 +47,8 @@ class CaptionedCell:
 
 
 def captioned_sheet(cells: Sequence[CaptionedCell]) -> Bytes:
-    """Return an image of a grid of cells with an aspect ratio of about 4:3.
-
-    ``cells``: at least one. Pictures are centred; they must be at most 240 pixels wide. Returns (H,
-    W, 4) uint8, first row at the top, opaque.
-    """
+    """Return an opaque grid of at least one cell, about 4:3: (H, W, 4) uint8, first row on top."""
+    # Pictures are centred; they must be at most 240 pixels wide.
     from PIL import Image, ImageDraw, ImageFont
 
     tallest = max((cell.pixels.shape[0] for cell in cells if cell.pixels is not None), default=0)
@@ -113,8 +110,6 @@ def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
 def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], float]) -> list[str]:
     """Return text as lines; long words are broken, and text that does not fit is omitted.
 
-    >>> wrapped("expected 3 numbers", 10, 2, len)
-    ['expected 3', 'numbers']
     >>> wrapped("expected 3 numbers, found 2", 10, 2, len)
     ['expected 3', 'numbers,…']
     """

@@ -13,11 +13,7 @@ _PAPER_OPACITY = 0.62
 
 
 def write_label(pixels: Bytes, text: str) -> None:
-    """Write a short text on a dark translucent tag into the lower left corner of an image.
-
-    ``pixels``: (H, W, 4) uint8, straight alpha; modified in place, unchanged if the text does not
-    fit.
-    """
+    """Write text, if it fits, on a dark tag in the lower left corner of (H, W, 4) uint8 pixels."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = pixels.shape[:2]

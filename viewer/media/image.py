@@ -42,10 +42,7 @@ def is_picture(head: bytes) -> bool:
 
 
 def decode_picture(path: Path, data: bytes) -> Bytes:
-    """Return the pixels of an image: (H, W, 4) uint8, first row at the top.
-
-    Raises ``FormatError`` if it is not a readable image.
-    """
+    """Return the pixels of an image: (H, W, 4) uint8, first row at the top."""
     from viewer.media.array_cache import slot_of
 
     slot = slot_of("pixels-1", data, 0, len(data))
@@ -71,15 +68,11 @@ def decode_pictures(files: Sequence[tuple[Path, bytes]]) -> list[Bytes | FormatE
 def decoding_pictures(
     files: Sequence[tuple[Path, bytes]],
 ) -> Iterator[Callable[[], list[Bytes | FormatError]]]:
-    """Decode several images in other threads while the body of the ``with`` statement runs.
+    """Decode images, given as names and bytes, in other threads while the ``with`` block runs.
 
-    Small images are decoded immediately, in the calling thread, because starting threads takes
-    longer.
-
-    ``files``: sequence of (Path, bytes), file names for errors, and the files. Yields waits and
-    returns a list. Its items are the pixels, (H, W, 4) uint8, first row at the top, read-only; or
-    the FormatError of an image that is not readable, or that exceeds the number of pixels allowed
-    for all images together.
+    Yields a function that waits and returns the pixels of each image, (H, W, 4) uint8, first row at
+    the top, read-only; or the error of an image that is not readable, or exceeds the number of
+    pixels allowed for all images together.
     """
     from PIL import Image
 
@@ -189,11 +182,7 @@ def _open(data: bytes) -> Image.Image:
 
 
 def save_image(path: Path, pixels: Bytes) -> int:
-    """Write an image in the format of its suffix, PNG if there is no suffix.
-
-    ``pixels``: (H, W, 4) uint8, first row at the top. Returns the number of bytes. Raises
-    ``OutputError`` if it cannot be written.
-    """
+    """Write (H, W, 4) uint8 pixels in the suffix's format, by default PNG; return the size."""
     from viewer.media.saving import save_bytes
 
     data = _encoded(path, pixels)

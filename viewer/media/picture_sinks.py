@@ -22,10 +22,7 @@ _WHITE = (255, 255, 255, 255)
 
 
 class PictureSink:
-    """Writes an image for every frame, each atomically.
-
-    Finished images are kept if the run is aborted.
-    """
+    """Writes an image for every frame, each atomically; they are kept if the run is aborted."""
 
     n_samples = 0
 
@@ -47,10 +44,7 @@ class PictureSink:
         """Do nothing: images are independent of each other."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Write one image; see ``viewer.rendering.recorder.Sink``.
-
-        Raises ``OutputError`` if it cannot be written.
-        """
+        """Write one image; see ``viewer.rendering.recorder.Sink``."""
         save_image(self.paths[frame], pixels)
         self._written.append(frame)
 
@@ -62,13 +56,9 @@ class PictureSink:
 
 
 class SheetSink:
-    """Writes one image of all frames, row by row, with gutters and a number in each cell.
+    """Writes one image of all frames, row by row, with gutters and a number in each cell."""
 
-    Gutters and unused cells are white, or transparent if the frames are transparent.
-
-    ``size``: largest width and height of the image, in pixels. Raises ``ViewerError`` if there are
-    too many frames for the size of the image.
-    """
+    # Gutters and unused cells are white, or transparent if the frames are transparent.
 
     n_samples = 0
 
@@ -107,10 +97,7 @@ class SheetSink:
         write_label(cell, str(self.numbers[frame]))
 
     def close(self) -> None:
-        """Write the image.
-
-        Raises ``OutputError`` if it cannot be written.
-        """
+        """Write the image."""
         assert self._sheet is not None  # there is at least one frame
         self.n_bytes = save_image(self.path, self._sheet)
 

@@ -20,10 +20,7 @@ _RGB, _RGBA = 2, 6  # colour types
 
 
 def encode_png(pixels: Bytes) -> bytes:
-    """Return an image as the bytes of a PNG file, without alpha if all of it is opaque.
-
-    ``pixels``: (H, W, 4) uint8, sRGB and alpha, first row at the top.
-    """
+    """Return (H, W, 4) uint8 sRGB and alpha as PNG, without alpha if all of it is opaque."""
     is_opaque = int(pixels[..., 3].min()) == 255
     channels, kind = (3, _RGB) if is_opaque else (4, _RGBA)
     height, width = pixels.shape[:2]

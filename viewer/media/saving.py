@@ -73,14 +73,9 @@ def save_text(path: str | Path, text: str) -> None:
 
 
 def save_bytes(path: str | Path, data: bytes) -> None:
-    """Replace a file's content atomically, or leave it unchanged.
-
-    A link is followed. A device or pipe is written to directly and never replaced, as is standard
-    output, even if redirected to a file. The new file keeps the old permissions.
-
-    Raises ``OutputError`` if it cannot be written; the message gives the path and the system's
-    reason.
-    """
+    """Replace a file's content atomically, or leave it unchanged."""
+    # A link is followed. A device or pipe is written to directly and never replaced, as is standard
+    # output, even if redirected to a file. The new file keeps the old permissions.
     save_parts(path, [data])
 
 
@@ -121,10 +116,7 @@ def save_parts(
 
 
 class Replacement:
-    """A file that a library writes by name: a temporary file next to the target, then renamed.
-
-    Raises ``OutputError`` if it is a folder or device, or its folder does not exist.
-    """
+    """A file that a library writes by name: a temporary file next to the target, then renamed."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -194,12 +186,8 @@ _outer: ContextVar[_Copies | None] = ContextVar("copies of the innermost all_or_
 
 @contextlib.contextmanager
 def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
-    """Restore all of several files that belong together if writing one of them fails.
-
-    An inner block that succeeds passes its copies to the outer one, which may still fail.
-
-    Raises ``OutputError`` if their old content cannot be copied.
-    """
+    """Restore all of several files that belong together if writing one of them fails."""
+    # An inner block that succeeds passes its copies to the outer one, which may still fail.
     hold()  # signals must not leave copies behind
     poll()
     copies: _Copies = {}

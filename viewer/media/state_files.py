@@ -30,13 +30,9 @@ def load_kept(
     usual: Content,
     say: Callable[[str], object] = to_stderr,
 ) -> Content:
-    """Return the content of a kept file; ``usual`` if there is none, or it cannot be used.
-
-    A damaged file is renamed, so that it is neither read again nor replaced.
-
-    ``parse``: converts its bytes, or raises ``ValueError`` if they are damaged. ``usual``: the
-    default. ``say``: receives a message if the file cannot be used.
-    """
+    """Return the parsed content of a kept file; ``usual`` if it is missing or damaged."""
+    # A damaged file, for which ``parse`` raises a ValueError, is renamed, so that it is neither
+    # read again nor replaced.
     shown = printable(path, 300)
     try:
         if not path.exists():

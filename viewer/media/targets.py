@@ -21,13 +21,9 @@ _since: ContextVar[float] = ContextVar("since", default=float("inf"))
 
 @contextmanager
 def replacing_since(start: float) -> Iterator[None]:
-    """Let the block replace files without ``force`` if they were written after a time.
-
-    A run that is repeated, because its process died before it reported success, replaces its own
-    outputs, but nothing that is more than a second older.
-
-    ``start``: start of the first run, in seconds since 1970.
-    """
+    """Let the block replace files written after a start, in seconds since 1970."""
+    # A run that is repeated, because its process died before it reported success, replaces its own
+    # outputs, but nothing that is more than a second older.
     token = _since.set(start - _CLOCKS)
     try:
         yield
@@ -38,12 +34,9 @@ def replacing_since(start: float) -> Iterator[None]:
 def check_targets(
     files: Sequence[Path], inputs: Iterable[Path], force: bool, hint: str = _FORCE
 ) -> None:
-    """Refuse a run if one of its output files may not be written, before anything is written.
-
-    Raises ``OutputError``: for the first file that is a folder or an input, already exists, is
-    written twice, is in a folder that is missing or read-only, or is a closed standard output.
-    Links are resolved.
-    """
+    """Refuse a run if one of its output files may not be written, before anything is written."""
+    # The first file that is a folder or an input, already exists, is written twice, is in a folder
+    # that is missing or read-only, or is a closed standard output. Links are resolved.
     opened = _Inputs(inputs)
     written: dict[_Identity, Path] = {}
     folders: set[Path] = set()
@@ -59,11 +52,7 @@ def check_targets(
 
 
 def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> None:
-    """Refuse to write a folder that already exists or from which input was read.
-
-    ``inputs``, ``force``: as for ``check_targets``. Raises ``OutputError`` if the folder must not
-    be written, or is a file.
-    """
+    """Refuse to write a folder that exists or is above an input; see ``check_targets``."""
     try:
         place = folder.resolve()
         for path in inputs:

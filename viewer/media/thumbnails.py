@@ -22,11 +22,8 @@ _MOST_BYTES = 256 << 20  # maximum size of a file
 
 
 def thumbnail(path: str | Path, size: tuple[int, int]) -> Bytes | None:
-    """Return an image, or the middle frame of a video, reduced to fit into a box.
-
-    ``size``: largest width and height, pixels. Small images are not enlarged. Returns (H, W, 4)
-    uint8 or None, first row at the top; None if the file is neither, or unreadable.
-    """
+    """Return an image, or a video's middle frame, reduced to fit a box; None if unreadable."""
+    # (H, W, 4) uint8, first row at the top. Small images are not enlarged.
     pixels = _pixels(Path(path))
     if pixels is None:
         return None
@@ -54,10 +51,7 @@ def _pixels(path: Path) -> Bytes | None:
 
 
 def data_uri(pixels: Bytes) -> str:
-    """Return an image as a data URI: JPEG, or PNG if it is transparent.
-
-    ``pixels``: (H, W, 4) uint8, first row at the top.
-    """
+    """Return (H, W, 4) uint8 pixels as a data URI: JPEG, or PNG if transparent."""
     from PIL import Image
 
     stream = io.BytesIO()

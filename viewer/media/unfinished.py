@@ -30,11 +30,7 @@ _LEFTOVER = re.compile(r"(\..+\.tmp)(?:([0-9a-f]{8})-([0-9]+)-)?[a-z0-9_]{8}(\.\
 
 
 def temporary_prefix(name: str) -> str:
-    """Return the beginning of the names of a file's temporary files, different for every file.
-
-    >>> temporary_prefix("walk.bvh")
-    '.walk.bvh.tmp'
-    """
+    """Return the beginning of the names of a file's temporary files, different for every file."""
     if len(name) > _LONGEST:
         from hashlib import blake2b  # loads OpenSSL, which few names need
 

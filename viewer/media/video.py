@@ -43,14 +43,9 @@ _PALETTE_SIDE = 16  # FFmpeg stores a palette as an image of 16 x 16
 class VideoSink:
     """Writes frames as a video; a sink of ``viewer.rendering.recorder``.
 
-    The video is written to a temporary file next to the target, which it replaces when complete.
-
     ``n_samples``: number of frames that should be passed to ``look`` first. ``rate``: frames per
-    second. GIF frame delays are multiples of 1/100 s; they are rounded so that their mean is exact.
-    ``quality``: 0 to 100; ignored for GIFs. ``transparent``: whether frames have transparent
-    pixels. If the format has no alpha, frames are composited on black. Raises ``ViewerError`` if
-    PyAV is not installed or lacks the encoder, or a number is out of range. Raises ``OutputError``
-    if the target cannot be written.
+    second. ``quality``: 0 to 100; ignored for GIFs. ``transparent``: whether frames have
+    transparent pixels; if the format has no alpha, they are composited on black.
     """
 
     def __init__(
@@ -106,11 +101,7 @@ class VideoSink:
         self._chooser.look(self._picture(pixels))
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Encode one frame; frames must be passed in order.
-
-        Raises ``OutputError`` if the encoder rejects the frame or the file cannot be written, and
-        for every later frame.
-        """
+        """Encode one frame, in order; an error is raised again for every later frame."""
         with self._errors():
             if self._container is None:
                 if self.encoder == "gif" and self._chooser is None:
@@ -121,10 +112,7 @@ class VideoSink:
             self._encode(self._converted(picture))
 
     def close(self) -> None:
-        """Finish the video and replace the target.
-
-        Raises ``OutputError`` if it cannot be finished; an existing file is then unchanged.
-        """
+        """Finish the video and replace the target, which is unchanged if that fails."""
         # Opened for the first frame.
         assert self._container is not None and self._output is not None
         with self._errors():
@@ -286,15 +274,12 @@ def _bit_rate(size: tuple[int, int], rate: float, quality: float) -> int:
 
 
 class VideoFile:
-    """A seekable file object for PyAV that drops everything after the first error.
+    """A seekable file object for PyAV that drops everything after the first error."""
 
-    FFmpeg hides write errors, and libavformat does not survive every failed write: if the header
-    could not be written, the next packet makes PyAV write it again, and ``avformat_init_output``
-    reads freed memory. So writes always succeed for the library, and the owner of the file checks
-    for an error after each step.
-
-    Raises ``OSError`` if the file cannot be opened.
-    """
+    # FFmpeg hides write errors, and libavformat does not survive every failed write: if the header
+    # could not be written, the next packet makes PyAV write it again, and ``avformat_init_output``
+    # reads freed memory. So writes always succeed for the library, and the owner of the file checks
+    # for an error after each step.
 
     def __init__(self, path: Path) -> None:
         self.name, self.problem, self.closed = str(path), None, False
@@ -338,10 +323,7 @@ class VideoFile:
         return self._path.open("rb")
 
     def finish(self) -> None:
-        """Close the file.
-
-        Raises ``OSError``: the first error, possibly from closing the file.
-        """
+        """Close the file; raise the first ``OSError``, possibly from closing it."""
         self.closed = True
         try:
             self._file.close()
@@ -387,10 +369,7 @@ class _PaletteChooser:
 
 
 class _PaletteUser:
-    """Assigns a colour of a palette to each pixel (FFmpeg's ``paletteuse``).
-
-    ``time_base``: duration of a frame in seconds. ``palette``: result of a ``_PaletteChooser``.
-    """
+    """Assigns a colour of a palette to each pixel (FFmpeg's ``paletteuse``)."""
 
     def __init__(
         self,

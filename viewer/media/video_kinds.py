@@ -48,10 +48,7 @@ VIDEOS = {
 
 
 def video_kind(path: Path) -> VideoKind:
-    """Return the video format for a file's suffix.
-
-    Raises ``UnsupportedFormatError`` if there is no such format; the message lists all formats.
-    """
+    """Return the video format for a file's suffix; the error for another one lists all formats."""
     suffix = path.suffix.lower()
     if suffix not in VIDEOS:
         known = ", ".join(VIDEOS)

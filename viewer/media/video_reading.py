@@ -36,12 +36,8 @@ class VideoFrames:
     """Reads the frame of a video that is nearest to a time.
 
     Frames are decoded in the order of time. The last ones are cached; an earlier time, or one far
-    ahead, is reached by seeking to the key frame before it.
-
-    ``size``: width and height of the upright picture, pixels. ``rate``: frames per second, on
-    average. ``n_frames``: number of frames according to the file; 0 if unknown. Raises
-    ``ViewerError`` if PyAV is not installed. Raises ``FormatError`` if the file is not a readable
-    video.
+    ahead, is reached by seeking to the key frame before it. ``size``: of the upright picture.
+    ``rate``: frames per second, on average. ``n_frames``: according to the file; 0 if unknown.
     """
 
     def __init__(self, path: Path) -> None:
@@ -89,11 +85,7 @@ class VideoFrames:
         self.size = (high, wide) if turned else (wide, high)
 
     def at(self, seconds: float) -> Bytes | None:
-        """Return the pixels of the frame nearest to a time; None outside the video.
-
-        Returns (H, W, 4) uint8 or None, first row at the top, upright. Raises ``FormatError`` if
-        the file is damaged there.
-        """
+        """Return the frame nearest to a time, (H, W, 4) uint8, upright; None outside the video."""
         found = self._find(seconds)
         if found is None:
             return None

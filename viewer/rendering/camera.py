@@ -140,11 +140,9 @@ class Camera:
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
-    """Return the camera's right, up and backward axes in scene space, each (3,).
-
-    Up is the derivative of the backward axis with respect to inclination, so it is also defined
-    at the poles.
-    """
+    """Return the camera's right, up and backward axes in scene space, each (3,)."""
+    # Up is the derivative of the backward axis with respect to inclination, so it is also defined
+    # at the poles.
     azimuth, inclination = math.radians(camera.azimuth), math.radians(camera.inclination)
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
     sin_i, cos_i = math.sin(inclination), math.cos(inclination)
@@ -200,16 +198,12 @@ def camera_from_view(
     box: Floats | None = None,
     seen: CameraView | None = None,
 ) -> Camera:
-    """Return a camera that looks through a calibrated one.
+    """Return a camera that looks through a calibrated one, in an image of a size in pixels.
 
     If ``fixed`` is reset to None, it is an upright orbit camera at the same position, with the same
     viewing direction and about the same field of view; its principal point is the image's centre.
-
-    ``view``: calibrated camera in scene space. ``size``: width and height of the drawn image,
-    pixels. ``up``: either "y" or "z", the scene's up axis. ``box``: (2, 3), bounds of the objects
-    to orbit, scene space; the origin if omitted. ``seen``: the camera at the time and in the pose
-    of the scene, from ``view_in``, if it moves. Raises ``RigError`` if the size of the camera's
-    images is unknown.
+    ``box``: (2, 3), bounds of the objects to orbit, scene space; the origin if omitted. ``seen``:
+    the camera at the time and in the pose of the scene, from ``view_in``, if it moves.
     """
     from viewer.rendering.pinhole import picture_size
 
@@ -241,13 +235,8 @@ def camera_from_view(
 def follow_view(
     camera: Camera, size: tuple[int, int], scene: Scene, box: Floats | None = None
 ) -> None:
-    """Move a camera together with the calibrated camera that it looks through, in place.
-
-    If ``fixed`` is later reset to None, the camera continues from the current position.
-
-    ``camera``: any camera; unless it looks through a calibrated camera that moves, it does not
-    change. ``size``, ``box``: as for ``camera_from_view``.
-    """
+    """Move a camera, in place, with the moving calibrated camera that it looks through, if any."""
+    # If ``fixed`` is later reset to None, the camera continues from the current position.
     fixed = camera.fixed
     if fixed is None or (fixed.motion is None and fixed.mount is None):
         return
@@ -259,12 +248,8 @@ def follow_view(
 
 
 def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:
-    """Frame some points: aim at their centre and step back until all are visible.
-
-    ``camera``: camera whose target and distance are modified in place. ``points``: (N, 3), points
-    to frame, scene space. ``free_height``: fraction of the image's height to use, about its centre;
-    0 to 1.
-    """
+    """Aim at the centre of points, (N, 3), and step back until all are visible."""
+    # Of the image's height, a fraction ``free_height`` about its centre is used.
     camera.target = bounding_box(points).mean(axis=0)
     across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
     tangent = math.tan(math.radians(camera.fov) / 2)
@@ -289,10 +274,7 @@ def pan(camera: Camera, across: float, upward: float) -> None:
 
 
 def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
-    """Scale the distance and keep the point under the pointer in place.
-
-    ``camera``: camera whose target and distance are modified in place.
-    """
+    """Scale the camera's distance, in place, and keep the point under the pointer."""
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
     # At the ends of the range, the factor is 1, so the camera does not pan.
     factor = distance / camera.distance

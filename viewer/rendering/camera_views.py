@@ -67,11 +67,9 @@ def depth_bounds(
 def with_cameras(
     scene: Scene, options: DisplayOptions, points: Floats, poses: Iterable[Scene] | None = None
 ) -> Floats:
-    """Return the points to frame: the figures' points, and the corners of drawn frusta.
-
-    Cameras that move in frames are framed along their whole path, those that a figure moves where
-    they are in some poses of the scene; without these, where they are now.
-    """
+    """Return the points to frame: the figures' points, and the corners of drawn frusta."""
+    # Cameras that move in frames are framed along their whole path, those that a figure moves where
+    # they are in some poses of the scene; without these, where they are now.
     if not options.cameras or not scene.views:
         return points
     from viewer.rig.captures.cameras import motion_times, view_at
@@ -168,10 +166,7 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
 
 
 def image_notes(scene: Scene, camera: CameraView) -> list[str]:
-    """Return messages about a camera's images, one line each; an empty list if it has no images.
-
-    Raises ``RigError`` if the size of the camera's images is unknown.
-    """
+    """Return messages about a camera's images, one line each; an empty list if it has no images."""
     if scene.images is None:
         return []
     name, size = printable(camera.name, 40), scene.images.size_of(camera.name)
@@ -189,10 +184,7 @@ def image_notes(scene: Scene, camera: CameraView) -> list[str]:
 
 
 def lens_notes(scene: Scene, camera: CameraView) -> list[str]:
-    """Return a message about visible lens distortion, which is removed from images or neglected.
-
-    Raises ``RigError`` if the size of the camera's images is unknown.
-    """
+    """Return a message about visible lens distortion, which is removed from images or neglected."""
     error = distortion_error(camera)
     if error < _VISIBLE:
         return []

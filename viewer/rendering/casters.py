@@ -103,10 +103,8 @@ def _mesh_size(figure: Figure) -> float:
 
 
 def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
-    """Return spheres around the drawn parts of an actor, computed from its joints alone.
-
-    Returns (N, 4), centre and radius, scene space.
-    """
+    """Return spheres, (N, 4) centre and radius in scene space, around an actor's drawn parts."""
+    # They are computed from its joints alone.
     parts = []
     if shows_mesh(actor.figure, options):
         parts.append(_mesh_spheres(actor, options))

@@ -103,30 +103,18 @@ _DARKER = 0.55  # factor of the brightness for each repetition of the list
 
 
 def colormap(count: int = 256) -> Bytes:
-    """Return the map as pixels: (count, 4) sRGB with alpha, from lowest to highest.
-
-    >>> colormap(2).shape
-    (2, 4)
-    """
+    """Return the map as pixels: (count, 4) sRGB with alpha, from lowest to highest."""
     return _map_pixels(_ANCHORS, np.linspace(0.0, 1.0, len(_ANCHORS)), count)
 
 
 def diverging_map(count: int = 256) -> Bytes:
-    """Return the diverging map as pixels: (count, 4) sRGB with alpha, white in the middle.
-
-    >>> diverging_map(3)[1].tolist()
-    [245, 245, 245, 255]
-    """
+    """Return the diverging map as pixels: (count, 4) sRGB with alpha, white in the middle."""
     return _map_pixels(_DIVERGING, _DIVERGING_PLACES, count)
 
 
 @cache
 def named_map(name: str) -> Bytes:
-    """Return a map of ``assets/colormaps.txt`` as pixels: (256, 4) sRGB with alpha.
-
-    >>> named_map("viridis")[[0, -1]].tolist()
-    [[68, 1, 84, 255], [253, 231, 37, 255]]
-    """
+    """Return a map of ``assets/colormaps.txt`` as pixels: (256, 4) sRGB with alpha."""
     lines = resource("assets", "colormaps.txt").read_text("ascii").splitlines()
     first = lines.index(name) + 1
     pixels = np.full((256, 4), 255, dtype=np.uint8)
@@ -157,17 +145,10 @@ def oklab(colors: Floats) -> Floats:
 
 
 def joint_palette(parents: Ints) -> Bytes:
-    """Return a colour for every joint; neighbours differ clearly, even for colour-blind people.
-
-    Neighbours of a joint are its parent, its grandparent, its siblings and its parent's siblings.
-    Among the least-used colours, the one farthest from all neighbours is chosen.
-
-    ``parents``: (J,), index of each joint's parent, smaller than its own; -1 for a root. Returns
-    (J, 4) uint8, sRGB and alpha.
-
-    >>> joint_palette(np.array([-1, 0, 1])).shape
-    (3, 4)
-    """
+    """Return a clearly different colour for neighbouring joints: (J, 4) uint8, sRGB and alpha."""
+    # Neighbours of a joint are its parent, its grandparent, its siblings and its parent's siblings.
+    # Among the least-used colours, the one farthest from all neighbours is chosen, also as colour-
+    # blind people see it.
     bright = decode_srgb(_JOINT_COLORS / 255.0)
     linear = np.concatenate([brightness * bright for brightness in _ROUNDS])
     distances = _distances(linear)
@@ -209,11 +190,7 @@ def part_palette(count: int) -> Bytes:
 
 
 def part_colors(count: int) -> Floats:
-    """Return a colour for each of ``count`` parts: (count, 3), linear.
-
-    >>> part_colors(3).shape
-    (3, 3)
-    """
+    """Return a colour for each of ``count`` parts: (count, 3), linear."""
     numbers = np.arange(count)
     linear = (_PART_COLORS / 255.0) ** 2.2
     return linear[numbers % len(linear)] * _DARKER ** (numbers // len(linear))[:, None]

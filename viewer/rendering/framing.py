@@ -25,10 +25,10 @@ _N_VIEWS = 24  # number of views of a rotating camera to fit, 15 degrees apart i
 
 
 def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
-    """Return the points that a recording's camera should frame, from up to 32 of its frames.
+    """Return the points that a recording's camera should frame, and their bounds in the scene.
 
-    Returns ``points``: (N, 3), the outermost points of these frames, scene space; relative to the
-    camera if it moves; ``box``: (2, 3), bounds of all points in the scene: the recording's ``box``.
+    The points, (N, 3), are the outermost ones of up to 32 frames, scene space; relative to the
+    camera if it moves. The bounds, (2, 3), are the recording's ``box``.
     """
     follow, show = recording.follow, recording.options.show
     clouds: list[Floats] = []
@@ -59,10 +59,8 @@ def framed_poses(recording: Recording) -> Iterator[Scene]:
 
 
 def level_shifts(recording: Recording) -> Floats:
-    """Return the movement of the actors over the ground up to each frame, scene units: (F, 3).
-
-    A camera with these shifts shows all frames at the same scale and with the same ground line.
-    """
+    """Return the movement of the actors over the ground up to each frame, scene units: (F, 3)."""
+    # A camera with these shifts shows all frames at the same scale and with the same ground line.
     scene = copied(recording.scene)
     shifts = np.zeros((recording.n_frames, 3))
     before: dict[int, Floats] = {}
@@ -79,10 +77,7 @@ def level_shifts(recording: Recording) -> Floats:
 
 
 def seen_aspect(camera: Camera, points: Floats) -> float:
-    """Return the width / height of points as seen by a camera from far away.
-
-    ``camera``: camera of which only the direction is used. ``points``: (N, 3), scene space.
-    """
+    """Return the width / height of points, (N, 3), seen from far away in a camera's direction."""
     right, up, _ = camera_axes(camera)
     wide, high = (float(np.ptp(points @ axis)) for axis in (right, up))
     return wide / high if wide > 0.0 and high > 0.0 else 1.0
@@ -108,15 +103,10 @@ def frames_looked_at(n_frames: int, most: int) -> list[int]:
 
 
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
-    """Return the points that are outermost in any of many directions.
-
-    Their bounding box is exact. A camera fitted to these points cuts off much less than 1 % of the
-    size, because 1000 directions are 7 degrees apart; the margin of ``fit`` is 8 %.
-
-    ``points``: (N, 3), at least one point. ``n_directions``: number of directions; 100 are 20
-    degrees apart, with an error below 2 %. Returns (M, 3), a subset of at most ``n_directions + 6``
-    points; all points if there are no more.
-    """
+    """Return the points, of (N, 3), that are outermost in any of many directions."""
+    # Their bounding box is exact. A camera fitted to these points cuts off much less than 1 % of
+    # the size, because 1000 directions are 7 degrees apart; the margin of ``fit`` is 8 %. A hundred
+    # are 20 degrees apart, with an error below 2 %.
     if len(points) <= n_directions:
         return points
     directions = np.concatenate([np.eye(3), -np.eye(3), _directions(n_directions)])
@@ -140,11 +130,7 @@ def _directions(count: int) -> Floats:
 
 
 def fit_turntable(camera: Camera, points: Floats, aspect: float, angle: float) -> None:
-    """Fit a rotating camera so that all points stay visible; see ``viewer.rendering.camera``.
-
-    ``camera``: changed in place: target and distance. ``points``: (N, 3), points to frame, scene
-    space. ``angle``: rotation about the target in degrees.
-    """
+    """Fit a camera, in place, so that points (N, 3) stay visible while it rotates by an angle."""
     first, widest = camera.azimuth, 0.0
     for fraction in np.linspace(0.0, 1.0, _N_VIEWS + 1) if angle else (0.0,):
         camera.azimuth = first + angle * float(fraction)
@@ -154,11 +140,7 @@ def fit_turntable(camera: Camera, points: Floats, aspect: float, angle: float) -
 
 
 def find_follow(scene: Scene, name: str) -> Follow:
-    """Return the actor or joint that a camera follows.
-
-    ``name``: name of an actor, joint or point, see ``follow_candidates``; the first match is used.
-    Raises ``RigError`` if nothing has this name.
-    """
+    """Return the actor or joint that a camera follows: the first of ``follow_candidates``."""
     for index, joint in follow_candidates(scene, name):
         place = followed_point(scene.actors[index], joint)
         return Follow(index, joint, np.zeros(3) if place is None else place)
@@ -166,12 +148,10 @@ def find_follow(scene: Scene, name: str) -> Follow:
 
 
 def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
-    """Return all candidates for a name: indices of actors, and of a joint or point of each.
-
-    ``name``: name of an actor, which stands for its root joint or the centre of its points; name of
-    a joint or captured point; a person's number; or a joint of an actor, such as ``fox/head`` or
-    ``1:pelvis``.
-    """
+    """Return the indices of actors, and of a joint or point of each, that a name may mean."""
+    # The name is that of an actor, which stands for its root joint or the centre of its points; of
+    # a joint or captured point; a person's number; or a joint of an actor, such as "fox/head" or
+    # "1:pelvis".
     wanted = name.lower()
     called = _called(scene)
     roots = [_root(actor) for actor in scene.actors]

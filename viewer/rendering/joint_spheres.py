@@ -16,14 +16,9 @@ _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()
 
 
 def skin_spheres(figure: Figure, pose: Pose) -> Floats:
-    """Return bounding spheres of the vertices of a figure, computed from its joints alone.
-
-    A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
-    it lies in the convex hull of spheres around the joints that reach their farthest vertices.
-
-    ``pose``: DOFs in lengths and radians; its placement is not applied. Returns (N, 4), centre and
-    radius of each joint with influence, figure space.
-    """
+    """Return bounds of a figure's vertices from its joints: (N, 4) centre, radius; figure space."""
+    # A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
+    # it lies in the convex hull of spheres around the joints that reach their farthest vertices.
     skin = figure.require_skin()
     centers, radii = _reaches.get(figure, (), lambda: _reaches_of(figure, skin))
     palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
@@ -35,22 +30,16 @@ def skin_spheres(figure: Figure, pose: Pose) -> Floats:
 
 
 def stretch_bounds(matrices: Floats) -> Floats:
-    """Return upper bounds of the spectral norms of matrices; exact for rotations.
-
-    The spectral norm is at most the square root of the largest absolute row sum of M^T M.
-
-    ``matrices``: (..., 4, 4), affine matrices. Returns (...), factors.
-    """
+    """Return upper bounds, (...), of the spectral norms of affine matrices, (..., 4, 4)."""
+    # The spectral norm is at most the square root of the largest absolute row sum of M^T M; exactly
+    # that for rotations.
     linear = matrices[..., :3, :3]
     products = np.abs(np.swapaxes(linear, -1, -2) @ linear)
     return np.sqrt(products.sum(axis=-1).max(axis=-1))
 
 
 def _reaches_of(figure: Figure, skin: Skin) -> tuple[Floats, Floats]:
-    """Return each joint's bind position, (J, 3), and the distance of its farthest vertex, (J,).
-
-    The distance is -1 for joints without influence.
-    """
+    """Return joints' bind positions, (J, 3), and farthest vertices' distances, (J,), -1: none."""
     centers, positions = bind_positions(skin), figure.require_mesh().positions
     used = skin.weights != 0.0
     joints = skin.joints[used]

@@ -59,10 +59,7 @@ class Lighting:
         return self._owner.keep(GroundShadowPass(self.context, self.programs))
 
     def begin(self, casters: Casters, up: str, box: Floats) -> None:
-        """Draw the maps shared by all passes of an image.
-
-        ``box``: (2, 3), bounds whose lowest point is at ground level, scene space.
-        """
+        """Draw the maps shared by all passes; the box, (2, 3), stands on the ground."""
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options
         if options.quality == "draft":
@@ -87,11 +84,7 @@ class Lighting:
         sample: Sample,
         strength: float,
     ) -> View:
-        """Draw the maps for one pass of an image; return its view with the effects.
-
-        ``size``: width and height of the image, pixels. ``strength``: strength of shadows and
-        occlusion, 0 to 1.
-        """
+        """Draw the maps for one pass of an image; return its view with the effects."""
         options, shadow, occlusion = casters.options, None, None
         casters = replace(casters, threshold=sample.threshold)
         if self._spheres is not None and options.lights.key.strength > 0.0:

@@ -27,11 +27,9 @@ class Offscreen:
     """A headless context that draws any number of scenes.
 
     The context is current only while drawing, so any thread may use it, one at a time. Another
-    context that was current before must be made current again (``with context:``).
-
-    ``device``: index of the EGL device; if omitted, each one is tried in turn. ``graphics``: an
-    existing context to draw in, which ``release`` does not free. Raises ``RenderError`` if there is
-    no usable OpenGL, with the cause and a remedy.
+    context that was current before must be made current again (``with context:``). ``device``:
+    index of the EGL device; if omitted, each one is tried in turn. ``graphics``: an existing
+    context to draw in, which ``release`` does not free.
     """
 
     def __init__(self, device: int | None = None, graphics: Graphics | None = None) -> None:
@@ -69,11 +67,9 @@ class Offscreen:
         box: Floats,
         on_time: Callable[[float, int], object] | None = None,
     ) -> Bytes:
-        """Draw a scene and return its pixels; see ``render``.
-
-        ``on_time`` is called after the second of several passes with the time that it took, in
-        seconds, and their number. The first one also compiles shaders and uploads buffers.
-        """
+        """Draw a scene and return its pixels; see ``render``."""
+        # The second of several passes is timed, because the first one also compiles shaders and
+        # uploads buffers: ``on_time`` is called with its seconds and the number of passes.
         with self.context:
             target = self.target(size, options.samples)
             draw = partial(self.renderer.draw, scene, camera, options, target, box)
@@ -120,10 +116,7 @@ class _OfThread:
 
 
 def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> Camera:
-    """Return a camera that frames the whole scene from the front, slightly left and above.
-
-    ``show``: drawn parts of the figures, a key of ``SHOWN``.
-    """
+    """Return a camera that frames the whole scene from the front, slightly left and above."""
     return _framing(scene, size, scene_points(scene, show))
 
 

@@ -258,13 +258,7 @@ def skeleton_opacity(skeleton: Skeleton, options: DisplayOptions) -> float:
 
 
 def parse_color(text: str) -> tuple[float, float, float]:
-    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
-
-    Raises ``ViewerError`` if the text does not have this form.
-
-    >>> parse_color("#ff0000")
-    (1.0, 0.0, 0.0)
-    """
+    """Return the colour of ``#rrggbb``, sRGB from 0 to 1."""
     digits = text.removeprefix("#")
     if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
         names = ", ".join(f'"{name}"' for name in BACKGROUNDS)

@@ -22,14 +22,9 @@ _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's c
 
 
 def picture_size(view: CameraView) -> tuple[float, float]:
-    """Return the width and height of a camera's images, pixels.
-
-    If the files do not state the size, the principal point is assumed to be the image centre:
-    (W - 1) / 2 and (H - 1) / 2, because pixel coordinates begin at the centre of the first pixel.
-
-    Raises ``RigError`` if the size is unknown and the principal point does not have positive
-    coordinates.
-    """
+    """Return the width and height of a camera's images, pixels."""
+    # If the files do not state the size, the principal point is assumed to be the image centre: (W
+    # - 1) / 2 and (H - 1) / 2, because pixel coordinates begin at the centre of the first pixel.
     if view.size is not None:
         return float(view.size[0]), float(view.size[1])
     across, down = view.intrinsic[:2, 2] / view.intrinsic[2, 2]
@@ -51,15 +46,12 @@ def pinhole_view(view: CameraView) -> Floats:
 
 
 def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
-    """Return the matrix from camera to clip space that reproduces the camera's image.
+    """Return the matrix, (4, 4), from camera to clip space that reproduces the camera's image.
 
     OpenCV's pixel coordinates start at the centre of the first pixel, OpenGL's at its corner. So
     for u from K and the image's width W, x = 2 (u + 1/2) / W - 1 in -1..1. An image with a
     different aspect ratio shows all of the camera's image in its centre, with margins on two sides.
-
-    ``view``: the camera; its distortion is ignored, see ``distortion_error``. ``box``: (2, 3),
-    bounds that must lie between the near and the far plane, scene space. Returns (4, 4), OpenGL
-    clip space, z in -1..1. Raises ``RigError``: see ``picture_size``.
+    ``box``: (2, 3), bounds that must lie between the near and the far plane, scene space.
     """
     width, height = picture_size(view)
     k = view.intrinsic / view.intrinsic[2, 2]
@@ -90,11 +82,9 @@ def distortion_error(view: CameraView) -> float:
 
     This is the error of a view through the camera that neglects the distortion. OpenCV's model is,
     with r^2 = x^2 + y^2: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + 2
-    p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged.
-
-    ``view``: camera with coefficients k1 k2 p1 p2 k3 k4 k5 k6, of which trailing ones may be
-    missing; the thin prism coefficients after them are ignored. The result is in pixels; 0 without
-    distortion. Raises ``RigError``: see ``picture_size``.
+    p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged. The coefficients are k1 k2
+    p1 p2 k3 k4 k5 k6, of which trailing ones may be missing; the thin prism coefficients after them
+    are ignored.
     """
     k1, k2, p1, p2, k3, k4, k5, k6 = np.append(view.distortion, np.zeros(8))[:8]
     width, height = picture_size(view)
@@ -118,11 +108,9 @@ def frustum_depth(box: Floats) -> float:
 
 
 def frustum_corners(camera: CameraView, depth: float) -> Floats:
-    """Return the corners of a camera's image at a depth: (4, 3), scene space.
-
-    Clockwise from the upper left; these are the corners of the outermost pixels, with
-    X = R^T (d K^-1 u - T), without lens distortion.
-    """
+    """Return the corners of a camera's image at a depth: (4, 3), scene space."""
+    # Clockwise from the upper left; these are the corners of the outermost pixels, with X = R^T (d
+    # K^-1 u - T), without lens distortion.
     width, height = picture_size(camera)
     k = camera.intrinsic / camera.intrinsic[2, 2]
     left, top, right, bottom = -0.5, -0.5, width - 0.5, height - 0.5

@@ -26,10 +26,7 @@ class Projected:
 
 
 def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
-    """Project points into the image: x = c_x / c_w with c = P V [p 1].
-
-    ``size``: width and height of the image, pixels. ``points``: (N, 3), scene space.
-    """
+    """Project points, (N, 3) in scene space, into the image: x = c_x / c_w with c = P V [p 1]."""
     clip = _clip(view, points)
     in_front = clip[:, 3] > 0.0
     w = np.where(in_front, clip[:, 3], 1.0)
@@ -41,13 +38,9 @@ def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
 def project_segments(
     view: View, size: tuple[int, int], starts: Floats, ends: Floats
 ) -> tuple[Floats, Bools]:
-    """Project segments into the image, clipped at the near plane: -c_w <= c_z.
-
-    ``size``: width and height of the image, pixels. ``starts``, ``ends``: (N, 3), scene space.
-    Returns ``pixels``: (N, 2, 2), both ends, from the image's left and upper edges; they may lie
-    outside the image; ``seen``: (N,) bool, whether any part of the segment is beyond the near
-    plane.
-    """
+    """Project segments, ends (N, 3) in scene space, clipped at the near plane: -c_w <= c_z."""
+    # Returns both ends, (N, 2, 2) pixels from the image's left and upper edges, which may lie
+    # outside the image, and a mask of the segments of which a part is beyond the near plane.
     clips = np.stack([_clip(view, starts), _clip(view, ends)], axis=1)
     away = clips[..., 2] + clips[..., 3]
     seen: Bools = np.any(away > 0.0, axis=1)
@@ -62,12 +55,8 @@ def project_segments(
 
 
 def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats) -> Floats:
-    """Return the scene points at given pixels with the depths of given points.
-
-    ``size``: width and height of the image, pixels. ``points``: (N, 3), scene space, in front of
-    the eye. ``pixels``: (N, 2), from the image's left and upper edge. Returns (N, 3), scene space:
-    (P V)^-1 c with the points' own c_z and c_w.
-    """
+    """Return the points, (N, 3), at pixels, (N, 2), with the depths of other points, (N, 3)."""
+    # (P V)^-1 c with the points' own c_z and c_w; they must be in front of the eye.
     clip = _clip(view, points)
     clip[:, 0] = (2.0 * pixels[:, 0] / size[0] - 1.0) * clip[:, 3]
     clip[:, 1] = (1.0 - 2.0 * pixels[:, 1] / size[1]) * clip[:, 3]
@@ -76,10 +65,7 @@ def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats)
 
 
 def picture_scale(size: tuple[int, int]) -> float:
-    """Return the scale of marks in an image, 1 at a height of 720 pixels.
-
-    ``size``: width and height of the image, pixels.
-    """
+    """Return the scale of marks in an image, 1 at a height of 720 pixels."""
     return float(np.clip(min(size[1], 0.75 * size[0]) / _USUAL_HEIGHT, *_SCALES))
 
 

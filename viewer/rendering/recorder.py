@@ -106,39 +106,21 @@ class Follow:
 
 
 class Sink(Protocol):
-    """Receiver of frames; ``viewer.media`` has sinks for images, contact sheets and videos.
-
-    Attributes
-    ----------
-    workers : int
-        Number of threads that may call ``write`` at the same time; 1 for sinks that need the
-        frames in order.
-    n_samples : int
-        Number of frames, spread over the recording, to pass to ``look`` before the first
-        ``write``.
-    """
+    """Receiver of frames; ``viewer.media`` has sinks for images, contact sheets and videos."""
 
     @property
     def workers(self) -> int:
-        """Number of threads that may call ``write`` at the same time."""
+        """Number of threads that may ``write`` at once; 1 if frames must be in order."""
 
     @property
     def n_samples(self) -> int:
-        """Number of frames to pass to ``look``."""
+        """Number of frames, spread over the recording, to pass to ``look`` first."""
 
     def look(self, pixels: Bytes) -> None:
         """Inspect a sample frame before any frame is written, to choose the palette of a GIF."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Write one frame; called in a worker thread.
-
-        Parameters
-        ----------
-        frame : int
-            Index of the frame, from 0.
-        pixels : (H, W, 4) uint8
-            sRGB and straight alpha, first row at the top; read-only.
-        """
+        """Write a frame, counted from 0, in a worker thread: (H, W, 4) uint8, read-only."""
 
     def close(self) -> None:
         """Finish the output and move it to its final name; called once, after the last frame."""
@@ -152,11 +134,8 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[in
 
     The renderer's context must be current in every step and when the generator is closed. Other
     framebuffers may be bound between steps. Closing or discarding the generator before its end
-    aborts the sink.
-
-    ``renderer``: preferably a separate renderer: buffers of other scenes are freed and must be
-    uploaded again. Raises ``ViewerError`` if the driver cannot draw an image of this size. Raises
-    ``OutputError`` if the sink cannot write.
+    aborts the sink. The renderer is preferably a separate one: buffers of other scenes are freed
+    and must be uploaded again.
     """
     total = recording.n_frames
     samples = np.unique(np.rint(np.linspace(0, total - 1, sink.n_samples)).astype(int)).tolist()
@@ -318,11 +297,8 @@ class Waiter:
     moderngl holds the global interpreter lock during every call. Reading an image that is still
     being drawn blocks until the drawing is finished, and meanwhile no other thread can run Python:
     an encoder thread that needs the lock five times per frame would be delayed by five frames.
-    ``ctypes`` releases the lock during a call, so two OpenGL functions are called through it.
-
-    ``is_free``: whether other threads can run during the wait. False with versions of moderngl that
-    do not expose the functions' addresses; recording still works then, but more slowly.
-    ``context``: the context in use; it must be current whenever a method is called.
+    ``ctypes`` releases the lock during a call, so two OpenGL functions are called through it, if
+    ``is_free``: some versions of moderngl do not expose the functions' addresses.
     """
 
     def __init__(self, context: moderngl.Context) -> None:

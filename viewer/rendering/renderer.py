@@ -57,9 +57,9 @@ if TYPE_CHECKING:
 class Renderer:
     """Owner of all programs, passes and buffers needed for drawing.
 
-    ``marks``: marks, drawn over everything except annotations and legends. ``annotations``:
-    annotations, drawn over everything except legends. ``names_left_out``: number of joint names
-    omitted from the last image for lack of room, and number of joints in the image.
+    ``marks`` are drawn over everything except annotations and legends, ``annotations`` over
+    everything except legends. ``names_left_out``: number of joint names omitted from the last image
+    for lack of room, and number of joints in the image.
     """
 
     def __init__(self, programs: Programs) -> None:
@@ -92,15 +92,14 @@ class Renderer:
         passes: range | None = None,
         strength: float = 1.0,
     ) -> None:
-        """Draw a scene.
+        """Draw a scene, without actors that are hidden, or absent at this time.
 
-        ``scene``: the scene; actors that are hidden, or absent at this time, are omitted. ``box``:
-        (2, 3), bounds for the ground grid and the depth range, scene space: ``scene_box`` of the
-        pose in which the scene was opened. ``selected``: index of an actor and of its highlighted
-        joint, -1 for none. The joint is also used for a scalar quantity that needs one and does not
-        specify it. ``passes``: passes of final quality to draw now, in order from 0; all if
-        omitted. The target shows the average of the passes drawn so far. ``strength``: strength of
-        shadows and occlusion, 0 to 1.
+        ``box``: (2, 3), bounds for the ground grid and the depth range, scene space: ``scene_box``
+        of the pose in which the scene was opened. ``selected``: index of an actor and of its
+        highlighted joint, -1 for none. The joint is also used for a scalar quantity that needs one
+        and does not specify it. ``passes``: passes of final quality to draw now, in order from 0;
+        all if omitted. The target shows the average of the passes drawn so far. ``strength``: of
+        shadows and occlusion.
         """
         note = f"{target.asked_samples} samples per pixel requested, {target.samples or 1} drawn"
         if target.asked_samples > max(target.samples, 1) and note not in self.notes:
@@ -201,10 +200,7 @@ class Renderer:
         box: Floats,
         selected: tuple[int, int],
     ) -> None:
-        """Draw everything that lies over the scene: joint marks, ghost, marks, annotations.
-
-        All labels are drawn last, on top.
-        """
+        """Draw joint marks, ghost, marks and annotations over the scene; all labels come last."""
         marked: list[Annotation] = []
         if has_joint_marks(options):
             from viewer.rendering.overlay.joint_marks import joint_annotation
@@ -247,10 +243,7 @@ class Renderer:
         y: float,
         box: Floats,
     ) -> Pick | None:
-        """Return the object at a pixel or within three pixels of it; None if there is none.
-
-        ``size``: width and height of the image, pixels. ``box``: (2, 3), bounds, as in ``draw``.
-        """
+        """Return the object at a pixel or within three pixels of it; None if there is none."""
         self.buffers.keep_only(scene.actors)
         return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
 
@@ -270,12 +263,8 @@ class Renderer:
         self.late.outline_pass.draw(outlined, scene, view, options, target, is_layer=True)
 
     def prepare(self, scene: Scene) -> None:
-        """Upload a scene's buffers in advance, so that a failure leaves the previous scene intact.
-
-        Whatever was uploaded before a failure is freed.
-
-        Raises ``RenderError`` if there is not enough graphics memory.
-        """
+        """Upload a scene's buffers in advance, so that a failure leaves the previous scene."""
+        # Whatever was uploaded before a failure is freed.
         with self.buffers.guard():
             prepare_meshes(self.buffers, scene.actors, DisplayOptions())
             for actor in scene.actors:
@@ -301,11 +290,9 @@ class Renderer:
         return meshes
 
     def _draw_translucent(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        """Draw translucent actors over everything opaque, as a single layer.
-
-        Where they overlap, only the nearest surface is visible, so the poses of a motion stay
-        legible.
-        """
+        """Draw translucent actors over everything opaque, as a single layer."""
+        # Where they overlap, only the nearest surface is visible, so the poses of a motion stay
+        # legible.
         drawn = [
             (actor, mesh, opacity)
             for actor, mesh in meshes.singles

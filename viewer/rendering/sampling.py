@@ -95,13 +95,8 @@ def tilted(direction: Floats, light: tuple[float, float]) -> Floats:
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower the quality if it would take a long time in software, or need over 1 GB of memory.
-
-    The work is counted, not timed, so that an image does not depend on the machine or its load.
-
-    ``options``: display options; modified in place if necessary. ``size``: width and height in
-    pixels. Returns a message if the quality was lowered.
-    """
+    """Lower the quality, in place, if it takes long in software or over 1 GB; return a message."""
+    # The work is counted, not timed, so that an image does not depend on the machine or its load.
     if options.quality != "final":
         return []
     memory = _BYTES_PER_PIXEL * math.prod(size)

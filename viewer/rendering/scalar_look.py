@@ -63,12 +63,9 @@ def is_whole(name: str) -> bool:
 
 
 def typical_span(numbers: Floats) -> tuple[float, float]:
-    """Return a range that contains nearly all nonzero values.
-
-    ``numbers``: (V,), values of a scalar quantity. Returns the range of the values, limited to the
-    99th percentile of their absolute values; with fewer than a hundred nonzero values, the whole
-    range.
-    """
+    """Return a range that contains nearly all nonzero values of a scalar quantity, (V,)."""
+    # It is limited to the 99th percentile of their absolute values; with fewer than a hundred
+    # nonzero values, it is the whole range.
     amounts = np.abs(numbers[numbers != 0.0])
     if not len(amounts):
         return 0.0, 0.0
@@ -82,11 +79,7 @@ def shown_ends(
     ranges: Sequence[tuple[float, float]],
     options: DisplayOptions,
 ) -> tuple[float, float]:
-    """Return the common range of the colour map for all figures.
-
-    ``figure``: defines the unit of a requested range. ``options``: display options with the
-    requested range, if any. Returns the ends, in the unit of the values.
-    """
+    """Return the colour map's common range for all figures; the first one defines the unit."""
     requested = options.scalar_range
     if requested is not None and not is_whole(name):
         factor, _ = shown_unit(name, figure)
@@ -98,10 +91,7 @@ def shown_ends(
 def look_of(
     name: str, figure: Figure, ends: tuple[float, float], options: DisplayOptions
 ) -> ScalarLook:
-    """Return the colours of a quantity on a figure.
-
-    ``ends``: result of ``shown_ends``.
-    """
+    """Return the colours of a quantity on a figure, between the results of ``shown_ends``."""
     quantity = find_quantity(name)
     if quantity.kind == "categorical":
         return ScalarLook(_category_colors(name, figure), ends, is_whole=True)

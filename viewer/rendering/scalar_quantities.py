@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 
 
 class ScalarQuantities:
-    """Values, colours and legend of the displayed scalar quantity, updated on demand.
+    """Values, colours and legend of the displayed scalar quantity, updated on demand."""
 
-    ``range``: lowest and highest value of the last drawn quantity, over all figures. ``legend``:
-    its legend; None if there was none.
-    """
+    # Range and legend are those of the last drawn quantity, over all figures.
 
     def __init__(self) -> None:
         self.range = self.ends = 0.0, 0.0
@@ -42,13 +40,8 @@ class ScalarQuantities:
         selected: tuple[Actor | None, int],
         figures: Sequence[Figure],
     ) -> None:
-        """Recompute changed values; the same colour means the same value on all figures.
-
-        Figures without the quantity are drawn with the default shading.
-
-        ``values``: sequence of (Actor, ScalarBuffer), drawn actors with meshes and the values on
-        these, at least one.
-        """
+        """Recompute changed values of drawn meshes; the same colour means the same value on all."""
+        # Figures without the quantity are drawn with the default shading.
         name = name_for(options.scalar, *selected)
         for actor, buffer in values:
             pose = None if options.show == "binding" else actor.pose
@@ -103,8 +96,7 @@ class ScalarBuffer:
     ``values``: one float32 per split vertex; None before the first computation. ``numbers``: (V,),
     the same values per vertex of the figure. ``range``: lowest and highest value, in the unit given
     in ``SCALARS``. ``span``: ``range``, or the typical range of a quantity with a robust range.
-    ``look``: colours of the values; None for a figure without the quantity. ``is_shown``: whether
-    ``show`` was called.
+    ``look``: colours of the values; None for a figure without the quantity.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers) -> None:
@@ -119,11 +111,7 @@ class ScalarBuffer:
         self._key: tuple[object, ...] | None = None
 
     def update(self, name: str, pose: Pose | None, skinning: Skinning) -> None:
-        """Compute a scalar quantity if its inputs changed.
-
-        ``name``: a key of ``SCALARS``, with a joint if the quantity needs one. Missing values are
-        0. ``pose``: none for the mesh in its bind pose.
-        """
+        """Compute a scalar quantity if its inputs changed; missing values are 0."""
         from viewer.rendering.scalar_look import typical_span
 
         depends = find_quantity(name).moves and pose is not None

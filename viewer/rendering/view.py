@@ -100,10 +100,9 @@ _NO_EFFECTS = Effects()  # lighting depends only on the lights
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A camera's matrices for one image, (4, 4) for column vectors, and the camera itself.
+    """A camera's matrices for one image, (4, 4) for column vectors, and the camera itself."""
 
-    Effects modify the lighting of everything drawn with this view.
-    """
+    # Effects modify the lighting of everything drawn with this view.
 
     matrix: Floats
     projection: Floats
@@ -124,10 +123,8 @@ def in_front(view: View) -> View:
 
 
 def set_model(program: moderngl.Program, view: View, placement: Floats, center: Floats) -> None:
-    """Set the matrices of a mesh whose positions are relative to ``center``.
-
-    The product is formed in float64: large translations cancel before the conversion to float32.
-    """
+    """Set the matrices of a mesh whose positions are relative to ``center``."""
+    # The product is formed in float64: large translations cancel before the conversion to float32.
     model_view = view.matrix @ placement @ translation_matrix(center)
     values = {
         "u_model_view": as_uniform(model_view),
@@ -139,13 +136,9 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 
 
 def normal_matrix(linear: Floats) -> Floats:
-    """Return the matrix that transforms normals: the inverse transpose, up to a positive factor.
-
-    A singular matrix, which flattens a mesh or shrinks it to a point, has no inverse. Its
-    cofactors, the determinant times the inverse transpose, still transform normals.
-
-    ``linear``: (3, 3), transforms positions.
-    """
+    """Return the (3, 3) matrix of normals: the inverse transpose, up to a positive factor."""
+    # A singular matrix, which flattens a mesh or shrinks it to a point, has no inverse. Its
+    # cofactors, the determinant times the inverse transpose, still transform normals.
     if np.linalg.det(linear) != 0.0:
         found: Floats = np.linalg.inv(linear).T.astype(np.float64, copy=False)
         largest = float(np.abs(found).max())
@@ -202,10 +195,8 @@ def _direction(light: Light, follows: bool, view: View) -> Floats:
 
 
 def _studio_axes(view: View, follows: bool) -> Floats:
-    """Return the rotation from camera space to the studio's: +y up, +z towards the camera.
-
-    A studio that does not follow the camera has +z at azimuth 0.
-    """
+    """Return the rotation from camera space to the studio's: +y up, +z towards the camera."""
+    # A studio that does not follow the camera has +z at azimuth 0.
     axes = view.matrix[:3, :3]
     front = np.stack(camera_axes(Camera(azimuth=0.0, inclination=0.0, up=view.camera.up)))
     if follows:

@@ -45,11 +45,7 @@ class Meshes:
 def prepare_meshes(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
 ) -> Meshes:
-    """Upload the buffers of the actors' meshes, without skinning posed buffers.
-
-    ``actors``: actors; those without a mesh are ignored. Raises ``RenderError`` if there is not
-    enough graphics memory.
-    """
+    """Upload the buffers of the actors' meshes, without skinning posed buffers."""
     meshes = Meshes()
     actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
     of_figure: dict[int, list[list[Actor]]] = {}

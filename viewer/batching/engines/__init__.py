@@ -27,10 +27,7 @@ ENGINES = {
 
 
 class Job(Protocol):
-    """The job that is applied to each item: a callable that can be pickled.
-
-    It returns a result for any item, even for invalid input; see ``execution.attempt``.
-    """
+    """A picklable callable that returns a result for any item; see ``execution.attempt``."""
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
@@ -74,9 +71,6 @@ class Engine(Protocol):
 
 
 def load_engine(name: str) -> Engine:
-    """Return an engine.
-
-    ``name``: a key of ``ENGINES``.
-    """
+    """Return an engine by its key in ``ENGINES``."""
     engine: Engine = import_module(f"viewer.batching.engines.{name}")
     return engine

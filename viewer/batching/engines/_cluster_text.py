@@ -31,10 +31,7 @@ class ClusterName:
 
     @property
     def workers_per_job(self) -> int:
-        """Number of workers of each SLURM job, the option ``cpus``.
-
-        Raises ViewerError if it is not a positive integer.
-        """
+        """Number of workers of each SLURM job, the option ``cpus``: a positive integer."""
         count = self.options.get("cpus", "1")
         if not count.isdecimal() or int(count) < 1:
             raise ViewerError(
@@ -45,8 +42,6 @@ class ClusterName:
 
 def parse_cluster(text: str) -> ClusterName:
     """Parse the value of ``--cluster``.
-
-    Raises ``ViewerError`` if it is not a known kind, or an option has no name.
 
     >>> parse_cluster("slurm:partition=gpu,time=2:00:00").options
     {'partition': 'gpu', 'time': '2:00:00'}

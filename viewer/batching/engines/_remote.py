@@ -78,10 +78,7 @@ class NoFolder:
 
 
 def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVersion | NoFolder:
-    """Run items one after another in a thread of a worker.
-
-    ``call``: values of a ``Call``.
-    """
+    """Run items one after another in a thread of a worker; ``call`` is the values of a ``Call``."""
     from distributed import get_worker
 
     worker = get_worker()

@@ -32,13 +32,8 @@ _MOST_VAIN = 3  # consecutive jobs that end before their workers connect; then t
 def slurm_cluster(
     name: ClusterName, memory: int | None, settings: Mapping[str, Any]
 ) -> SLURMCluster:
-    """Return a cluster whose workers are SLURM jobs; none is submitted yet.
-
-    The options ``partition``, ``account``, ``time``, ``mem``, ``cpus`` (workers per job) and
-    ``interface`` describe a job; all others are passed to ``sbatch``.
-
-    Raises ``ViewerError`` if sbatch or dask-jobqueue is missing, or an option is invalid.
-    """
+    """Return a cluster whose workers are SLURM jobs; none is submitted yet."""
+    # The options that describe a job; all others are passed to sbatch.
     if shutil.which("sbatch") is None:
         raise ViewerError(
             "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "
@@ -102,12 +97,7 @@ def _exported(key: str, value: object) -> str:
 
 
 class SlurmJobs:
-    """The jobs of a batch; jobs that end are submitted again.
-
-    Jobs end at their time limit, are preempted, or fail with their node.
-
-    ``cluster``: from ``slurm_cluster``.
-    """
+    """The jobs of a batch. A job that ends, as at its time limit, is submitted again."""
 
     def __init__(self, cluster: Any, n_workers: int, note: Callable[[str], None]) -> None:
         self._cluster, self._n_workers, self._note = cluster, n_workers, note
@@ -118,10 +108,7 @@ class SlurmJobs:
         cluster.scale(n_workers)
 
     def check(self, workers: Iterable[str]) -> None:
-        """Replace jobs that have ended.
-
-        Raises ``ViewerError`` if sbatch refuses all jobs, or jobs end before their workers connect.
-        """
+        """Replace ended jobs; raise if all are refused, or end before their workers connect."""
         names = [*workers]
         jobs = dict(self._cluster.workers)
         self._drop_refused(jobs)
@@ -157,10 +144,7 @@ class SlurmJobs:
         self._cluster.sync(self._cluster.scale_down, [*refused])
 
     def _replace(self, ended: Mapping[str, str]) -> None:
-        """Submit new jobs in place of those that have ended.
-
-        ``ended``: job numbers by name.
-        """
+        """Submit new jobs in place of those that have ended, given as job numbers by name."""
         has_worked = not self._connected.isdisjoint(ended)
         self._n_vain = 0 if has_worked else self._n_vain + len(ended)
         numbers = listed(sorted(ended.values()), 5)
@@ -201,10 +185,7 @@ def _handlers_kept() -> Iterator[None]:
 
 
 class Job(SLURMJob):  # type: ignore[misc]  # the package has no types
-    """A job that runs workers.
-
-    ``refusal``: the reason why it was not submitted; empty if it was.
-    """
+    """A job that runs workers; ``refusal`` says why it was not submitted, empty if it was."""
 
     refusal = ""
 

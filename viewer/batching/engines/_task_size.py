@@ -15,11 +15,10 @@ LONGEST = 1.5 * _SECONDS
 
 
 class TaskSize:
-    """The number of items that a task has, from the times of the latest items.
+    """The number of items that a task has, from the times of the latest items."""
 
-    The first tasks have one item each, as do all tasks whose items take more than 0.25 s. The last
-    ones become shorter, so that all workers finish at about the same time.
-    """
+    # The first tasks have one item each, as do all tasks whose items take more than 0.25 s. The
+    # last ones become shorter, so that all workers finish at about the same time.
 
     def __init__(self) -> None:
         self._seconds: deque[float] = deque(maxlen=_RECENT)
@@ -35,10 +34,7 @@ class TaskSize:
         self._n_finished = 0
 
     def now(self, n_left: int, n_workers: int) -> int:
-        """Return the number of items for the next task, from 1 to 64.
-
-        ``n_left``: number of items that are not in a task yet; 0 if unknown.
-        """
+        """Return the size of the next task, 1 to 64; ``n_left`` is 0 if unknown."""
         # Not the mean, because a worker's first item also loads modules.
         each = median(self._seconds) if self._seconds else _SECONDS
         fitting = int(_SECONDS / max(each, _SECONDS / _MOST))

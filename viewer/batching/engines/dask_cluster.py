@@ -67,11 +67,7 @@ _CONFIG = {
 
 
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
-    """Run items on a cluster.
-
-    Raises ``ViewerError`` if Dask is missing, the cluster can't be reached or started, or a worker
-    lacks this version of the viewer.
-    """
+    """Run items on a cluster, whose workers must have this version of the viewer."""
     try:
         import distributed  # noqa: F401
     except ImportError:
@@ -97,28 +93,25 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item.
-
-    ``earlier``: number of workers that died while running it.
-    ``is_alone``: whether it is a task of its own, which shows whether it ends its worker.
-    ``since``: time of its first submission, in seconds since 1970.
-    """
+    """One run of an item."""
 
     item: Item
     earlier: int = 0
+    """Number of workers that died while running it."""
     is_alone: bool = False
+    """Whether it is a task of its own, which shows whether it ends its worker."""
     since: float = field(default_factory=time.time)
+    """Time of its first submission, in seconds since 1970."""
 
 
 _Task = tuple[_Attempt, ...]
 
 
 class _Flight:
-    """The tasks that have been submitted to a cluster; each runs one item, or several short ones.
+    """The submitted tasks of a cluster; each runs one item, or several short ones."""
 
-    If a worker dies, the items of the task that it was running are run again one by one, including
-    those that had finished, as their results are lost.
-    """
+    # If a worker dies, the items of the task that it was running are run again one by one,
+    # including those that had finished, as their results are lost.
 
     def __init__(
         self, client: Client, check: Check, items: Iterator[Item], job: Job, limits: Limits
@@ -143,10 +136,7 @@ class _Flight:
         self._is_stopping = False
 
     def count_workers(self) -> None:
-        """Update the number of workers, which changes while the batch runs.
-
-        Raises ViewerError if a scheduler has had no workers for a minute.
-        """
+        """Update the number of workers; raise if a scheduler has had none for a minute."""
         now = time.monotonic()
         if now < self._counted + _COUNT_EVERY:
             return
@@ -410,11 +400,7 @@ class WorkerChecks:
         self._found: set[tuple[str, str]] = set()
 
     def accepted(self, reply: Reply | OtherVersion | NoFolder) -> Reply:
-        """Return the reply of a suitable worker.
-
-        Raises ``ViewerError`` if the worker has another version, or cannot read the files of the
-        batch.
-        """
+        """Return the reply of a worker with this version that can read the files of the batch."""
         if isinstance(reply, OtherVersion):
             raise ViewerError(
                 f"--cluster: the worker {reply.worker} has viewer {printable(reply.version, 40)}, "

@@ -44,11 +44,7 @@ _RETRIED = ("crashed", "timeout", "memory")
 
 
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
-    """Run items in worker processes.
-
-    Raises ``ViewerError`` if pebble is missing, the job cannot be pickled, or the workers do not
-    start.
-    """
+    """Run items in worker processes, to which the job is pickled."""
     try:
         import pebble  # noqa: F401
     except ImportError:
@@ -84,15 +80,13 @@ def _check_pickles(job: Job) -> None:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """One run of an item.
-
-    ``earlier``: number of times that it has been started before.
-    ``since``: time of the first start, in seconds since 1970.
-    """
+    """One run of an item."""
 
     item: Item
     earlier: int = 0
+    """Number of times that it has been started before."""
     since: float = field(default_factory=time.time)
+    """Time of the first start, in seconds since 1970."""
 
     @property
     def arguments(self) -> tuple[Item, float | None]:
@@ -254,10 +248,8 @@ class _Workers:
         self._pool = self._new_pool()
 
     def _check_stall(self) -> None:
-        """Replace a pool in which no item runs.
-
-        If the system kills a worker that holds the lock of the queue, the lock is never released.
-        """
+        """Replace a pool in which no item runs."""
+        # If the system kills a worker that holds the lock of the queue, the lock is never released.
         now = time.monotonic()
         if any(future.running() for future in self.flying):
             self._moved = now
@@ -320,10 +312,7 @@ def _note_termination(number: int, frame: FrameType | None) -> None:
 
 
 def _work(item: Item, since: float | None) -> Result:
-    """Run an item.
-
-    ``since``: time of its first attempt, whose outputs are replaced; None if this is the first.
-    """
+    """Run an item; outputs written ``since`` its first attempt are replaced, None if this is it."""
     assert _job is not None and _stopping is not None  # set by _prepare
     if _is_terminated:
         os._exit(128 + signal.SIGTERM)

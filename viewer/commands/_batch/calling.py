@@ -211,11 +211,9 @@ def _check_options(parser: Parser, job: str, options: Sequence[str]) -> None:
 
 
 def identity_of(function: Callable[..., Any]) -> str:
-    """Return a string that is the same in all processes, and changes if the function does.
-
-    It covers code, defaults, bound arguments, variables of enclosing functions and the program's
-    version, but not the code of other functions that it calls.
-    """
+    """Return a string that is the same in all processes, and changes if the function does."""
+    # It covers code, defaults, bound arguments, variables of enclosing functions and the program's
+    # version, but not the code of other functions that it calls.
     total = blake2b(digest_size=8)
     for part in _parts(function, set()):
         total.update(part + b"\0")

@@ -20,13 +20,9 @@ _MOST = 20  # maximum number of failures listed
 
 
 class Display:
-    """Progress of a batch: a bar in a terminal, otherwise one line per minute.
+    """Progress of a batch: a bar in a terminal, otherwise one line per minute."""
 
-    ``title``: name of the work.
-    ``items``: the items of the batch.
-    ``prints``: whether the text of items is printed, in their order.
-    ``is_json``: whether that text is JSON, which is printed in one line per item.
-    """
+    # If ``prints``, the text of items is printed in their order; JSON in one line per item.
 
     def __init__(
         self, title: str, items: Sequence[Item], prints: bool, is_json: bool = False

@@ -25,24 +25,20 @@ from viewer.phrases import printable
 
 @dataclass(frozen=True)
 class JobKind:
-    """Properties of a command as a job.
-
-    ``title``: description.
-    ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
-    ``writes``: ``always``, ``maybe`` or ``never``.
-    ``prints``: whether its text is the result and is therefore printed.
-    ``few``: maximum number of items for which no worker process is started.
-    ``is_folder_input``: whether each folder is an input.
-    ``timeout``: default time limit in seconds; None if the time depends on the requested frames.
-    """
+    """Properties of a command as a job."""
 
     title: str
     suffix: str = ""
+    """Suffix of the outputs in a folder if ``--to`` is not given."""
     writes: str = "never"
     prints: bool = False
+    """Whether its text is the result and is therefore printed."""
     few: int = 16
+    """Maximum number of items for which no worker process is started."""
     is_folder_input: bool = False
+    """Whether each folder is an input."""
     timeout: float | None = TIMEOUT
+    """Default time limit in seconds; None if the time depends on the requested frames."""
 
 
 JOBS = {
@@ -63,10 +59,7 @@ JOBS = {
 
 
 def job_parser(job: str) -> Parser:
-    """Return the parser of a job: the options of its command, and those of the batch.
-
-    ``job``: a key of ``JOBS``.
-    """
+    """Return the parser of a key of ``JOBS``: the options of its command and those of the batch."""
     parser = Parser(prog=f"viewer batch {job}", description=JOBS[job].title)
     parser.add_argument("job", choices=[job], help=argparse.SUPPRESS)
     add_all_arguments(parser, job)
@@ -88,11 +81,7 @@ def add_all_arguments(parser: argparse.ArgumentParser, job: str) -> None:
 
 
 def add_job_arguments(parser: argparse.ArgumentParser, job: str) -> None:
-    """Add the arguments of a command; its files become the paths of the batch.
-
-    ``parser``: an empty parser, or one with the name of the job.
-    ``job``: a key of ``JOBS``.
-    """
+    """Add the arguments of a command; its files become the paths of the batch."""
     import_module(f"viewer.commands.{job}").add_arguments(parser)
     for action in parser._actions:  # argparse has no public name for this table
         if action.dest == "files":
@@ -111,18 +100,16 @@ def add_job_arguments(parser: argparse.ArgumentParser, job: str) -> None:
 
 @dataclass(frozen=True)
 class CommandJob:
-    """A command as a job.
-
-    ``command``: a key of ``JOBS``.
-    ``arguments``: its arguments, without files and output.
-    ``fixed``: files that are opened with every item.
-    ``shared``: files that all items read, including those named by options.
-    """
+    """A command as a job."""
 
     command: str
+    """A key of ``JOBS``."""
     arguments: argparse.Namespace
+    """Its arguments, without files and output."""
     fixed: tuple[str, ...] = ()
+    """Files that are opened with every item."""
     shared: tuple[str, ...] = ()
+    """Files that all items read, including those named by options."""
 
     @property
     def uses_gpu(self) -> bool:

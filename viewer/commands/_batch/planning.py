@@ -138,14 +138,7 @@ def add_batch_arguments(
     has_fixed: bool = False,
     timeout: float | None = TIMEOUT,
 ) -> None:
-    """Add the options that all jobs share.
-
-    ``parser``: parser of a job.
-    ``suffix``: default of ``--to``.
-    ``writes``: whether the job writes files: ``always``, ``maybe`` or ``never``.
-    ``has_fixed``: whether the job itself has an option for files shared by all items.
-    ``timeout``: default of ``--timeout``.
-    """
+    """Add the options that all jobs share; ``has_fixed``: the job has its own for common files."""
     group = parser.add_argument_group("batch")
     if writes != "never":
         add_settings(group, Request, "to", usual=f" (default: {suffix})" if suffix else "")
@@ -166,22 +159,16 @@ def add_batch_arguments(
 
 @dataclass(frozen=True)
 class Plan:
-    """The items of a batch, or of its shard, and how they are run.
-
-    ``notes``: messages about inputs and processes.
-    """
+    """The items of a batch, or of its shard, and how they are run."""
 
     items: Sequence[Item]
     settings: Settings
     notes: tuple[str, ...] = ()
+    """Messages about inputs and processes."""
 
 
 def plan_of(request: Request) -> Plan:
-    """Return a plan.
-
-    Raises ViewerError if an input is missing, options contradict each other, or a file would be
-    written twice or replaced.
-    """
+    """Return a plan; refuse missing inputs, and outputs that are written twice or replaced."""
     inputs = find_inputs(
         request.paths,
         request.lists,
@@ -263,10 +250,8 @@ def _check_free(items: Sequence[Item]) -> None:
 
 
 def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, list[str]]:
-    """Return the engine, its limits and a message.
-
-    Few small inputs are run in this process, because starting workers takes about a second.
-    """
+    """Return the engine, its limits and a message."""
+    # Few small inputs are run in this process, because starting workers takes about a second.
     limits = _limits(request, len(items))
     if request.cluster:
         return "dask_cluster", limits, _cluster_notes(request)

@@ -46,11 +46,7 @@ _NOT_RESULTS = ("files", "output", "force", "model_path", "json")
 
 
 def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
-    """Return the request and the job of a command line.
-
-    ``arguments``: from a parser of ``job_parser``.
-    Raises ViewerError if an option is missing or wrong.
-    """
+    """Return the request and the job of a command line, parsed by ``job_parser``."""
     name = arguments.job
     kind = JOBS[name]
     output = getattr(arguments, "output", None) or ""
@@ -146,13 +142,10 @@ def _files_in(command: argparse.Namespace) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _SubmissionJob:
-    """A job that opens submissions; files and recordings are passed on.
+    """A job that opens submissions; files and recordings are passed on."""
 
-    ``job``: compares the files.
-    ``expected``, ``alike``: patterns of the files; see ``choose``.
-    ``temporary``: folder for unpacked files, which is removed when the batch ends, even if a worker
-      was killed.
-    """
+    # The temporary folder, for unpacked files, is removed when the batch ends, even if a worker was
+    # killed.
 
     job: Job
     expected: tuple[str, ...]
@@ -197,12 +190,7 @@ class _SubmissionJob:
 
 
 def _submission_job(job: Job, reference: str, expected: list[str]) -> _SubmissionJob:
-    """Return the job of ``batch diff``.
-
-    ``job``: compares files with the reference.
-    ``reference``: the argument; without patterns, submissions need files of the same kinds.
-    ``expected``: patterns of the files in each submission.
-    """
+    """Return the job of ``batch diff``; without patterns, files are of the reference's kinds."""
     alike = patterns_of(input_files(reference))
     return _SubmissionJob(job, tuple(expected), tuple(alike), _temporary_folder())
 

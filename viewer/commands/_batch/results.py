@@ -17,11 +17,7 @@ _DRAWN = ("render", "diff")
 
 
 def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
-    """Add the options.
-
-    ``parser``: parser of a job.
-    ``job``: its name.
-    """
+    """Add the options of a job."""
     group = parser.add_argument_group("results")
     group.add_argument(
         "--table",
@@ -53,13 +49,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
 
 
 def check_results(job: str, table: str, overview: str, may_replace: bool, output: str = "") -> None:
-    """Check the file names before the batch starts.
-
-    ``table``, ``overview``: the files; empty for none.
-    ``may_replace``: whether they may exist.
-    ``output``: folder that the batch creates if it is missing.
-    Raises ViewerError if a suffix is wrong, a file exists, or its folder is missing.
-    """
+    """Check the file names, empty for none, before the batch starts and creates ``output``."""
     if table and Path(table).suffix.lower() != ".csv":
         raise UnsupportedFormatError(
             f'--table: {printable(table, 300)}: expected .csv, found "{Path(table).suffix}"'
@@ -91,8 +81,6 @@ def check_results(job: str, table: str, overview: str, may_replace: bool, output
 def name_in_shard(path: str, shard: str) -> str:
     """Return the name of one shard's file, so that shards do not replace each other's files.
 
-    ``shard``: ``I/N``; empty for the whole batch.
-
     >>> name_in_shard("a/grades.csv", "0/8"), name_in_shard("grades.csv", "")
     ('a/grades.0-of-8.csv', 'grades.csv')
     """
@@ -103,11 +91,7 @@ def name_in_shard(path: str, shard: str) -> str:
 
 
 def save_results(job: str, table: str, overview: str, results: Sequence[Result]) -> list[str]:
-    """Write the files; return a line about each.
-
-    ``table``, ``overview``: the files; empty for none.
-    Raises OutputError if one cannot be written.
-    """
+    """Write the files, empty for none; return a line about each."""
     lines = []
     for path in filter(None, (table, overview)):
         try:

@@ -41,10 +41,7 @@ class BackFaces:
         self._around: tuple[Mesh, Skin] | None = None
 
     def update(self, figure: Figure, pose: Pose | None, how: Skinning) -> None:
-        """Update to a pose.
-
-        ``pose``: DOFs in lengths and radians; None for the bind pose.
-        """
+        """Update to a pose; None for the bind pose."""
         shell = self._mesh.shell
         self._spheres = None
         if shell is None or not _is_together(shell, figure, how):
@@ -76,11 +73,7 @@ class BackFaces:
     def regions(
         self, model_view: Floats, projection: Floats, viewport: Region
     ) -> tuple[Region, ...] | None:
-        """Return the regions of the image with visible back faces; None for the whole image.
-
-        ``model_view``: (4, 4), figure to camera space. ``projection``: (4, 4), camera to clip
-        space.
-        """
+        """Return the regions of the image with visible back faces; None for the whole image."""
         spheres = self._spheres
         if spheres is None:
             return None

@@ -54,9 +54,8 @@ _TIP_WIDTH = 2.4  # width of the tip, in widths of the shaft
 class BoneBuffers:
     """A skeleton as octahedra, sticks or axes.
 
-    ``skeleton``: skeleton in its rest pose, which determines directions and sizes of ends without a
-    child. ``style``: ``"octahedra"``, ``"sticks"`` or ``"axes"``. ``size``: size of the figure if
-    all joints coincide, figure units.
+    The rest pose determines directions and sizes of ends without a child. ``size``: size of the
+    figure if all joints coincide, figure units.
     """
 
     def __init__(
@@ -206,14 +205,10 @@ class _BoneLinks:
 
 
 def _bone_links(skeleton: Skeleton, size: float) -> _BoneLinks:
-    """Return the links of a skeleton.
-
-    A joint with several children has a bone to each. A joint without children has a short end in
-    the direction of the previous bone if it can rotate, so that its rotation is visible. The bone
-    reaches its far end if the file states that. Bones between coincident joints have length 0.
-
-    ``size``: size of the figure if all joints coincide, figure units.
-    """
+    """Return the links of a skeleton; ``size`` is used if all joints coincide, figure units."""
+    # A joint with several children has a bone to each. A joint without children has a short end in
+    # the direction of the previous bone if it can rotate, so that its rotation is visible. The bone
+    # reaches its far end if the file states that. Bones between coincident joints have length 0.
     worlds = world_matrices(skeleton, rest_pose(skeleton))
     points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
     parents, drawn = shown_parents(skeleton), shown_joints(skeleton)
@@ -287,11 +282,9 @@ _Point: TypeAlias = tuple[float, float, float]
 
 
 def _octahedron() -> Floats:
-    """Return a flat octahedron from a joint to its child, with a ridge on its first side.
-
-    Returns (N, 7), corners of triangles: x and z in half-widths, y in lengths; normals, 0 for flat
-    triangles; tint, 1 for the ridge, which shows the roll.
-    """
+    """Return a flat octahedron from a joint to its child, with a ridge on one side: (N, 7)."""
+    # Corners of triangles: x and z in half-widths, y in lengths; normals, 0 for flat triangles;
+    # tint, 1 for the ridge, which shows the roll.
     ring = [(1.0, _WIDEST, 0.0), (0.0, _WIDEST, _FLATNESS)]
     ring += [(-1.0, _WIDEST, 0.0), (0.0, _WIDEST, -_FLATNESS)]
     head, tail = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -324,11 +317,9 @@ def _ball() -> Floats:
 
 
 def _ridge(foot: float, half: float, tip: float, end: float) -> Floats:
-    """Return a pyramid on the side of +x, up to a third of the length.
-
-    Parameters are in half-widths: position and thickness of its base, distance of its tip from the
-    axis, and distance of the surface where the ridge ends.
-    """
+    """Return a pyramid on the side of +x, up to a third of the length."""
+    # Parameters are in half-widths: position and thickness of its base, distance of its tip from
+    # the axis, and distance of the surface where the ridge ends.
     low, high = (foot, _WIDEST, half), (foot, _WIDEST, -half)
     top, last = (tip, 1.3 * _WIDEST, 0.0), (end, 0.35, 0.0)
     return _flat([(low, high, top), (low, top, last), (high, last, top)], 1.0)

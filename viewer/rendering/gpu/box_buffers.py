@@ -19,10 +19,7 @@ _MANY = 1000  # minimum number of boxes for which coincident boxes are searched
 
 
 def joint_colors(n_joints: int) -> Floats:
-    """Return a colour for each joint: hues spaced by the golden ratio, so that neighbours differ.
-
-    Returns (J, 3), linear.
-    """
+    """Return hues spaced by the golden ratio, so that neighbours differ: (J, 3), linear."""
     hues = 0.58 + _GOLDEN * np.arange(n_joints)
     return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.42, 0.72) for hue in hues])
 
@@ -30,9 +27,9 @@ def joint_colors(n_joints: int) -> Floats:
 class BoxBuffers:
     """Boxes on the GPU, each with its own matrix.
 
-    ``world``: the matrices, relative to ``center``. ``center``: (3,), figure space; it is part of
-    the model matrix. ``cube``: corners and normals of a cube from 0 to 1, shared by all boxes.
-    ``boxes``: (N, 2, 3), lower and upper corner of each box.
+    ``world``: the matrices, relative to ``center``: (3,), figure space; part of the model matrix.
+    ``cube``: corners and normals of a cube from 0 to 1, shared by all boxes. ``boxes``: (N, 2, 3),
+    lower and upper corner of each box.
     """
 
     def __init__(self, context: moderngl.Context, cube: moderngl.Buffer, boxes: Floats) -> None:
@@ -49,10 +46,8 @@ class BoxBuffers:
         self._arrays = self._owner.keep(VertexArrays(context))
 
     def move(self, matrices: Floats, hides: bool = True) -> None:
-        """Upload the boxes' matrices, (N, 4, 4) box to figure space; modified in place.
-
-        If ``hides`` is true, only one of many coincident boxes is drawn.
-        """
+        """Upload the matrices from box to figure space, (N, 4, 4), which are modified in place."""
+        # If ``hides`` is true, only one of many coincident boxes is drawn.
         self.center = bounding_box(matrices[:, :3, 3]).mean(axis=0)
         matrices[:, :3, 3] -= self.center
         if hides and self.count > _MANY:
@@ -60,10 +55,8 @@ class BoxBuffers:
         write_matrices(self.world, matrices)
 
     def _hidden(self, matrices: Floats) -> Bools:
-        """Return a mask of boxes that coincide with an earlier one; they are collapsed to a point.
-
-        Software drivers take minutes to draw a hundred thousand overlapping boxes.
-        """
+        """Return a mask of boxes that coincide with an earlier one, to collapse them to a point."""
+        # Software drivers take minutes to draw a hundred thousand overlapping boxes.
         rows = np.concatenate([matrices[:, :3].reshape(-1, 12), self._boxes.reshape(-1, 6)], axis=1)
         _, first = np.unique(rows.astype(np.float32), axis=0, return_index=True)
         hidden = np.ones(len(rows), dtype=bool)

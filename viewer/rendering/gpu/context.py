@@ -39,13 +39,9 @@ _thread = threading.local()
 
 
 class Graphics:
-    """A headless context and its programs, which outlive the renderers that use them.
+    """A headless context and its programs, which outlive the renderers that use them."""
 
-    In software, a context and its first image take ten times as long as the next image.
-
-    ``device``: index of the EGL device; if omitted, each one is tried in turn. Raises
-    ``RenderError`` if there is no usable OpenGL, with the cause and a remedy.
-    """
+    # In software, a context and its first image take ten times as long as the next image.
 
     def __init__(self, device: int | None = None) -> None:
         self.context = headless_context(device)
@@ -79,10 +75,7 @@ class _OfThread:
 
 
 def thread_graphics(device: int | None = None) -> Graphics:
-    """Return the graphics of this thread on a device, created on first use and never released.
-
-    Raises ``RenderError`` if there is no usable OpenGL, with the cause and a remedy.
-    """
+    """Return the graphics of this thread on a device, created on first use and never released."""
     if not hasattr(_thread, "graphics"):
         _thread.graphics = _OfThread()
     kept: dict[int | None, Graphics] = _thread.graphics.kept
@@ -92,13 +85,9 @@ def thread_graphics(device: int | None = None) -> Graphics:
 
 
 def headless_context(device: int | None = None) -> moderngl.Context:
-    """Return a context that needs neither display nor window.
-
-    ``device``: index of the EGL device; if omitted, each one is tried in turn. Returns OpenGL 3.3
-    core or newer, current in this thread; the caller must release it. Raises ``RenderError`` if
-    there is no usable OpenGL; the message gives the cause and a remedy. Raises ``ViewerError`` if
-    there are devices, but none with this index.
-    """
+    """Return a current context, OpenGL 3.3 core or newer, that needs neither display nor window."""
+    # Without an index of an EGL device, each one is tried in turn. The caller must release the
+    # context.
     if not sys.platform.startswith("linux"):
         return _create({})
     if device is not None:
@@ -132,10 +121,7 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
 
 
 def check_device(device: int) -> None:
-    """Raise for an index without a device; any index is accepted if devices cannot be listed.
-
-    Raises ``ViewerError`` if the index is invalid; the message gives the valid numbers.
-    """
+    """Raise for an index without a device; any index is accepted if devices cannot be listed."""
     count = device_count() if sys.platform.startswith("linux") else 0
     if device < 0 or (count and device >= count):
         known = {0: "0 or more", 1: "0, the only one"}.get(count, f"0 to {count - 1}")
@@ -168,13 +154,7 @@ def is_software(context: moderngl.Context) -> bool:
 
 
 def explain_failure(text: str) -> str:
-    """Return an explanation of a message from glcontext or GLFW, with a remedy.
-
-    Returns one line: cause and remedy, and the library's message in brackets.
-
-    >>> explain_failure("libEGL.so.1 not loaded").startswith("libEGL was not found")
-    True
-    """
+    """Return the cause of a message from glcontext or GLFW, a remedy, and the message."""
     devices = re.search(r"requested device index (\d+), but found (\d+)", text)
     code = re.search(r"0x30[0-9a-fA-F]{2}", text)
     if "not loaded" in text or "cannot open shared object" in text:
@@ -205,10 +185,7 @@ def explain_failure(text: str) -> str:
 
 
 def check_errors(context: moderngl.Context, doing: str) -> None:
-    """Raise if OpenGL has recorded an error, since an oversized buffer or texture does not raise.
-
-    Raises ``RenderError`` if there is an error; the message gives the renderer's name.
-    """
+    """Raise if OpenGL recorded an error, since an oversized buffer or texture does not raise."""
     error = context.error
     if error == "GL_NO_ERROR":
         return
@@ -228,10 +205,7 @@ class OpenGLOffer:
 
 
 def _headless_offer(options: Mapping[str, Any]) -> OpenGLOffer | None:
-    """Return the OpenGL version that the machine offers without a window; None if it offers none.
-
-    ``options``: moderngl's settings ``backend``, ``device_index``, ``libegl`` and ``libgl``.
-    """
+    """Return the OpenGL version that moderngl's settings give without a window; None if none."""
     chosen = options.get("backend")
     create = glcontext.get_backend_by_name(chosen) if chosen else glcontext.default_backend()
     names = {key: options[key] for key in ("device_index", "libegl", "libgl") if key in options}
@@ -248,10 +222,7 @@ def _headless_offer(options: Mapping[str, Any]) -> OpenGLOffer | None:
 
 
 def offer_of(address: int) -> OpenGLOffer:
-    """Return the version strings of the current context's driver.
-
-    ``address``: address of the function ``glGetString``.
-    """
+    """Return the version strings of the driver, by the address of its ``glGetString``."""
     get_string = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_uint)(address)
     strings = [
         (get_string(name) or b"").decode("utf-8", "replace")

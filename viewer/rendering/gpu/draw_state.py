@@ -90,11 +90,8 @@ def sides(
 
 
 def opacities(context: moderngl.Context, hidden: float | None) -> Iterator[float]:
-    """Yield the opacity of each draw call, first for hidden parts, then for visible ones.
-
-    ``hidden`` is the opacity of hidden parts; if it is None, there is one draw call, over
-    everything.
-    """
+    """Yield the opacity of each draw call, first for hidden parts, then for visible ones."""
+    # Without an opacity of hidden parts there is one draw call, over everything.
     for order, opacity in (("1", 1.0),) if hidden is None else ((">", hidden), ("<=", 1.0)):
         context.depth_func = order
         yield opacity

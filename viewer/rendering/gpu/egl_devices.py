@@ -68,15 +68,9 @@ def _function(egl: ctypes.CDLL, name: str, result: Any) -> Any:
 def device_of_worker(
     rank: int, devices: Sequence[EglDevice] | None = None, visible: str | None = None
 ) -> int | None:
-    """Return the EGL device on which a worker process draws.
-
-    The first device of ``CUDA_VISIBLE_DEVICES`` is used, which schedulers set for each job, but EGL
-    ignores. If the variable is not set, graphics cards are assigned to workers in turn.
-
-    ``devices``: devices; this machine's devices if omitted. ``visible``: value of
-    ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted. Returns the index of an EGL
-    device; None if there is no graphics card.
-    """
+    """Return the EGL device on which a worker process draws; None without a graphics card."""
+    # The first device of CUDA_VISIBLE_DEVICES is used, which schedulers set for each job, but EGL
+    # ignores. If the variable is not set, graphics cards are assigned to workers in turn.
     cards = [one for one in (devices or egl_devices()) if not one.is_software]
     if visible is None:
         visible = os.environ.get("CUDA_VISIBLE_DEVICES", "")

@@ -31,10 +31,9 @@ _orders: Memo[Figure, Ints] = Memo()
 
 @dataclass(frozen=True, slots=True)
 class MeshRun:
-    """Consecutive triangles of one material, and of one part until runs are merged.
+    """Consecutive triangles of one material, and of one part until runs are merged."""
 
-    First index, number of indices, surface, and part; -1 for several or none.
-    """
+    # First index, number of indices, surface, and part; -1 for several or none.
 
     first: int
     count: int
@@ -95,13 +94,9 @@ def index_set(
     order: Ints | None = None,
     parts: Ints | None = None,
 ) -> IndexSet:
-    """Upload triangles.
-
-    ``triangles``: (T, 3), indices of split vertices. ``materials``: (T,), index into ``surfaces``
-    of each triangle, -1 for none. ``order``: (T,) int32, order of the triangles, see
-    ``curve_order``; that of the file if omitted. ``parts``: (T,), part of each triangle, -1 for
-    none. The result contains a run for each material of each part, in the order of the file.
-    """
+    """Upload triangles, (T, 3) split vertices, with a run for each material of each part."""
+    # Materials, (T,), are indices into the surfaces and parts, (T,), numbers, -1 for none. The
+    # order, (T,), is that of ``curve_order``; by default that of the file, as is that of the runs.
     parts = np.full(len(triangles), -1, dtype=np.int32) if parts is None else parts
     edges = _edges(materials, parts)
     runs = []
@@ -122,12 +117,9 @@ def _edges(materials: Ints, parts: Ints) -> Ints:
 
 
 def curve_order(triangles: Ints, materials: Ints, parts: Ints, positions: Floats) -> Ints:
-    """Return the order of triangles along a space-filling curve within each run.
-
-    ``triangles``: (T, 3), indices of vertices. ``materials``, ``parts``: (T,), material and part of
-    each triangle, -1 for none. ``positions``: (R, 3), rest positions of the vertices. Returns (T,)
-    int32, index of the triangle at each position.
-    """
+    """Return the order, (T,) int32, of triangles along a space-filling curve within each run."""
+    # Materials and parts, (T,), are -1 for none; the rest positions, (R, 3), are of the vertices
+    # that the triangles, (T, 3), refer to.
     if not len(triangles):
         return np.zeros(0, dtype=np.int32)
     run = np.zeros(len(triangles), dtype=np.int64)
@@ -141,10 +133,10 @@ def curve_order(triangles: Ints, materials: Ints, parts: Ints, positions: Floats
 
 
 def curve_places(points: Floats) -> NDArray[np.int64]:
-    """Return the positions of points on a Z-order curve through their box (Morton 1966).
+    """Return the positions of points, (N, 3), on a Z-order curve through their box (Morton 1966).
 
-    ``points``: (N, 3), at least one. Returns (N,), morton codes: interleaved bits of x, y and z,
-    with 1024 cells along the longest side.
+    These are Morton codes, (N,): interleaved bits of x, y and z, with 1024 cells along the longest
+    side.
 
     >>> curve_places(np.array([[0.0, 0, 0], [1023, 0, 0], [0, 1, 0], [1, 1, 1]])).tolist()
     [0, 153391689, 2, 7]
@@ -159,11 +151,7 @@ def curve_places(points: Floats) -> NDArray[np.int64]:
 
 
 def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> Bools:
-    """Return a mask of triangles with a corner outside the hidden body parts: (T,) bool.
-
-    ``figure``: the figure, with or without body parts. ``triangles``: (T, 3), indices of the
-    figure's vertices.
-    """
+    """Return a mask, (T,), of triangles with a corner outside the hidden body parts."""
     if figure.body_parts is None or not hidden:
         return np.ones(len(triangles), dtype=bool)
     is_shown: Bools = ~np.isin(figure.body_parts.of_vertex, hidden)
@@ -171,10 +159,8 @@ def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> 
 
 
 def prepare_scene(scene: Scene) -> None:
-    """Compute the order of triangles in advance, in the thread that reads files.
-
-    For millions of triangles, this takes longer than the upload and would block the window.
-    """
+    """Compute the order of triangles in advance, in the thread that reads files."""
+    # For millions of triangles, this takes longer than the upload and would block the window.
     for figure in dict.fromkeys(actor.figure for actor in scene.actors):
         if figure.mesh is not None:
             report(0, 0, "")

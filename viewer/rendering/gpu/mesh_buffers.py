@@ -39,12 +39,9 @@ class MeshBuffers:
     """Rest vertices, triangle indices, influences and textures of one figure.
 
     Along texture seams, a vertex is uploaded once per texture coordinate, as several split
-    vertices. Positions are stored relative to the centre of the mesh, so that float32 keeps its
-    precision even if the mesh is far from the origin.
-
-    ``center``: (3,), the offset that was subtracted, figure space. ``sources``: (R,) int32, vertex
-    of the figure for each split vertex. ``copies``: (V,) int32, one split vertex for each vertex of
-    the figure. ``context``: the context in use; ``release`` frees all buffers.
+    vertices. Positions are stored relative to ``center``, (3,) in figure space, so that float32
+    keeps its precision even if the mesh is far from the origin. ``sources``: (R,) int32, vertex of
+    the figure for each split vertex. ``copies``: (V,) int32, one split vertex for each vertex.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
@@ -101,11 +98,9 @@ class MeshBuffers:
         as_listed: bool = False,
         hidden_parts: frozenset[int] = frozenset(),
     ) -> IndexSet:
-        """Return the triangles of the full or the reduced mesh, without hidden body parts.
-
-        ``as_listed`` keeps the file's order, which affects how translucent edges blend.
-        ``hidden_parts`` are parts of the mesh, which are omitted by drawing only the other runs.
-        """
+        """Return the triangles of the full or the reduced mesh, without hidden body parts."""
+        # The file's order is kept on request, as it affects how translucent edges blend. Hidden
+        # parts of the mesh are omitted by drawing only the other runs.
         reduced = reduced and self.figure.reduced is not None
         key = (reduced, hidden, as_listed)
         if key not in self._index_sets:
@@ -252,8 +247,6 @@ class SkinBuffers:
 
     ``bindings``: one row per split vertex, see ``include/skinning.glsl``. ``joint_fractions``:
     (J,), each joint's fraction of the sum of all weights, for the mean motion of the figure.
-    ``context``: the context in use; ``release`` frees all buffers. ``skin``: none for vertices
-    without influences. ``sources``: (R,), vertex of the skin for each split vertex.
     """
 
     def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:

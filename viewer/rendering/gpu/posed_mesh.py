@@ -43,10 +43,8 @@ _BYTES_PER_VERTEX = 24  # a position and a normal, of three float32 each
 class PosedMesh:
     """One actor's posed vertices.
 
-    ``posed``: a row for every split vertex: position (relative to ``center``) and unit normal.
-    ``center``: (3,), origin of the positions in figure space; part of the model matrix.
-    ``context``: the context in use; some framebuffer must be bound when ``update`` runs. ``way``:
-    method of summing pose correctives, see ``rest_buffers``.
+    ``posed``: a row for every split vertex: position relative to ``center``, (3,) in figure space,
+    and unit normal. Some framebuffer must be bound when ``update`` runs.
     """
 
     def __init__(
@@ -82,11 +80,7 @@ class PosedMesh:
         return self._looks.of(found)
 
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
-        """Skin the mesh if pose or method changed since the last call.
-
-        ``pose``: pose; None leaves the mesh in its bind pose. ``skinning``: skinning settings, or a
-        key of ``viewer.rig.skinning.METHODS``.
-        """
+        """Skin the mesh if pose (None: the bind pose) or method changed since the last call."""
         self._looks.update(pose)
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
@@ -155,10 +149,8 @@ class PosedMesh:
             write_rigid(self._rigid, *split_palette(palette, centers))
 
     def is_mirrored_by(self, placement: Floats) -> bool:
-        """Return whether a placement, (4, 4), or most of the skinning reflects the mesh.
-
-        Its triangles are then clockwise seen from their front.
-        """
+        """Return whether a placement, (4, 4), or most of the skinning reflects the mesh."""
+        # Its triangles are then clockwise seen from their front.
         return self._is_mirrored != bool(np.linalg.det(placement[:3, :3]) < 0.0)
 
     def posed_positions(self) -> NDArray[np.float32]:
@@ -166,10 +158,7 @@ class PosedMesh:
         return np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6)[:, :3]
 
     def read(self) -> tuple[Floats, Floats]:
-        """Return the current posed positions in figure space and normals, (V, 3) each.
-
-        One row per vertex of the figure; the placement of the pose is not applied.
-        """
+        """Return the posed positions in figure space and normals of the vertices, (V, 3) each."""
         rows = np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6).astype(np.float64)
         rows = rows[self.mesh.copies]
         return rows[:, :3] + self.center, rows[:, 3:]

@@ -34,10 +34,7 @@ _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
 def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
-    """Set uniforms by name; uniforms that the compiler removed as unused are skipped.
-
-    ``values``: numbers, tuples of numbers, or ``bytes`` laid out as GLSL stores them.
-    """
+    """Set uniforms by name; uniforms that the compiler removed as unused are skipped."""
     for name, value in values.items():
         # Not ``name in program``, which compares the names of all members one by one.
         uniform = program.get(name, None)
@@ -50,10 +47,7 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
 
 
 class Programs:
-    """Cache of compiled programs; one per context.
-
-    ``context``: owns the programs; ``release`` frees them.
-    """
+    """Cache of compiled programs; one per context."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
@@ -73,13 +67,11 @@ class Programs:
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
-        ``name``: name of the vertex shader, without suffix. ``chunk``: a key of ``SHADING``, for
-        fragment shaders with a chunk. ``fragment``: name of the fragment shader; the same name if
-        omitted. ``skin``: a key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
-        ``geometry``: name of the geometry shader between the two, if any. ``materials``: whether
-        surfaces have more than a base colour texture, see ``include/surface.glsl``. ``effects``:
-        macros of the fragment shader, see ``viewer.rendering.view.Effects``. Raises ``RenderError``
-        if the driver rejects a shader; the message gives the file and line.
+        ``chunk``: a key of ``SHADING``, for fragment shaders with a chunk. ``fragment``: name of
+        the fragment shader; the same name if omitted. ``skin``: a key of ``METHODS``, for vertex
+        shaders that skin. ``geometry``: name of the geometry shader between the two, if any.
+        ``materials``: whether surfaces have more than a base colour texture, see
+        ``include/surface.glsl``. ``effects``: macros of the fragment shader, see ``Effects``.
         """
         files = name, skin, fragment or name, chunk, geometry
         return self._get((*files, affine, summed, materials, *effects), ())
@@ -92,10 +84,7 @@ class Programs:
         affine: bool = False,
         summed: bool = False,
     ) -> moderngl.Program:
-        """Return a program without a fragment shader, whose interleaved outputs are captured.
-
-        The chunk is a skinning method; see ``drawing`` for ``affine`` and ``summed``.
-        """
+        """Return a skinning program without a fragment shader, whose outputs are captured."""
         return self._get((name, chunk, "", "", "", affine, summed, False), outputs)
 
     def _get(self, key: tuple[str | bool, ...], outputs: tuple[str, ...]) -> moderngl.Program:
@@ -155,11 +144,9 @@ class Programs:
 
 
 def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] = ()) -> str:
-    """Return a shader's text with its chunk and includes, with line numbers of the original files.
-
-    Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
-    Mesa discards the source number after parsing.
-    """
+    """Return a shader's text with its chunk and includes, with the line numbers of the files."""
+    # Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
+    # Mesa discards the source number after parsing.
     base = len(files) * _LINES_PER_FILE
     files.append(name)
     parts = []

@@ -45,13 +45,10 @@ _MOST_TEXELS = 24 << 20
 
 
 class RestBuffers:
-    """Positions and normals of one actor, the input of the skinning shader.
+    """Positions and normals of one actor, the input of the skinning shader."""
 
-    They are the figure's, or a copy with shape and correctives applied.
-
-    ``mesh``: mesh that is used unchanged while shape and correctives are 0. ``way``: one of
-    ``WAYS``; chosen by the driver if empty.
-    """
+    # They are the figure's, from a mesh that is used unchanged while shape and correctives are 0,
+    # or a copy with shape and correctives applied.
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
         self.context, self.mesh = context, mesh
@@ -63,10 +60,7 @@ class RestBuffers:
         self._key: tuple[bytes, bytes] = b"", b""
 
     def update(self, figure: Figure, pose: Pose, how: Skinning) -> None:
-        """Update to a shape and pose.
-
-        ``pose``: DOFs in lengths and radians.
-        """
+        """Update to a shape and pose."""
         weights = self._weights(figure, pose) if how.correctives else np.zeros(0)
         active = weights.any()
         self.n_offsets = 0
@@ -107,10 +101,7 @@ class RestBuffers:
     def attributes(
         self, program: moderngl.Program, skin: SkinBuffers, attached: bool = True
     ) -> list[tuple[moderngl.Buffer, str, str]]:
-        """Return the vertex attributes of ``include/skinning.glsl``, for a vertex array.
-
-        ``program``: attributes that it does not use are omitted.
-        """
+        """Return the attributes of ``include/skinning.glsl`` that a program uses."""
         rest = self if attached else self.mesh
         found = [
             (rest.positions, "3f4", "in_position"),
@@ -134,14 +125,10 @@ class RestBuffers:
 
 
 class SummedOffsets:
-    """Offsets that ``include/skinning.glsl`` adds to the vertices of each instance.
+    """Offsets that ``include/skinning.glsl`` adds to the vertices of each instance."""
 
-    If the shader sums the offsets, a list contains the weights of all instances. If the CPU sums
-    them, one matrix product computes a row of offsets for every instance.
-
-    ``n_listed``: length of each instance's list; 0 if there are no correctives. ``way``: one of
-    ``WAYS``.
-    """
+    # If the shader sums the offsets, a list contains the weights of all instances, ``n_listed`` of
+    # each. If the CPU sums them, one matrix product computes a row of offsets for every instance.
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str) -> None:
         self.context, self.mesh, self.way = context, mesh, way
@@ -152,11 +139,7 @@ class SummedOffsets:
         self._summed: moderngl.Texture | None = None
 
     def update(self, weights: Floats | None, rows: NDArray[np.intp], count: int) -> None:
-        """Update to new poses.
-
-        ``weights``: (C, P) or None, weights of the correctives, for changed instances; None for no
-        correctives. ``rows``: (C,), indices of these instances.
-        """
+        """Update changed instances, ``rows`` (C,), to the correctives' weights, (C, P), if any."""
         self.n_listed, self.has_sums = 0, False
         if weights is None:
             self._weights = np.zeros((0, 0), "f4")

@@ -87,11 +87,7 @@ def needs_materials(mesh: Mesh) -> bool:
 
 
 def drawn_sets(mesh: Mesh, notes: list[str]) -> tuple[int, ...]:
-    """Return the sets of texture coordinates that are drawn, the first set first.
-
-    ``mesh``: sets that no texture uses are omitted. ``notes``: receives a message if textures use
-    more sets than can be drawn.
-    """
+    """Return the sets of texture coordinates that textures use and that can be drawn, in order."""
     used = {
         texture.uv_set
         for material in mesh.materials
@@ -114,10 +110,7 @@ def upload_surfaces(
     notes: list[str],
     owner: Owner,
 ) -> list[Surface]:
-    """Upload the textures of materials.
-
-    ``sets``: sets of texture coordinates that are drawn; textures of other sets are omitted.
-    """
+    """Upload the textures of materials whose sets of texture coordinates are drawn."""
     made: dict[tuple[object, ...], moderngl.Texture] = {}
     units = dict(zip(TEXTURES, SAMPLERS.values(), strict=True))
     surfaces = []

@@ -22,11 +22,9 @@ _OPAQUE = 0xFF000000  # smallest value of an opaque pixel as a little-endian num
 
 
 class Target:
-    """Framebuffers of an image that is being drawn.
+    """Framebuffers of an image that is being drawn, which is ``texture`` after ``resolve``."""
 
-    ``texture``: the image after ``resolve``. ``size``: width and height in pixels. ``samples``:
-    requested samples per pixel, rounded down to a power of two and limited by the driver.
-    """
+    # Samples per pixel are rounded down to a power of two and limited by the driver.
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
         check_size(context, size)
@@ -86,18 +84,13 @@ class Target:
         return self.texture
 
     def read(self) -> Bytes:
-        """Return the resolved image: (H, W, 4) uint8, first row at the top.
-
-        Alpha is straight, not premultiplied, as in image files.
-        """
+        """Return the resolved image: (H, W, 4) uint8 with straight alpha, first row at the top."""
         return straight(picture_rows(self._resolved.read(components=4), self.size))
 
     def read_into(self, buffer: moderngl.Buffer) -> None:
-        """Queue a copy of the resolved image to a buffer, without waiting for it.
-
-        ``buffer``: 4 bytes per pixel, last row first; ``picture_rows`` converts its contents to an
-        image. Reading it waits for the copy.
-        """
+        """Queue a copy of the resolved image to a buffer, without waiting for it."""
+        # The buffer has 4 bytes per pixel, last row first; ``picture_rows`` converts it to an
+        # image. Reading it waits for the copy.
         self._resolved.read_into(buffer, components=4)
 
     def release(self) -> None:
@@ -107,12 +100,9 @@ class Target:
 
 
 class Accumulation:
-    """Sum of several passes of one image, in floating point, and their average.
+    """Sum of ``count`` passes of one image, in floating point, and their average."""
 
-    Colours are premultiplied by alpha, so averaging pixels averages their coverage.
-
-    ``count``: images added since the last ``clear``. ``size``: width and height in pixels.
-    """
+    # Colours are premultiplied by alpha, so averaging pixels averages their coverage.
 
     def __init__(self, context: moderngl.Context, programs: Programs, size: tuple[int, int]):
         self.context, self.size, self.count = context, size, 0
@@ -158,10 +148,7 @@ class Accumulation:
 
 
 def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:
-    """Raise for an image size that the driver cannot draw; ``what`` begins the message.
-
-    Raises ``ViewerError`` if the size is not supported; the message gives the limit.
-    """
+    """Raise for an image size that the driver cannot draw; ``what`` begins the message."""
     limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
     if not all(1 <= side <= limit for side in size):
         raise ViewerError(
@@ -172,10 +159,8 @@ def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "im
 def target_bytes(size: tuple[int, int], samples: int) -> int:
     """Return the memory in bytes that OpenGL needs to draw an image.
 
-    Colour and depth of every sample, 4 bytes each, plus the resolved image; without
-    multisampling, the image and its depth.
-
-    ``size``: width and height in pixels. ``samples``: samples per pixel; 0 without multisampling.
+    Colour and depth of every sample, 4 bytes each, plus the resolved image; without multisampling,
+    the image and its depth.
 
     >>> target_bytes((100, 10), 4), target_bytes((100, 10), 0)
     (36000, 8000)

@@ -61,20 +61,15 @@ def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
 
 
 def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
-    """Upload (J, 4, 4) matrices, the only per-frame upload of a posed figure.
-
-    Their affine rows take three texels each, padded to whole rows of the texture.
-    """
+    """Upload (J, 4, 4) matrices, the only per-frame upload of a posed figure."""
+    # Their affine rows take three texels each, padded to whole rows of the texture.
     rows = np.zeros((_height(len(matrices), _MATRICES_PER_ROW) * _MATRICES_PER_ROW, 3, 4), "f4")
     rows[: len(matrices)] = matrices[:, :3, :]
     texture.write(rows.tobytes())
 
 
 def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
-    """Upload consecutive texels into the first rows of a texture, padding the last row.
-
-    ``rows``: (N, ...), consecutive texels; they replace the previous contents.
-    """
+    """Replace the first rows of a texture by consecutive texels, (N, ...), padding the last row."""
     wide = texture.width * texture.components
     flat = rows.reshape(-1)
     height = -(-flat.size // wide)
@@ -131,11 +126,8 @@ def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
 def picture_texture(
     context: moderngl.Context, pixels: Bytes, notes: list[str], is_linear: bool = False
 ) -> moderngl.Texture:
-    """Return a mip-mapped texture, clamped at its edges, v = 0 at the image's last row.
-
-    Pixels are sRGB unless ``is_linear``. An image that exceeds the driver's limit is reduced by an
-    integer factor, with a message in ``notes``.
-    """
+    """Return a mip-mapped sRGB or linear texture, clamped at its edges, v = 0 at the last row."""
+    # An image that exceeds the driver's limit is reduced by an integer factor, with a message.
     limit = context.info["GL_MAX_TEXTURE_SIZE"]
     factor = -(-max(pixels.shape[:2]) // limit)
     if factor > 1:

@@ -25,11 +25,9 @@ class VertexArrays:
         indices: moderngl.Buffer | None = None,
         key: tuple[object, ...] = (),
     ) -> moderngl.VertexArray:
-        """Return the array for a program.
-
-        ``program``: program cached by ``Programs``, so its id is unique. ``content``: returns
-        buffers, layouts and attribute names; called only to create the array.
-        """
+        """Return the array for a program."""
+        # Programs are cached by ``Programs``, so their ids are unique. The content, buffers with
+        # layouts and attribute names, is only asked for to create the array.
         key = (id(program), *key)
         if key not in self._arrays:
             self._arrays[key] = self._context.vertex_array(
@@ -62,10 +60,7 @@ class InstanceRows:
         self._count = 0
 
     def write(self, rows: Floats) -> None:
-        """Upload rows, (N, number of values in the layout).
-
-        Raises ``RenderError`` if there is not enough graphics memory.
-        """
+        """Upload rows, (N, number of values in the layout)."""
         self._count = len(rows)
         if not self._count:
             return

@@ -83,21 +83,14 @@ def mark_annotation(marks: Marks) -> Annotation:
 
 
 def letters_for(size: tuple[int, int]) -> int:
-    """Return the height of text in an image, pixels.
-
-    ``size``: width and height of the image, pixels.
-    """
+    """Return the height of text in an image, pixels."""
     return round(_LETTERS * picture_scale(size))
 
 
 def place_labels(
     labels: Sequence[Labels], view: View, size: tuple[int, int], lettering: Lettering
 ) -> PlacedLabels:
-    """Place labels next to their points: low ranks first, then nearer points.
-
-    ``labels``: the labels; they are placed without overlap. ``size``: width and height of the
-    image, pixels.
-    """
+    """Place labels next to their points without overlap: low ranks first, then nearer points."""
     texts = [text for one in labels for text in one.texts]
     points = np.concatenate([np.zeros((0, 3)), *(one.points for one in labels)])
     colors = np.concatenate([np.zeros((0, 3)), *(one.colors for one in labels)])
@@ -150,11 +143,7 @@ class PlacedLabels:
 
 
 def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Segments:
-    """Return the leader lines of labels that are not next to their points.
-
-    ``placed``: placed labels from ``place_labels``. ``size``: width and height of the image,
-    pixels.
-    """
+    """Return the leader lines of placed labels that are not next to their points."""
     led, scale = placed.has_line, picture_scale(size)
     points, to = placed.points[led], placed.ends[led]
     pixels = project(view, size, points).pixels

@@ -45,10 +45,7 @@ def joint_annotation(
     size: tuple[int, int],
     selected: tuple[int, int],
 ) -> Annotation | None:
-    """Return the marks at the joints of all actors; None if there are no joints.
-
-    ``size``: width and height of the image, pixels.
-    """
+    """Return the marks at the joints of all actors; None if there are no joints."""
     marks, scale = joint_marks_of(actors), picture_scale(size)
     parts: list[Segments] = []
     for one in marks:  # the topmost last
@@ -129,11 +126,9 @@ def joint_dots(marks: JointMarks, selected: int, scale: float) -> list[Segments]
 
 
 def axis_segments(marks: JointMarks, scale: float) -> Segments:
-    """Return the x, y and z axis of each joint: red, green, blue.
-
-    Their length is a fraction of the distance to the nearest parent or child, so that the axes of
-    finger joints do not overlap.
-    """
+    """Return the x, y and z axis of each joint: red, green, blue."""
+    # Their length is a fraction of the distance to the nearest parent or child, so that the axes of
+    # finger joints do not overlap.
     shown = shown_joints(marks.skeleton)
     points, count = marks.points[shown], len(shown)
     lengths = _axis_lengths(marks)[shown]
@@ -196,11 +191,7 @@ def joint_at(
     pixel: tuple[float, float],
     with_bones: bool,
 ) -> tuple[int, int, Floats] | None:
-    """Return the joint whose dot or bone is at a pixel.
-
-    ``size``: width and height of the image, pixels. Returns (actor, joint, point) or None, indices,
-    and the position (3,) in scene space.
-    """
+    """Return the actor and joint whose dot or bone is at a pixel, and its point (3,)."""
     best: tuple[float, float, int, int, Floats] | None = None
     scale = picture_scale(size)
     for one in marks:

@@ -77,11 +77,9 @@ def lay_out(
 
     A label is placed right or left of its point, diagonally, above or below, whichever position has
     the most room; otherwise at a distance, with a leader line. It is never closer to another point
-    than to its own; distances are accurate to a quarter of a pixel.
-
-    ``anchors``: (N, 2), the points, pixels from the image's left and upper edge. ``order``: (N,),
-    indices of the labels in the order of placement. ``sizes``: (N, 2), width and height of the
-    labels, pixels, 1 or more.
+    than to its own; distances are accurate to a quarter of a pixel. ``anchors``: (N, 2), the
+    points, pixels from the image's left and upper edge. ``order``: (N,), indices of the labels in
+    the order of placement. ``sizes``: (N, 2), width and height of the labels, pixels, 1 or more.
     """
     n_cells = min(_CELLS_PER_LABEL * max(len(order), 1), _MANY_CELLS)
     side = max(int(_CELL_SIDE * gap), math.ceil(math.sqrt(math.prod(picture) / n_cells)))
@@ -144,11 +142,7 @@ def _settle(places: LabelPlaces, taken: _Taken, gap: float) -> Ints:
 
 
 class _Taken:
-    """Mask of the pixels occupied by labels and lines.
-
-    ``picture`` is the width and height, pixels; ``gap`` is the number of pixels between a point and
-    its label.
-    """
+    """Mask of the pixels occupied by labels and lines; points are ``gap`` pixels from labels."""
 
     def __init__(self, picture: tuple[int, int], gap: float) -> None:
         self._pixels = np.zeros(picture[::-1], dtype=np.bool_)
@@ -217,11 +211,7 @@ class LabelPlaces:
 
 
 def label_places(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> LabelPlaces:
-    """Return all candidate positions of labels that lie within an image.
-
-    ``anchors``: (N, 2), the points, pixels from the image's left and upper edge. ``sizes``: (N, 2),
-    width and height of the labels, pixels.
-    """
+    """Return candidates for labels, sizes (N, 2), of points, (N, 2), within an image; pixels."""
     ways = np.tile(_WAYS, (len(_REACHES), 1))
     nearest = anchors[:, None] + gap * np.repeat(_REACHES, len(_WAYS))[:, None] * ways
     low = np.rint(nearest - 0.5 * (1.0 - np.sign(ways)) * sizes[:, None])
@@ -239,10 +229,7 @@ def label_places(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: fl
 
 
 def crowded(places: LabelPlaces, anchors: Floats, dots: Dots, gap: float) -> Bools:
-    """Return a mask of positions certainly too close to other points, or over their own: (M,).
-
-    ``anchors``: (N, 2), the labels' points, pixels.
-    """
+    """Return a mask, (M,), of positions certainly too close to other points, or over their own."""
     # 0.7 < 1 / sqrt(2): all points of the enlarged rectangle are within the minimum distance.
     more = 0.7 * _least(places, gap)[:, None]
     around = dots.most_within(anchors - _ALIKE, anchors + _ALIKE)
@@ -252,11 +239,10 @@ def crowded(places: LabelPlaces, anchors: Floats, dots: Dots, gap: float) -> Boo
 
 
 def line_pixels(places: LabelPlaces, gap: float) -> tuple[Ints, Bools]:
-    """Return the pixels of leader lines from next to the points to just before their labels.
+    """Return the pixels of leader lines, from next to the points to just before their labels.
 
-    Returns ``pixels``: (M, S, 2), column and row of the pixels, starting from the point;
-    ``are_part``: (M, S) bool, whether each pixel belongs to the line; positions without a line have
-    none.
+    They are columns and rows, (M, S, 2), starting from the point. The mask, (M, S), says which
+    belong to the line; positions without a line have none.
     """
     start, length = places.anchors[:, None], places.own[:, None]
     steps = np.arange(0.5 * gap, places.own.max(initial=0.0))
@@ -269,10 +255,7 @@ def line_pixels(places: LabelPlaces, gap: float) -> tuple[Ints, Bools]:
 def crowded_lines(
     places: LabelPlaces, pixels: Ints, are_part: Bools, dots: Dots, gap: float
 ) -> Bools:
-    """Return a mask of lines that certainly pass too close to other points: (M,).
-
-    ``pixels``, ``are_part``: (M, S, 2), (M, S) bool, result of ``line_pixels``.
-    """
+    """Return a mask, (M,), of lines that certainly pass too close to other points."""
     diagonal = math.sqrt(2.0) * dots.cells.side
     if diagonal > _BESIDE_LINE * gap:
         return np.zeros(len(pixels), dtype=np.bool_)
@@ -323,12 +306,10 @@ def _clearances(places: LabelPlaces, dots: Dots, layer: int, gap: float) -> tupl
 
 
 class Dots:
-    """Points sorted into grid cells.
+    """Points, (N, 2) pixels from the image's left and upper edge, sorted into grid cells."""
 
-    ``points``: (N, 2), pixels from the image's left and upper edge. Points within the same quarter
-    of a pixel are merged: otherwise all joints of a distant figure would be compared with each
-    other.
-    """
+    # Points within the same quarter of a pixel are merged: otherwise all joints of a distant figure
+    # would be compared with each other.
 
     def __init__(self, cells: Cells, points: Floats) -> None:
         self.cells = cells
@@ -370,12 +351,9 @@ class Dots:
         return sums_within(self._sums, *self.cells.touching(low, high))
 
     def pairs(self, low: Floats, high: Floats, layer: int) -> Iterator[tuple[Ints, Floats]]:
-        """Yield batches of pairs of a rectangle and a dot of one layer in the cells it touches.
-
-        ``low``, ``high``: (M, 2), corners of the rectangles. ``layer``: index of the layer, less
-        than ``n_layers``. Yields ``owners``: (P,), indices of rectangles; ``dots``: (P, 2), a point
-        in or near each of these rectangles, pixels.
-        """
+        """Yield batches of pairs of a rectangle, corners (M, 2), and a dot in a cell it touches."""
+        # The dots are those of one layer. Each batch has the indices of rectangles, (P,), and a
+        # point in or near each of these, (P, 2), pixels.
         points, begins = self._layers[layer]
         first, after = self.cells.touching(low, high)
         owners, rows = spread(first[:, 1], after[:, 1] - first[:, 1])
@@ -390,10 +368,7 @@ class Dots:
 
 
 class Cells:
-    """The cells: 1 to ``n`` per axis within the image; 0 and ``n + 1`` are outside it.
-
-    ``picture``: width and height, pixels. ``side``: side length of a cell, pixels.
-    """
+    """The cells: 1 to ``n`` per axis within the image; 0 and ``n + 1`` are outside it."""
 
     def __init__(self, picture: tuple[int, int], side: int) -> None:
         self.side = side
@@ -418,11 +393,9 @@ class Cells:
 
 
 def summed(table: Ints) -> Ints:
-    """Return the summed-area table of an array, one row and column larger.
-
-    Four of its elements give the sum over a rectangle (Crow 1984, Summed-area tables for texture
-    mapping).
-    """
+    """Return the summed-area table of an array, one row and column larger."""
+    # Four of its elements give the sum over a rectangle (Crow 1984, Summed-area tables for texture
+    # mapping).
     sums = np.zeros((table.shape[0] + 1, table.shape[1] + 1), dtype=np.int32)
     table.cumsum(axis=0, out=sums[1:, 1:], dtype=np.int32)
     sums[1:, 1:].cumsum(axis=1, out=sums[1:, 1:])
@@ -430,11 +403,8 @@ def summed(table: Ints) -> Ints:
 
 
 def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
-    """Return the sums over rectangles of cells: (...,).
-
-    ``sums``: (rows + 1, columns + 1), result of ``summed``. ``first``, ``after``: (..., 2), column
-    and row of the first cell and the cell after the last; empty if they are equal.
-    """
+    """Return sums, (...,), over rectangles of cells from a result of ``summed``."""
+    # The first cell and the cell after the last are column and row, (..., 2); equal ones are empty.
     flat, width = sums.ravel(), sums.shape[1]
     low, high = first[..., 1] * width, after[..., 1] * width
     left, right = first[..., 0], after[..., 0]

@@ -109,11 +109,7 @@ class ColoredFigure:
 def legend_of(
     name: str, having: Sequence[ColoredFigure], skinning: Skinning, figures: Sequence[Figure]
 ) -> Legend:
-    """Return the legend of a scalar quantity.
-
-    ``having``: the drawn figures that have the quantity; the first figure provides title and unit.
-    ``figures``: all figures of the scene, including those not drawn; at least one.
-    """
+    """Return a scalar quantity's legend, with title and unit from the first figure that has it."""
     if not having:
         return _empty(name, skinning, figures)
     title = quantity_title(name, having[0].figure, skinning)
@@ -247,9 +243,9 @@ class LegendColumns:
 def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendColumns:
     """Split items into as few columns as possible; omitted items are counted.
 
-    ``widths``: width of each item's swatch and name, with the gap to the next column, in any unit.
-    ``width``: maximum total width of all columns, in the same unit. The first column is used even
-    if it is wider. The columns are of about equal length if all items fit, otherwise full columns.
+    ``widths``: width of each item's swatch and name, with the gap to the next column, in the unit
+    of ``width``, the maximum of all columns. The first column is used even if it is wider. The
+    columns are of about equal length if all items fit, otherwise full columns.
 
     >>> legend_columns([10.0] * 5, 4, 30.0).counts
     (3, 2)
@@ -290,14 +286,9 @@ _ON_LIGHT = _Ink((255, 255, 255, 214), (28, 30, 34), (92, 98, 106))
 
 
 def legend_pixels(legend: Legend, size: tuple[int, int], is_light: bool = False) -> Bytes | None:
-    """Return a legend's pixels, sized for an image.
-
-    Many named items are set in several columns, then in smaller text, then in wider columns; items
-    that still do not fit are counted.
-
-    ``size``: width and height of the image that contains the legend, pixels. Returns (H, W, 4)
-    uint8 or None, sRGB with straight alpha, first row at the top; None if there is no room for it.
-    """
+    """Return a legend's (H, W, 4) uint8 pixels, straight alpha, for an image; None without room."""
+    # Many named items are set in several columns, then in smaller text, then in wider columns;
+    # items that still do not fit are counted.
     wanted = min(size[1] / _LETTERS_PER_HEIGHT, size[0] / _LETTERS_PER_WIDTH)
     letters = round(min(max(wanted, _TEXT_HEIGHTS[0]), _TEXT_HEIGHTS[1]))
     least = max(round(_SMALLER * letters), _TEXT_HEIGHTS[0])

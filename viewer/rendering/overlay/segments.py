@@ -50,10 +50,7 @@ class SegmentStyle:
 
 
 def dots(points: Floats, colors: Floats, diameter: float) -> Segments:
-    """Return round dots.
-
-    ``points``: (N, 3), scene space. ``colors``: (N, 4) or (4,), sRGB and opacity, 0 to 1.
-    """
+    """Return round dots at points, (N, 3) in scene space, with sRGB and opacity, (N, 4) or (4,)."""
     colors = np.broadcast_to(colors, (len(points), 4))
     return Segments(points, points, colors, np.full(len(points), diameter))
 
@@ -80,10 +77,7 @@ class SegmentPass:
     def draw(
         self, segments: Segments, view: View, size: tuple[int, int], style: SegmentStyle
     ) -> None:
-        """Draw segments into the bound framebuffer.
-
-        ``size``: width and height of the image, pixels.
-        """
+        """Draw segments into the bound framebuffer."""
         if not len(segments.widths):
             return
         # Positions are relative to their centre, to keep precision in float32.

@@ -58,12 +58,9 @@ _RIM_OPACITY = 205  # opacity of the outline, 0 to 255
 
 
 class Typeface:
-    """Text of one size for pictures, with each letter in the first font that contains it.
+    """Text of one size for pictures, with each letter in the first font that contains it."""
 
-    Letters that no font contains are written as escape sequences.
-
-    ``letters``: height of the text, pixels.
-    """
+    # Letters that no font contains are written as escape sequences.
 
     def __init__(self, letters: int) -> None:
         from PIL import ImageFont
@@ -86,11 +83,8 @@ class Typeface:
         fill: object,
         rim: int = 0,
     ) -> None:
-        """Draw a text, with an outline of a given width in pixels.
-
-        ``place``: upper left corner: left end of the text at the height of the ascender, pixels.
-        ``rim``: width of the outline, pixels.
-        """
+        """Draw a text, with an outline of a given width in pixels."""
+        # The place is the left end of the text at the height of the ascender, pixels.
         (x, top), base = place, self._fonts[0]
         for font, part in self._runs(text):
             # All fonts share the baseline of the first.
@@ -202,10 +196,7 @@ def _installed(folders: tuple[Path, ...]) -> tuple[Path, ...]:
 
 
 class Lettering:
-    """Rasteriser of text in one font size.
-
-    ``letters``: height of the text, pixels.
-    """
+    """Rasteriser of text in one font size, the height ``letters`` in pixels."""
 
     def __init__(self, letters: int) -> None:
         self.letters = letters
@@ -246,11 +237,8 @@ class Lettering:
 
 
 def shelves(sizes: Ints, width: int, tallest: int) -> Ints:
-    """Return positions of rectangles of equal height, packed in rows: (M, 2), M <= N.
-
-    ``sizes``: (N, 2), widths, at most ``width``, and heights, pixels. ``width``, ``tallest``: size
-    of the image; rectangles that do not fit are omitted.
-    """
+    """Return corners, (M, 2), of the rectangles, (N, 2), that fit into rows of an image."""
+    # Rectangles, at most as wide as the image, have equal heights; all in pixels.
     corners: list[tuple[int, int]] = []
     x = y = 0
     for across, down in sizes.tolist():

@@ -34,22 +34,13 @@ class AnnotationPass:
         self._lettering: Lettering | None = None
 
     def draw(self, annotation: Annotation, view: View, size: tuple[int, int]) -> None:
-        """Draw the segments of one annotation.
-
-        ``size``: width and height of the image, pixels. Raises ``RenderError`` if there is not
-        enough graphics memory.
-        """
+        """Draw the segments of one annotation."""
         self.segments.draw(annotation.segments, view, size, annotation.style)
 
     def write(
         self, annotations: Sequence[Annotation], view: View, size: tuple[int, int]
     ) -> list[tuple[int, int]]:
-        """Draw the labels of several annotations without overlap.
-
-        ``size``: width and height of the image, pixels. Returns for each annotation, the number of
-        labels omitted for lack of room next to their points, and the number of labels within the
-        image. Raises ``RenderError`` if there is not enough graphics memory.
-        """
+        """Draw labels without overlap; return how many of how many lack room, by annotation."""
         having = [row for row, one in enumerate(annotations) if one.labels is not None]
         labels = [one.labels for one in annotations if one.labels is not None]
         counts = [(0, 0)] * len(annotations)
@@ -91,12 +82,7 @@ class _LabelPass:
         lettering: Lettering,
         size: tuple[int, int],
     ) -> None:
-        """Draw texts over the bound framebuffer's contents.
-
-        ``texts``: the texts; those that do not fit into the texture are omitted. ``corners``: (N,
-        2), top left corners, pixels from the image's left and upper edge. ``colors``: (N, 3),
-        colours of the text, sRGB, 0 to 1. ``size``: width and height of the image, pixels.
-        """
+        """Draw texts that fit into the texture, at corners (N, 2) and in sRGB colours (N, 3)."""
         if not texts:
             return
         if self._letters != lettering.letters or not self._places.keys() >= set(texts):

@@ -40,11 +40,7 @@ class BackgroundPass:
         self._last_size = 0, 0
 
     def draw(self, target: Target, background: str) -> None:
-        """Clear the depth and colour of a target, which must be bound.
-
-        ``background``: an entry of ``BACKGROUNDS`` or ``"#rrggbb"``; ``"environment"`` clears to
-        transparent.
-        """
+        """Clear the depth and colour of a bound target; ``"environment"`` clears to transparent."""
         if background != "gradient":
             color = _CLEARED.get(background) or (*parse_color(background), 1.0)
             target.framebuffer.clear(*color, depth=1.0)
@@ -148,11 +144,10 @@ class BackdropPass:
 def is_light(background: str) -> bool:
     """Return whether dark text is easier to read on a background: white, or a light colour.
 
-    The gradient is dark at the top, where legends are, and what is behind the others is unknown.
-
     >>> is_light("white"), is_light("#e9ebee"), is_light("#303840"), is_light("gradient")
     (True, True, False, False)
     """
+    # The gradient is dark at the top, where legends are, and what is behind the others is unknown.
     if background in BACKGROUNDS:
         return background == "white"
     red, green, blue = parse_color(background)

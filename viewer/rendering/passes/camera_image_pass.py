@@ -28,11 +28,7 @@ class CameraImagePass:
     def draw_behind(
         self, camera: CameraView, image: CameraImage, size: tuple[int, int], brightness: float
     ) -> None:
-        """Draw the image of the camera through which the scene is seen, behind everything.
-
-        ``size``: width and height of the image, pixels. ``brightness``: factor on the image's
-        colours, 0 to 1.
-        """
+        """Draw the image of the camera through which the scene is seen, behind everything."""
         width, height = picture_size(camera)
         own, aspect = width / height, size[0] / size[1]
         # As in pinhole_projection, the whole image is in the middle.

@@ -50,10 +50,7 @@ class GhostPass:
         self._posed: PosedMesh | None = None
 
     def draw(self, ghost: Ghost, view: View, options: DisplayOptions) -> None:
-        """Draw a ghost over everything drawn so far.
-
-        Raises ``RenderError`` if there is not enough graphics memory.
-        """
+        """Draw a ghost over everything drawn so far."""
         posed = self._uploaded(ghost.figure)
         xray = ghost.style == "translucent"
         look = replace(

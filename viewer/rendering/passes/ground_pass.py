@@ -41,11 +41,7 @@ class GroundPass:
         self._ground: moderngl.VertexArray | None = None
 
     def draw_grid(self, view: View, box: Floats, background: str) -> None:
-        """Draw the grid under a box.
-
-        ``box``: (2, 3), bounds of the objects on the ground, scene space, which define the grid's
-        height, step and extent.
-        """
+        """Draw the grid under a box, (2, 3), which defines the grid's height, step and extent."""
         program = self.programs.drawing("ground")
         step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)
         axes = ground_axes(view.camera.up)

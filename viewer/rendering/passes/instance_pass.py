@@ -65,16 +65,12 @@ _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
 
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
-    """Return groups of actors to draw as instances: those with the same figure and shape.
-
-    Posed buffers are used instead for small groups, so that camera moves need no re-skinning, and
-    for translucent actors, actors with hidden parts, outlines or changed materials, and meshes that
-    are drawn several times per frame, in the bind pose or coloured by a scalar. If back faces are
-    culled, either all or none of the actors of a group are mirrored, and actors with mirrored
-    joints are drawn individually.
-
-    Returns groups of at least ``FEWEST``.
-    """
+    """Return groups, of at least ``FEWEST`` actors of one figure and shape, drawn as instances."""
+    # Posed buffers are used instead for small groups, so that camera moves need no re-skinning, and
+    # for translucent actors, actors with hidden parts, outlines or changed materials, and meshes
+    # that are drawn several times per frame, in the bind pose or coloured by a scalar. If back
+    # faces are culled, either all or none of the actors of a group are mirrored, and actors with
+    # mirrored joints are drawn individually.
     if options.show == "binding" or options.shading == "scalar":
         return []
     if options.wireframe or options.normals:
@@ -118,10 +114,7 @@ def draw_instances(
     options: DisplayOptions,
     blended: bool = False,
 ) -> None:
-    """Draw the surfaces of actors that share a mesh.
-
-    ``blended``: whether to draw the blended triangles instead of the opaque ones.
-    """
+    """Draw the opaque or the blended surfaces of actors that share a mesh."""
     program = programs.drawing(
         "instance",
         shading_of(instances.mesh, options),
@@ -168,11 +161,9 @@ def draw_instance_shapes(
 
 
 class InstanceBuffers:
-    """Matrices, placements and colours of actors that share a figure and a shape.
+    """Matrices, placements and colours of actors that share a figure and a shape."""
 
-    ``is_mirrored``: whether the placements are reflections; all actors agree if faces are culled.
-    ``way``: method of summing pose correctives, see ``rest_buffers``.
-    """
+    # If faces are culled, all placements are reflections, or none.
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
         self.context, self.mesh = context, mesh
@@ -194,10 +185,7 @@ class InstanceBuffers:
         self._arrays = VertexArrays(context)
 
     def update(self, poses: Sequence[Pose], how: Skinning) -> None:
-        """Upload the matrices of poses that changed.
-
-        Raises ``RenderError`` if there is not enough graphics memory.
-        """
+        """Upload the matrices of poses that changed."""
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
         skinning_key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())
         keys = [pose.skinning_key for pose in poses]
@@ -261,10 +249,9 @@ class InstanceBuffers:
         self._offsets.update(weights, rows, self.count)
 
     def place(self, actors: Sequence[Actor], view: View) -> None:
-        """Upload the actors' placements, relative to a camera, and their colours.
-
-        Products are formed in float64: large translations cancel before the conversion to float32.
-        """
+        """Upload the actors' placements, relative to a camera, and their colours."""
+        # Products are formed in float64: large translations cancel before the conversion to
+        # float32.
         from viewer.rig.motion.instances import placements
 
         assert self._instances is not None  # guaranteed by update
@@ -346,10 +333,7 @@ class InstanceBuffers:
 
 
 def _pose_weights(figure: Figure, poses: Sequence[Pose], rotations: Floats) -> Floats | None:
-    """Return the weights of the pose correctives, (C, P), or None if there are none.
-
-    ``rotations`` (C, J, 3, 3): rotations of the joints relative to their parents.
-    """
+    """Return the pose correctives' weights, (C, P), for local rotations (C, J, 3, 3), if any."""
     correctives, skeleton = figure.correctives, figure.require_skeleton()
     if correctives is None:
         return None

@@ -69,10 +69,7 @@ class SkeletonBuffers:
         return self._key == (pose.skinning_key, self.style(options) == "boxes")
 
     def update(self, pose: Pose, options: DisplayOptions) -> None:
-        """Upload the joints' matrices if the pose changed.
-
-        ``pose``: DOFs in lengths and radians.
-        """
+        """Upload the joints' matrices if the pose changed."""
         if self.is_current(pose, options):
             return
         skeleton = shaped_skeleton(self.figure, pose.shape_weights)
@@ -107,11 +104,7 @@ class JointPass:
         color: Color | None = None,
         overlays: bool = False,
     ) -> None:
-        """Draw a skeleton.
-
-        ``placement``: (4, 4), matrix from figure space to scene space. ``color``: (r, g, b), colour
-        of all joints, linear; one colour per joint if omitted.
-        """
+        """Draw a skeleton in one linear colour; one colour per joint if it is None."""
         overlays = overlays and opacity < 1.0
         view = in_front(view) if overlays else view
         program = joint_program(

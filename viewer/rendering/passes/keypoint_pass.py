@@ -57,9 +57,6 @@ class KeypointPass:
         options: DisplayOptions,
         opacity: float = 1.0,
     ) -> None:
-        """Draw the markers, in front of everything.
-
-        ``placement``: (4, 4), matrix from figure space to scene space.
-        """
+        """Draw the markers, in front of everything."""
         program = self.joints.programs.drawing("joint", "phong", fragment="mesh")
         draw_boxes(program, points.boxes, placement, in_front(view), options, opacity=opacity)

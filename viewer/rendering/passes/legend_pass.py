@@ -23,10 +23,7 @@ class LegendPass:
         self._drawn: tuple[Legend, tuple[int, int], bool] | None = None
 
     def draw(self, legend: Legend, size: tuple[int, int], is_light: bool = False) -> bool:
-        """Draw a legend into the upper left corner of the bound framebuffer.
-
-        ``size``: width and height of the image, pixels.
-        """
+        """Draw a legend into the upper left corner of the bound framebuffer."""
         wanted = legend, size, is_light
         if self._drawn is None or self._drawn[0] is not legend or self._drawn[1:] != wanted[1:]:
             self._free()

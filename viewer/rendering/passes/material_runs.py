@@ -31,11 +31,9 @@ def draw_runs(
     is_mirrored: bool = False,
     back_faces: Sequence[Region] | None = None,
 ) -> None:
-    """Draw all opaque or all blended triangles, one material at a time.
-
-    If blended triangles are not sorted, their back faces are drawn first. Back faces of opaque
-    triangles are drawn only in the regions ``back_faces``, if given.
-    """
+    """Draw all opaque or all blended triangles, one material at a time."""
+    # If blended triangles are not sorted, their back faces are drawn first. Back faces of opaque
+    # triangles are drawn only in the regions ``back_faces``, if given.
     two_passes = blended and isinstance(indices, IndexSet)
     plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
     for run in indices.runs:
@@ -65,12 +63,9 @@ def draw_shapes(
     instances: int = 1,
     is_mirrored: bool = False,
 ) -> None:
-    """Draw the shapes of all surfaces, with the cutouts of their materials.
-
-    ``fragment``: name of the fragment shader. With ``"depth"`` back faces are drawn too, because
-    they block light; with ``"geometry"`` blended surfaces are omitted, because others show through
-    them.
-    """
+    """Draw the shapes of all surfaces, with the cutouts of their materials."""
+    # With "depth" back faces are drawn too, because they block light; with "geometry" blended
+    # surfaces are omitted, because others show through them.
     program = array.program
     has_materials = "u_alpha_mode" in program
     if has_materials:
@@ -93,13 +88,12 @@ def _render(array: moderngl.VertexArray, run: MeshRun, instances: int) -> None:
 
 
 class SortedTriangles:
-    """Blended triangles in a separate index buffer, sorted from the farthest to the nearest.
+    """Blended triangles in a separate index buffer, sorted from the farthest to the nearest."""
 
-    Triangles are sorted by their posed centroids. The order is therefore correct except for
-    triangles that intersect or overlap cyclically, and for interleaved materials, which are drawn
-    one after the other. The posed vertices are read back when the pose changes, and sorted when
-    the view changes.
-    """
+    # Triangles are sorted by their posed centroids. The order is therefore correct except for
+    # triangles that intersect or overlap cyclically, and for interleaved materials, which are drawn
+    # one after the other. The posed vertices are read back when the pose changes, and sorted when
+    # the view changes.
 
     def __init__(self, context: moderngl.Context) -> None:
         self.indices = buffer(context, np.zeros(0), "u4")
@@ -111,11 +105,9 @@ class SortedTriangles:
         self._positions, self._n_updates = np.zeros((0, 3), np.float32), -1
 
     def sort(self, mesh: PosedMesh, source: IndexSet, along: Floats) -> None:
-        """Sort the triangles, and upload them if their order may have changed.
-
-        ``along``: (3,), row of the model-view matrix that yields the depth, which decreases with
-        the distance.
-        """
+        """Sort the triangles, and upload them if their order may have changed."""
+        # ``along`` is the row, (3,), of the model-view matrix that yields the depth, which
+        # decreases with the distance.
         given = tuple(run for run in source.runs if run.surface.is_blended and run.count)
         if given != self._given or source.indices is not self._buffer:
             rows = [np.arange(run.first // 3, (run.first + run.count) // 3) for run in given]

@@ -55,11 +55,7 @@ class MeshPass:
         blended: bool = False,
         opacity: float = 1.0,
     ) -> None:
-        """Draw the surface: its opaque or its blended triangles.
-
-        ``placement``: (4, 4), matrix from figure space to scene space. ``color``: (r, g, b), colour
-        of untextured surfaces, linear; ``SKIN_COLOR`` if omitted.
-        """
+        """Draw the opaque or the blended triangles; ``color``: of untextured surfaces, linear."""
         look = mesh.scalars.look if options.shading == "scalar" else None
         corners = "corners" if look is not None else ""
         program = self.programs.drawing(
@@ -110,10 +106,7 @@ class MeshPass:
         blended: bool,
         look: Mapping[str, object],
     ) -> None:
-        """Draw the outlines of toon materials: back faces of a surface moved along its normals.
-
-        ``look``: uniforms of the whole mesh.
-        """
+        """Draw the outlines of toon materials: back faces of a surface moved along its normals."""
         indices = mesh.index_set(options)
         runs = [
             (run, run.surface.outline)
@@ -248,30 +241,23 @@ class MeshPass:
 
 
 def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
-    """Return the shading of a mesh, a key of ``SHADING``.
-
-    ``"auto"`` follows the materials, as does ``"scalar"`` if there are no values.
-    """
+    """Return the shading of a mesh, a key of ``SHADING``."""
+    # "auto" follows the materials, as does "scalar" if there are no values.
     if options.shading not in ("auto", "scalar"):
         return options.shading
     return "pbr" if mesh.is_physical else "phong"
 
 
 def surface_opacity(options: DisplayOptions) -> float:
-    """Return the opacity of surfaces, 0 to 1.
-
-    Colours of scalar quantities must match the legend, so these surfaces stay opaque.
-    """
+    """Return the opacity of surfaces, 0 to 1."""
+    # Colours of scalar quantities must match the legend, so these surfaces stay opaque.
     return _XRAY_OPACITY if options.xray and options.shading != "scalar" else 1.0
 
 
 def draw_layer(
     context: moderngl.Context, options: DisplayOptions, draw: Callable[[], object]
 ) -> None:
-    """Draw surfaces; only the nearest layer if they are translucent.
-
-    ``draw``: draws the surfaces; called twice if they are translucent.
-    """
+    """Draw surfaces; twice, and only the nearest layer, if they are translucent."""
     if surface_opacity(options) == 1.0:
         draw()
     else:

@@ -103,11 +103,7 @@ class MotionPathPass:
         size: tuple[int, int],
         at: Moment,
     ) -> None:
-        """Draw one actor's paths, with hidden parts faint.
-
-        ``placement``: (4, 4), matrix from figure space to scene space. ``size``: width and height
-        of the image, pixels.
-        """
+        """Draw one actor's paths, with hidden parts faint."""
         if not paths.count:
             return
         program = self.programs.drawing("motion_path")

@@ -17,10 +17,7 @@ _RADIUS = 0.09  # radius within which surfaces occlude, relative to a figure's s
 
 
 class OcclusionPass:
-    """Pass that computes how much ambient light reaches each pixel, at half resolution.
-
-    ``size``: width and height of the image, pixels.
-    """
+    """Pass that computes how much ambient light reaches each pixel, at half resolution."""
 
     def __init__(
         self, context: moderngl.Context, programs: Programs, size: tuple[int, int]
@@ -53,12 +50,9 @@ class OcclusionPass:
         phase: float,
         strength: float,
     ) -> Occlusion:
-        """Compute the occlusion of an image.
-
-        ``size``: size of a figure in scene units, which determines the radius. ``phase``: phase of
-        the direction pattern, 0 to 1: different for each pass of an image. ``strength``: strength
-        of the occlusion, 0 to 1.
-        """
+        """Compute an image's occlusion, of a strength from 0 to 1, for figures of a scene size."""
+        # The size determines the radius; the phase of the direction pattern, 0 to 1, is different
+        # for each pass of an image.
         halved = self._halved(view)
         context = self.context
         self._surfaces.use()

@@ -85,12 +85,9 @@ class OutlinePass:
         target: Target,
         is_layer: bool = False,
     ) -> None:
-        """Draw outlines into a target; its framebuffer is bound afterwards.
-
-        ``is_layer``: whether to replace the target's colours where there are lines, with straight
-        instead of premultiplied alpha. Raises ``RenderError`` if the driver has no room for the
-        masks.
-        """
+        """Draw outlines into a target; its framebuffer is bound afterwards."""
+        # A layer replaces the target's colours where there are lines, with straight instead of
+        # premultiplied alpha.
         self._make(target.size, options.samples)
         assert self._mask is not None  # ``_make`` created it
         mask = self._mask

@@ -42,14 +42,10 @@ _FLOATS = 11  # number of values per instance
 
 
 def point_radii(points: Floats) -> Floats:
-    """Return the drawn radius of each point, derived from the distances between points.
-
-    Files do not state their unit, so radii are relative to the size of the point set, and smaller
-    if points are close together, as on hands and faces.
-
-    ``points``: (F, K, 4), x, y, z and confidence in a sample of frames. Returns (K,), figure units,
-    medians over the frames with visible points; 0 if there are none.
-    """
+    """Return the drawn radii, (K,), of points in some frames, (F, K, 4) with confidences."""
+    # Files do not state their unit, so radii are relative to the size of the point set, and smaller
+    # if points are close together, as on hands and faces. They are medians over the frames with
+    # visible points; 0 if there are none.
     sizes, gaps = [], []
     for frame in points:
         seen = np.flatnonzero(frame[:, 3] > 0.0)
@@ -77,10 +73,8 @@ def _gaps(places: Floats) -> Floats:
 
 
 def _mean_gaps(places: Floats) -> Floats:
-    """Return the mean distance of the points on a surface near each of many points: (N,).
-
-    n points in a cell of a grid are about as far apart as the cell's side divided by sqrt(n).
-    """
+    """Return the mean distance of the points on a surface near each of many points: (N,)."""
+    # n points in a cell of a grid are about as far apart as the cell's side divided by sqrt(n).
     low, high = bounding_box(places)
     side = max(float((high - low).max()), 1e-30) / _CELLS
     cells = np.floor((places - low) / side).astype(np.int64)
@@ -99,11 +93,9 @@ def _radii_of(actor: Actor, points: Floats) -> Floats:
 
 
 class PointBuffers:
-    """Capsules of one actor's keypoints and limbs.
+    """Capsules of one actor's keypoints and limbs."""
 
-    ``elements``: (N,) int32, index of each instance: a keypoint, or a limb plus the number of
-    keypoints.
-    """
+    # Each instance's index is that of a keypoint, or of a limb plus the number of keypoints.
 
     def __init__(self, context: moderngl.Context, layout: PointLayout) -> None:
         self.layout = layout
@@ -117,11 +109,9 @@ class PointBuffers:
         self._measured: tuple[object, Floats] | None = None
 
     def update(self, actor: Actor, placement: Floats, view: View, options: DisplayOptions) -> None:
-        """Upload the actor's current points, with translucent capsules sorted from back to front.
-
-        ``placement``: (4, 4), matrix from figure space to scene space. ``options``: points below
-        its minimum confidence, and limbs that end at such points, are omitted.
-        """
+        """Upload the actor's points, with translucent capsules sorted from back to front."""
+        # Points below the options' minimum confidence, and limbs that end at such points, are
+        # omitted.
         least, translucency = options.min_confidence, options.opacity * actor.opacity
         points = actor.points
         assert points is not None  # checked by the caller
@@ -173,11 +163,10 @@ class PointBuffers:
 
 
 class PointPass:
-    """Pass that draws keypoints and limbs.
+    """Pass that draws keypoints and limbs."""
 
-    ``capsule``, ``coarse``: (moderngl.Buffer, moderngl.Buffer), vertices and indices, shared by all
-    instances; the coarse ones are for many points.
-    """
+    # All instances share the vertices and indices of one capsule; the coarse one is for many
+    # points.
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
@@ -198,10 +187,7 @@ class PointPass:
         options: DisplayOptions,
         overlays: bool,
     ) -> None:
-        """Draw one actor's keypoints.
-
-        ``placement``: (4, 4), matrix from figure space to scene space.
-        """
+        """Draw one actor's keypoints."""
         if not len(points.elements):
             return
         program = self.programs.drawing(
@@ -245,10 +231,8 @@ class PointPass:
 
 
 def _capsule(n_sides: int, n_rings: int) -> tuple[Floats, Ints]:
-    """Return two hemispheres and the tube between them: vertices (N, 4) and triangles (T, 3).
-
-    The last column is 0 for vertices at the start of the capsule and 1 for those at its end.
-    """
+    """Return two hemispheres and the tube between them: vertices (N, 4) and triangles (T, 3)."""
+    # The last column is 0 for vertices at the start of the capsule and 1 for those at its end.
     rows = []
     for end in (0.0, 1.0):
         tilts = np.linspace(0.0, math.pi / 2, n_rings + 1)

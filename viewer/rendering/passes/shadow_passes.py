@@ -64,12 +64,7 @@ class ShadowPass:
         direction: Floats,
         strength: float,
     ) -> Shadow:
-        """Draw a shadow map.
-
-        ``spheres``: (N, 4), bounds of the casters: centres and radii, scene space; at least one.
-        ``direction``: (3,), unit vector towards the light, scene space. ``strength``: 0 to 1:
-        fraction of the light that a shadow removes.
-        """
+        """Draw a shadow map of casters, (N, 4), which removes a fraction of the light."""
         view, extent = light_view(spheres, direction, self.side)
         _draw_depths(self._framebuffer, draw, view)
         matrix = _TO_TEXTURE @ view.projection @ view.matrix
@@ -107,12 +102,9 @@ class ContactPass:
         axes: Floats,
         height: float,
     ) -> ContactShadows | None:
-        """Draw and return the contact shadows of figures; None if all are far above the ground.
-
-        ``spheres``: (N, 4), bounds of the figures: centres and radii, scene space. ``size``: size
-        of a figure in scene units, which determines the softness. ``axes``: (3, 3), the ground's
-        two axes and the up axis as rows. ``height``: height of the ground, scene units.
-        """
+        """Draw the contact shadows of figures in (N, 4); None if all are far above the ground."""
+        # The size of a figure determines the softness. The axes, (3, 3), are the ground's two axes
+        # and the up axis as rows.
         centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
         near = (centers - radii)[:, 2] < height + _FAR * size
         if not near.any():
@@ -178,10 +170,7 @@ class GroundShadowPass:
         self._arrays = VertexArrays(context)
 
     def draw_shadow(self, shadow: Shadow, view: View, up: Floats, height: float) -> None:
-        """Draw the key light's shadow.
-
-        ``up``: (3,), the up axis.
-        """
+        """Draw the key light's shadow on the ground, which is at a height along ``up``, (3,)."""
         back = np.linalg.inv(shadow.matrix)
         away = back[:3, 2]
         slope = -(up @ away) / np.linalg.norm(away)
@@ -263,14 +252,9 @@ def map_side(size: tuple[int, int]) -> int:
 
 
 def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float]:
-    """Return the view of a directional light that contains the spheres, and its half extent.
-
-    Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
-    not crawl while figures move.
-
-    ``spheres``: (N, 4), centres and radii, scene space. ``direction``: (3,), unit vector towards
-    the light.
-    """
+    """Return a directional light's view that contains spheres, (N, 4), and its half extent."""
+    # Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
+    # not crawl while figures move.
     axes = np.stack([*light_axes(direction), direction])
     centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
     low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
@@ -286,11 +270,7 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
 
 
 def _parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
-    """Return a parallel view of a box.
-
-    ``axes``: (3, 3), right, up and backward as rows, scene space. ``middle``: (3,), centre of the
-    box, along these axes. ``halves``: (3,), half the side lengths of the box.
-    """
+    """Return the parallel view of a box about a middle, along axes (3, 3): right, up, backward."""
     matrix = np.eye(4)
     matrix[:3, :3] = axes
     # OpenGL's depth grows away from the eye, against the backward axis.
