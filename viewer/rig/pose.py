@@ -125,14 +125,12 @@ def rest_pose(skeleton: Skeleton) -> Pose:
 
 
 def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Build each joint's matrix: L = T(rest + translation + DOFs) R(quaternion) R(DOFs) S(scale).
+    """Build L = T(rest + translation + DOFs) R(quaternion) R(DOFs) S(scale) of joints (J, 4, 4).
 
-    The rotations of the DOF table are multiplied so that the first row is applied first: rows x, y,
-    z give R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
     Joints with a constraint follow their source instead.
-
-    ``pose``: DOFs in lengths and radians. Returns (J, 4, 4), joint-to-parent matrices.
     """
+    # The first row of a joint's DOFs is applied first: rows x, y, z give Rz Ry Rx (CSE169 course
+    # notes, "rotation about x first, then y, then z").
     turns = joint_rotations(skeleton, pose)
     return affine_matrices(
         *local_transforms(skeleton, turns, pose.dofs, pose.translations, pose.scales)
@@ -142,10 +140,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 def local_transforms(
     skeleton: Skeleton, rotations: Floats, dofs: Floats, translations: Floats, scales: Floats
 ) -> tuple[Floats, Floats]:
-    """Return each joint's linear part (..., J, 3, 3) and place (..., J, 3), relative to the parent.
-
-    ``rotations`` (..., J, 3, 3) are those of ``joint_rotations``, the other arrays those of poses.
-    """
+    """Return linear parts (..., J, 3, 3) and places (..., J, 3), relative to parents."""
     places = skeleton.rest_translations + joint_offsets(skeleton, dofs, translations)
     if skeleton.constraints:
         first = (np.moveaxis(part, -2, 0) for part in (places, scales))
@@ -170,19 +165,12 @@ def joint_offsets(skeleton: Skeleton, dofs: Floats, translations: Floats) -> Flo
 
 
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs): (J, 3, 3).
-
-    Constraints are not applied: these are the rotations that the pose specifies.
-    """
+    """Return R(quaternion) R(DOFs) relative to parents (J, 3, 3), without constraints."""
     return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
 
 
 def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
-    """Multiply the rotation DOFs of every joint, one row of all joints at a time.
-
-    ``dofs``: (..., D), lengths and radians, of any number of poses. Returns (..., J, 3, 3), the
-    first row of a joint is applied first.
-    """
+    """Multiply each joint's rotation DOFs (..., D), first row first, to (..., J, 3, 3)."""
     if skeleton.posing is not None:
         return skeleton.posing.rotations(dofs)
     return _order_of(skeleton).at(dofs)
@@ -199,10 +187,7 @@ def _order_of(skeleton: Skeleton) -> _AxisProducts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Factor:
-    """One rotation of each of N joints: R = C + cos(a) D + sin(a) E, nine entries row by row.
-
-    Joints with fewer rotations than others do not appear in the later factors.
-    """
+    """One rotation of each of N joints: R = C + cos(a) D + sin(a) E, nine entries row by row."""
 
     joints: _Indices | None  # None for all joints in order
     rows: _Indices
@@ -225,11 +210,7 @@ class _AxisProducts:
         self._n_joints, self._factors = n_joints, factors
 
     def at(self, dofs: Floats) -> Floats:
-        """Return the product of each joint's rotations.
-
-        ``dofs``: (..., D), rotations in radians; other DOFs are not used. Returns (..., J, 3, 3),
-        matrices for column vectors; the identity for joints without rotations.
-        """
+        """Return the products of rotation DOFs (..., D) as (..., J, 3, 3); identity without any."""
         result: Floats | None = None
         for factor in self._factors:
             rotations = factor.at(dofs)
@@ -245,11 +226,7 @@ class _AxisProducts:
 
 
 def axis_products(n_joints: int, joints: Ints, axes: Ints, rows: _Indices) -> _AxisProducts:
-    """Return the order of multiplication of rotation DOFs.
-
-    ``joints``, ``axes``: (N,), joint and axis (0, 1, 2 for x, y, z) of each rotation; the first one
-    of a joint is applied first. ``rows``: (N,), index of each rotation in the DOFs.
-    """
+    """Order rotations (N,) about ``axes`` 0 to 2 for multiplication, a joint's first row first."""
     factors = []
     for chosen in _by_rank(joints):
         matrices = np.zeros((3, len(chosen), 9))  # constant, cosines, sines
@@ -276,13 +253,7 @@ def _by_rank(joints: Ints) -> list[_Indices]:
 
 
 class PosedSkeleton:
-    """Read-only world and skinning matrices of one pose, each computed once.
-
-    A pose caches its latest instance; see ``viewer.rig.kinematics.posed_skeleton``.
-
-    ``key``: the pose's ``skinning_key``. ``world``: (J, 4, 4), joint-to-figure matrices of that
-    pose; made read-only.
-    """
+    """World (J, 4, 4) and skinning matrices of the pose ``key``, read-only, computed once."""
 
     __slots__ = ("_palette", "_skin", "key", "skeleton", "world")
 
@@ -293,10 +264,7 @@ class PosedSkeleton:
         self._palette: Floats = world
 
     def palette(self, skin: Skin) -> Floats:
-        """Return the skinning matrices: M[j] = W[j] inverse(B[j]).
-
-        Returns (J, 4, 4), bind-to-posed matrices, read-only.
-        """
+        """Return the skinning matrices M[j] = W[j] inverse(B[j]), (J, 4, 4), read-only."""
         if self._skin is not skin:
             self._palette = self.world @ skin.inverse_bind
             self._palette.flags.writeable = False

@@ -18,11 +18,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 def lock_feet(
     figure: Figure, clip: SampledClip, up: int, way: float = 1.0
 ) -> tuple[SampledClip, PlantedFeet]:
-    """Return a motion whose feet do not slide while they are on the ground.
-
-    ``up``: the vertical axis of the figure's space. ``way``: 1 if it points up, -1 if down. Feet
-    that glide farther than legs can follow are not held.
-    """
+    """Hold feet still while they stand, as far as legs reach; ``way``: -1 if ``up`` points down."""
     clip = cast("SampledClip", in_frame_order(clip))
     legs = legs_of(figure.require_skeleton())
     rest_up = np.eye(3)["xyz".index(figure.up)]

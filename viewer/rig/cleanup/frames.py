@@ -22,11 +22,7 @@ _MOST_FRAMES = 1_000_000  # maximum number of frames: 9 hours at 30 frames per s
 
 
 def runs_of(flags: Bools) -> list[tuple[int, int]]:
-    """Return the runs of True as half-open ranges of indices.
-
-    >>> runs_of(np.array([True, True, False, True]))
-    [(0, 2), (3, 4)]
-    """
+    """Return the runs of True as half-open ranges: [F, T, T, F] has the one run (1, 3)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -37,11 +33,7 @@ def in_frame_order(clip: Captured) -> Captured:
 
 
 def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
-    """Return a range of frames of a clip, with unchanged times and numbers.
-
-    ``first``, ``stop``: first frame and end frame (exclusive), in the numbering of the file; the
-    ends of the clip if omitted. Raises ``RigError`` if the range is empty or exceeds the clip.
-    """
+    """Return frames ``first`` to ``stop`` - 1 of the file's numbering; RigError if none remain."""
     low = clip.timing.first_frame
     high = low + clip.timing.n_frames
     start, end = low if first is None else first, high if stop is None else stop
@@ -55,11 +47,7 @@ def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -
 
 
 def _with_rows(clip: Captured, frames: _Indices) -> Captured:
-    """Return a clip of some of the frames, each with a separate row, in time order.
-
-    ``frames``: (F,), consecutive indices of frames, from 0; rate, first frame and start are
-    adjusted.
-    """
+    """Return some consecutive frames (F,), counted from 0, each with its own row, in time order."""
     timing = clip.timing
     chosen = timing.rows[frames]
     kept = chosen[chosen >= 0]
@@ -83,13 +71,9 @@ def _with_rows(clip: Captured, frames: _Indices) -> Captured:
 
 
 def resampled(clip: Captured, rate: float) -> Captured:
-    """Return a clip with another frame rate, which begins at the same time.
+    """Return a clip at ``rate`` frames per second from the same start; RigError above a million.
 
-    Rotations are interpolated along the shorter arc, everything else linearly. At the times of the
-    original frames, values are unchanged. A new frame between two original frames is missing if
-    either of those is missing. Frames are counted from 0.
-
-    ``rate``: frames per second. Raises ``RigError`` if there would be more than a million frames.
+    A new frame is missing if either of the frames around it is. Frames are counted from 0.
     """
     timing = clip.timing
     count = int(np.floor((timing.n_frames - 1) / timing.frame_rate * rate + _ON_FRAME)) + 1
@@ -145,12 +129,9 @@ def is_shared(clip: Captured, name: str) -> bool:
 
 
 def points_between(clip: PointClip, times: Floats, interpolate: bool = False) -> Floats:
-    """Return points (T, K, 4), interpolated where they are visible on both sides.
+    """Return points (T, K, 4), interpolated where both neighbours are visible.
 
-    Other points keep the values of the previous row or, with ``interpolate``, which also
-    interpolates across gaps, are invisible.
-
-    ``times``: (T,), seconds.
+    Others keep the previous row's values or, with ``interpolate``, are invisible, even across gaps.
     """
     before, after, fraction = clip.timing.locate(times, interpolate)
     start, end = clip.points[before], clip.points[after]

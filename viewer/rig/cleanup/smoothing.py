@@ -44,12 +44,7 @@ class Filter(Protocol):
 
 
 def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
-    """Return a clip whose rotations and translations are filtered; gaps separate runs of frames.
-
-    Shapes and scales are unchanged.
-
-    ``metres``: length of the clip's unit.
-    """
+    """Filter rotations and translations between gaps; ``metres``: length of the clip's unit."""
     ordered = in_frame_order(clip)
     rate = ordered.timing.frame_rate
     runs = _rows_of_runs(ordered.timing.present)
@@ -177,11 +172,7 @@ class OneEuro:
 def _continued(
     values: Floats, count: int, opposite: Callable[[Floats, Floats], Floats]
 ) -> tuple[Floats, slice]:
-    """Return frames (N, ...) extended beyond both ends, and the range of the original ones.
-
-    ``count`` is the number of frames to add at each end; ``opposite`` reflects values about a
-    value.
-    """
+    """Return frames (N, ...) with ``count`` more reflected at each end, and the old ones' range."""
     total = len(values)
     added = 0
     while added < count and len(values) > 1:
@@ -210,11 +201,11 @@ def _factor(cutoff: Floats | float, rate: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class SavitzkyGolay:
-    """Least-squares fit of a polynomial to a window of frames, evaluated at its middle.
+    """Least-squares polynomial through a window of frames, evaluated at its middle.
 
-    Near the ends of a motion, the window stays within the motion, and the polynomial is evaluated
-    away from the middle of the window. Rotations are fitted as rotation vectors relative to the
-    rotation of the frame, so constant and uniform rotations are unchanged.
+    Near the ends of a motion the window stays inside it, and the polynomial is evaluated off its
+    middle. Rotations are fitted as vectors relative to the frame's own, so that uniform rotation is
+    unchanged.
     """
 
     window: int = 0
@@ -249,10 +240,7 @@ class SavitzkyGolay:
         return positions if found is None else positions + found
 
     def _fitted(self, count: int, rate: float, at: Callable[[Ints], Floats]) -> Floats | None:
-        """Return the fitted values of all frames; None if there are too few to fit.
-
-        ``at`` returns the values at one frame of each window, relative to the frame to be filtered.
-        """
+        """Fit the values that ``at`` gives for a frame of each window; None for too few frames."""
         window = self.used_frames(count, rate)
         if not window:
             return None
@@ -291,17 +279,7 @@ def moved(base: Floats, vectors: Floats) -> Floats:
 
 
 def _relative_vectors(base: Floats, quaternions: Floats) -> Floats:
-    """Return the rotation vectors v with q = b exp(v), for rotations by less than 2 pi.
-
-    The sign of a quaternion matters: a negative real part means a rotation by more than pi.
-
-    ``base``, ``quaternions``: (..., 4), unit quaternions b and q. Returns (..., 3), radians, in the
-    space of ``base``.
-
-    >>> half_turn = np.array([0.0, 0.0, 1.0, 0.0])
-    >>> _relative_vectors(np.array([0.0, 0.0, 0.0, 1.0]), half_turn).round(6).tolist()
-    [0.0, 0.0, 3.141593]
-    """
+    """Return rotation vectors v (..., 3) with q = b exp(v); q's sign decides up to 2 pi."""
     found = multiply(conjugate(base), quaternions)
     sine = np.linalg.norm(found[..., :3], axis=-1)
     angle = 2.0 * np.arctan2(sine, found[..., 3])

@@ -37,13 +37,7 @@ def inner_gaps(clip: SampledClip | PointClip) -> list[Span]:
 
 
 def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captured, Gaps]:
-    """Interpolate the short gaps of a clip, rotations along the shorter arc.
-
-    Everything else is interpolated linearly. Frames before the first and after the last one stay
-    missing.
-
-    ``longest``: number of frames of the longest gap to interpolate; all gaps if omitted.
-    """
+    """Interpolate gaps of up to ``longest`` frames (None: all), but not beyond the clip's ends."""
     gaps = inner_gaps(clip)
     limit = clip.timing.n_frames if longest is None else longest
     closed = tuple(gap for gap in gaps if gap[1] - gap[0] <= limit)
@@ -93,10 +87,7 @@ def common_frames(first: Captured, second: Captured) -> Ints:
 
 
 def joined_tracks(first: Captured, second: Captured) -> Captured:
-    """Return a clip with the frames of both clips; the first takes precedence.
-
-    Raises ``RigError`` if the timelines, joints or points differ.
-    """
+    """Return the frames of both clips; the first takes precedence. RigError if they don't match."""
     a, b = first.timing, second.timing
     if (a.frame_rate, a.first_frame, a.start) != (b.frame_rate, b.first_frame, b.start):
         raise RigError("tracks of one person: expected the same frame rate and first frame")

@@ -46,19 +46,11 @@ def compare(
     n_poses: int = 8,
     frames: FrameRange | None = None,
 ) -> Difference:
-    """Compare two actors, regardless of their placements in a scene.
+    """Compare two actors joint by joint (by name) and vertex by vertex, wherever they stand.
 
-    Joints are matched by name. Vertices are compared by index if the triangles are the same,
-    otherwise by the closest point on the other surface, in both directions. Lengths of the second
-    are converted to the unit of the first if both are known. The actors are left in the pose in
-    which their meshes are farthest apart.
-
-    ``first``, ``second``: the first is the reference: lengths are given in its unit and as
-    fractions of its size. ``n_poses``: number of test poses for figures without motion; see
-    ``steps_of``. ``frames``: (int or None, int or None), first frame and end frame (exclusive), in
-    the numbering of the first motion. Returns a result with a mismatch for everything that only one
-    actor has. Raises ``RigError`` if the range contains no frame, or surfaces differ and SciPy is
-    missing.
+    Vertices are paired by index if the triangles are the same, otherwise with the closest point of
+    the other surface, both ways. The first is the reference, and lengths are in its unit. Actors
+    are left in the pose in which their meshes are farthest apart. RigError if the range is empty.
     """
     steps = steps_of(first, second, n_poses, frames)
     return _Comparison(first, second, skinning or Skinning(), steps).run()
@@ -80,10 +72,7 @@ class Difference:
     """Unit of the first figure, as in ``Figure.unit``."""
 
     def exceeds(self, tolerance: float) -> bool:
-        """Return whether any difference exceeds a tolerance.
-
-        ``tolerance``: limit for lengths as fractions of the size, angles in radians, and weights.
-        """
+        """Return whether a length (fraction of the size), angle or weight exceeds a tolerance."""
         # Written as "not within" rather than "more than", so that NaN exceeds any tolerance.
         within = all(measure.relative(self.size) <= tolerance for measure in self.measures)
         return bool(self.mismatches) or not within or not self.measures
@@ -118,11 +107,7 @@ class Measure:
 
 
 def content_notes(first: Figure, second: Figure) -> list[Diagnostic]:
-    """Return notes about materials, parts, blend shapes and animations that differ.
-
-    ``first``, ``second``: the figures. Kinds of content that only one figure has are not reported:
-    few formats store them.
-    """
+    """Note what differs in content that both have: few formats store all kinds of it."""
     notes = []
     for what, names in (
         ("parts", _parts),
@@ -352,11 +337,7 @@ class _Comparison:
 
 
 class _Tally:
-    """Accumulator of a measure over all steps.
-
-    ``worst``: largest value so far, negative before the first. ``name``, ``kind``: as in
-    ``Measure``. ``items``: names of the joints; empty for vertices, which have indices.
-    """
+    """Running maximum of a ``Measure``; ``worst`` is negative before the first step."""
 
     def __init__(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> None:
         self.name, self.kind, self.items = name, kind, items

@@ -47,11 +47,7 @@ class Pairs:
 
 
 def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
-    """Match joints by name, or by index if no name matches and the joint counts are equal.
-
-    Returns matched joints, with mismatches for unmatched joints and joints with different parents,
-    and a note if the order differs, as skins and clips refer to joints by index.
-    """
+    """Match joints by name, or all by index if no name matches; note what does not match."""
     pairs = pair_names(_unique_labels(first), _unique_labels(second), "joint")
     parents = [
         np.append(np.arange(len(pairs.first)), -1)[_places(found, skeleton.n_joints)[above]]
@@ -106,12 +102,7 @@ def _places(found: Ints, count: int) -> Ints:
 
 
 def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
-    """Match two lists of names.
-
-    ``first``, ``second``: names, each list without duplicates. ``what``: the kind of item:
-    ``"joint"``, ``"DOF"`` or ``"point"``. Returns matched names; if no name matches and both lists
-    have the same length, matched by index, with a note.
-    """
+    """Match unique names; if none matches and the counts are equal, match by index with a note."""
     numbers = {name: number for number, name in enumerate(second)}
     shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]
     if not shared and len(first) == len(second) > 0:
@@ -130,27 +121,16 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
 
 
 def rotation_distance(first: Floats, second: Floats) -> Floats:
-    """Return the angle between rotations: 2 asin(|A - B| / sqrt(8)), Frobenius norm.
+    """Return the angle (...) in radians between rotations, 2 asin(|A - B| / sqrt(8)) (Frobenius).
 
     It stays accurate for small angles, unlike the arc cosine of the trace.
-
-    ``first``, ``second``: (..., 3, 3), rotation matrices. Returns (...), radians, 0 to pi.
-
-    >>> quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> round(float(rotation_distance(np.eye(3), quarter)), 12) == round(np.pi / 2, 12)
-    True
     """
     norm = np.linalg.norm(first - second, axis=(-2, -1))
     return 2.0 * np.arcsin(np.minimum(norm / np.sqrt(8.0), 1.0))
 
 
 def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
-    """Return the L1 distance of each vertex's weights: sum over joints of |w - w'|.
-
-    The maximum for rows that sum to 1 is 2, if no joint has weight in both.
-
-    Returns (V,), 0 for equal rows, regardless of the order of influences and of duplicate joints.
-    """
+    """Return each vertex's sum over joints of |w - w'| (V,): 2 if no joint has weight in both."""
     # Unmatched joints of the second skin get indices that the first skin does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
@@ -163,11 +143,7 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
 
 
 def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
-    """Interpolate a skin's weights at points of its surface by barycentric coordinates.
-
-    ``triangles``: (T, 3), triangles of that mesh. Returns influences of N vertices; a vertex may
-    list a joint several times.
-    """
+    """Interpolate weights (barycentric) at points of the surface; a row may repeat a joint."""
     corners = skin_rows(skin, triangles[found.triangles].ravel())
     factors = np.repeat(found.barycentric.ravel(), np.diff(corners.starts))
     return replace(corners, starts=corners.starts[::3], weights=factors * corners.weights)

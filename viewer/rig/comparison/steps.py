@@ -67,16 +67,11 @@ class Steps:
 
 
 def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | None = None) -> Steps:
-    """Choose the poses in which two actors are compared.
+    """Choose the poses in which two actors are compared, without changing them.
 
-    Two motions are compared frame by frame at the frame rate of the first, each from its own
-    start, up to the end of the shorter. Figures at rest are compared in the poses of their files
-    and, for DOFs with the same names, in ``n_poses`` test poses within the limits of both. The
-    test poses depend only on names and limits.
-
-    ``first``, ``second``: not modified. ``n_poses``: test poses for figures without motion.
-    ``frames``: (int or None, int or None), first frame and end frame (exclusive), in the numbering
-    of the first motion. Raises ``RigError`` if the range contains no frame.
+    Motions are compared frame by frame at the rate of the first, each from its own start, to the
+    end of the shorter; figures at rest in the poses of their files and in ``n_poses`` test poses
+    within the limits of both. These depend only on names and limits. RigError for an empty range.
     """
     if first.clip is not None and second.clip is not None:
         return _motion_steps(first, second, frames)

@@ -66,10 +66,7 @@ class BodyLegs:
         return self.soles.heights(worlds, np.append(up, 0.0), 1.0)
 
     def straightness(self, worlds: Floats) -> Floats:
-        """Return the distance from hip to ankle relative to the distance in the rest pose: (N, L).
-
-        Legs that are folded at rest are compared with straight legs.
-        """
+        """Return hip to ankle relative to rest (N, L), or to a straight leg if legs rest folded."""
         usual = np.where(self.extensions > _FOLDED, self.extensions, 1.0)
         return _extensions(worlds, self.legs) / usual
 
@@ -107,10 +104,7 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
 
 
 def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) -> BodyLegs | None:
-    """Return the legs of a figure; None if they cannot be solved.
-
-    ``up``: (3,), the up axis of the figure.
-    """
+    """Return the legs of a figure; None if they cannot be solved."""
     skeleton = figure.require_skeleton()
     weights = figure_pose(figure).shape_weights
     if clip.shape_weights is not None:
@@ -211,11 +205,7 @@ def chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
 
 
 def chain_worlds(clip: SampledClip, chains: Chains, translations: Floats, scales: Floats) -> Floats:
-    """Return the world matrices of some joints in every row of a clip: (N, K, 4, 4).
-
-    ``translations``, ``scales``: (J, 3), rest translations and local scale factors of all joints;
-    the clip's scales precede these.
-    """
+    """Return the world matrices (N, K, 4, 4) of some joints; a clip's own scales come first."""
     joints = chains.joints
     factors = scales[None, joints] if clip.scales is None else clip.scales[:, joints]
     linear = quaternion_to_matrix(clip.rotations[:, joints]) * factors[:, :, None, :]

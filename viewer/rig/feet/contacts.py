@@ -64,11 +64,9 @@ def foot_contacts(
     ease: float = 0.0,
     slips: float = 1.0,
 ) -> list[list[Contact]]:
-    """Return the contacts of every foot, in time order.
+    """Return each foot's contacts in time order; ``spans`` are row ranges without gaps.
 
-    ``spans``: ranges of rows without gaps. ``rate``: rows per second. ``up``: (3,), the up axis.
-    ``ease``: seconds over which the hold rises and falls at the ends of a contact. ``slips``: how
-    many times faster along the ground the feet may move, as ``limits.SLIPS``.
+    ``ease``: seconds over which the hold rises and falls; ``slips``: as ``limits.SLIPS``.
     """
     # For every foot and every span without gaps:
     #   1. ball and heel separately: rows in which the point is low on the foot and slow (_stands);
@@ -165,13 +163,7 @@ def _stands(
 def ground_level(
     contacts: Sequence[Sequence[Contact]], size: float, clearance: float
 ) -> tuple[float, bool]:
-    """Return the height of feet on the ground, and whether the ground is at height 0.
-
-    This is the height at which feet are on the ground longest or, if the durations are similar, a
-    height that is consistent with a ground at height 0, as on the lowest step of stairs.
-
-    ``contacts``: contacts of every foot, at least one.
-    """
+    """Return the height at which feet stand, and whether the ground is at height 0."""
     # Contacts within LEVEL of one another are on the same floor. For each contact, count the rows
     # of all contacts on its floor: the floor with most rows is where the person stands longest. A
     # floor near height 0, where most files put the ground, wins with a third of that.
@@ -194,10 +186,7 @@ def ground_level(
 
 
 def step_height(contact: Contact, level: float, size: float) -> float:
-    """Return the height of the ground under a contact relative to the level of most contacts.
-
-    Small differences, and the height of a foot on tiptoe, are treated as 0.
-    """
+    """Return the ground under a contact above ``level``; 0 for small steps and for tiptoe."""
     height = contact.height - level
     is_tiptoe = abs(contact.tilt) > limits.TILTED * size and abs(height) < limits.TIPTOE * size
     return 0.0 if is_tiptoe or abs(height) < limits.LEVEL * size else height
@@ -220,11 +209,9 @@ def mean_speeds(places: Floats, rate: float) -> Floats:
 def slowest_points(
     foot: FootPath, spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
 ) -> Floats:
-    """Return the speed along the ground of a foot: (N,), that of its slowest point on the ground.
-
-    A foot that rolls or turns about its ball or its heel does not slide, although the other end
-    moves.
-    """
+    """Return each row's speed (N,) along the ground of the foot's slowest point on the ground."""
+    # A foot that rolls or turns about its ball or its heel does not slide, although the other end
+    # moves.
     low, result = foot.lowest(up), np.zeros(len(foot.toe))
     flat = np.eye(3) - np.outer(up, up)
     for first, last in spans:
@@ -247,10 +234,7 @@ _MOST = 500  # maximum number of candidates
 def ground_velocity(
     feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
 ) -> Floats | None:
-    """Return the velocity of the ground, (3,) per second; None if it does not move.
-
-    The parameters are those of ``foot_contacts``.
-    """
+    """Return the velocity (3,) of a moving ground per second; None if it does not move."""
     # The velocity that most rows of the lowest foot share, within GROUND_SAME: every one of up to
     # 500 rows is a candidate, the one with most neighbours wins, and the median of its neighbours
     # is the estimate. A mean over all rows would be biased by the swings, in which the lowest foot

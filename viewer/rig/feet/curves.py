@@ -20,11 +20,7 @@ from viewer.rig.arrays import Floats
 
 
 def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
-    """Return the curves that minimise the sum above, independently of each other: (..., N, C).
-
-    ``targets``: (..., N, C), targets t of curves with C components. ``weights``: (..., N), weights
-    w, greater than 0. ``span``: length s in rows.
-    """
+    """Minimise the sum above for curves t (..., N, C), weights w (..., N) > 0, length s in rows."""
     from scipy.linalg import solveh_banded  # loads for 0.3 s, and only planted feet need it
 
     # The derivative of the sum by every c_k is 0: (W + s^4 D^T D) c = W t with W = diag(w) and the

@@ -65,15 +65,10 @@ class RestingHeight:
 def ground_of(
     lowest: Floats, present: Bools, step: float, size: float, likely: Sequence[float] = (0.0,)
 ) -> Ground:
-    """Return the height at which feet rest, if the motion determines it.
-
-    This is the level on which the feet rest longest, or a likely level with a similar duration. The
-    height is unknown if they rest nearly as long on another level, or on a likely level that is a
-    step away, or if they rest on two lower levels, as on descending stairs.
-
-    ``lowest``: (F,), height of the lower sole in every frame. ``present``: (F,), frames in which
-    the actor is present.
-    """
+    """Return the height at which feet rest, if it is certain; ``lowest`` (F,): the lower sole's."""
+    # The level on which feet rest longest, or a likely level on which they rest nearly as long. It
+    # is unknown if another level may be the ground, or if feet rest on two lower levels, as on
+    # descending stairs.
     rests = lowest[resting_frames(lowest, present, step, size)]
     levels = _levels(rests, size) if len(rests) > _RESTS * present.sum() else ()
     if not levels:
@@ -88,10 +83,7 @@ def ground_of(
 
 
 def resting_height(actor: Actor, up: str) -> RestingHeight | None:
-    """Return the height at which an actor's feet rest; None unless two feet are found by name.
-
-    ``up``: either "y" or "z", up axis of the scene.
-    """
+    """Return the height at which an actor's feet rest; None unless two feet are found by name."""
     figure, motion = actor.figure, actor.joint_motion
     if figure.skeleton is None or motion is None:
         return None
@@ -129,12 +121,10 @@ def _level_at(rests: Floats, height: float, size: float) -> list[_Level]:
 
 
 def _has_rival(levels: Sequence[_Level], customs: Sequence[_Level], size: float) -> bool:
-    """Return whether a level other than the longest may be the ground.
-
-    A likely level with few frames just below the longest is not a rival, because feet have sunk
-    into the ground there. It is a rival if it is a step below, as for a person who sits or stands
-    on a box, or above, because feet may have sunk into the ground at the longest level.
-    """
+    """Return whether a level other than the longest may be the ground."""
+    # A likely level with few frames just below the longest is no rival: feet have sunk into the
+    # ground there. It is one if it is a step below, as for a person who sits or stands on a box, or
+    # above, because feet may have sunk into the ground at the longest level.
     longest, count = levels[0]
     long = [h for h, n in levels[1:] if n > _CLEAR * count and abs(h - longest) > _ROLLS * size]
     steps = [h for h, _ in customs if longest - h > _STEP * size or h - longest > _ROLLS * size]
@@ -144,10 +134,7 @@ def _has_rival(levels: Sequence[_Level], customs: Sequence[_Level], size: float)
 def resting_frames(
     lowest: Floats, present: Bools, step: float, size: float, seconds: float = _LONG
 ) -> Bools:
-    """Return a mask of the frames in which the lower foot rests at a constant height: (F,).
-
-    ``lowest``, ``present``, ``step``, ``size``: as for ``ground_of``.
-    """
+    """Return a mask (F,) of frames in which the lower foot rests at a constant height."""
     rests = np.zeros(len(lowest), dtype=np.bool_)
     width = max(1, round(seconds / step))
     count = len(lowest) - width

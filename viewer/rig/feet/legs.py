@@ -59,14 +59,9 @@ def leg_rotations(
     drop: Floats,
     shifts: Sequence[Floats],
 ) -> Floats:
-    """Return local rotations that bring the ankles of all legs to their targets.
+    """Return local rotations (N, J, 4) that bring ankles to their targets; feet keep their world's.
 
-    Feet keep their orientation in the world.
-
-    ``rotations``: (N, J, 4), local rotations, unit quaternions. ``world``: (N, J, 4, 4), world
-    matrices of the same poses. ``parents``: (J,), -1 for a root. ``drop``: (N, 3), translation of
-    the whole body. ``shifts``: sequence of (N, 3), translation of each leg's ankle, instead of
-    ``drop``.
+    ``drop`` (N, 3) translates the body; ``shifts``, (N, 3) a leg, the ankles instead of ``drop``.
     """
     result = rotations.copy()
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
@@ -97,18 +92,15 @@ def leg_rotations(
 def bend(
     hips: Floats, knees: Floats, ankles: Floats, targets: Floats, axis: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the rotations of thigh and shin that bring the ankle to a target.
+    """Return world rotations (F, 4) of thighs and shins, R' = Q R, that bring ankles to targets.
 
-    Hip and knee rotate in the leg's plane until the distance from hip to ankle equals the target's
-    (law of cosines). Then the whole leg rotates about the hip by the smallest angle that points it
-    at the target, so the knee keeps its direction. The nearer a leg is to straight, the more the
-    knee points forwards instead, perpendicular to its axis.
-
-    ``hips``, ``knees``, ``ankles``: (F, 3), positions. ``targets``: (F, 3), targets of the ankle;
-    those out of reach are approached as closely as possible. ``axis``: (F, 3), unit vectors along
-    the axis of the knee: the normal of a bent leg's plane, thigh x shin. Returns (F, 4), unit
-    quaternions in the space of the positions: R' = Q R.
+    The knee keeps its direction, or points forwards the straighter the leg is. ``axis`` (F, 3):
+    unit normal of a bent leg's plane, thigh x shin. Targets out of reach are approached.
     """
+    # Everything is first found for a leg that points along its old line from hip to ankle. The
+    # distance to the target fixes the angle at the hip by the law of cosines, b^2 = a^2 + d^2 -
+    # 2 a d cos; the knee stays on the side ahead of the line, on which it is. Then the leg as a
+    # whole rotates about the hip by the smallest angle that points the line at the target.
     upper, lower = knees - hips, ankles - knees
     a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
     line = unit(ankles - hips)
@@ -129,15 +121,13 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats) -> Floats:
-    """Return the axis of a knee in every frame, a unit vector fixed to the thigh: (N, 3).
+    """Return a knee's axis in each frame, a unit vector fixed to the thigh (N, 3).
 
-    This is the mean normal of the leg's plane, thigh x shin, weighted by the fourth power of the
-    sine of the bend; ``across`` has the weight of a bend of 15 degrees.
-
-    ``thighs``: (N, 3, 3), world rotations of the thigh. ``points``: ((N, 3), (N, 3), (N, 3)), world
-    positions of hip, knee and ankle. ``across``: (N, 3), directions from right to left: the axis of
-    a knee that hardly bends.
+    ``across`` (N, 3): from right to left, the axis of a knee that hardly bends.
     """
+    # The mean normal of the leg's plane in the axes of the thigh, weighted by the fourth power of
+    # the sine of the bend, as a straight leg has no plane. ``across`` weighs like a bend of 15
+    # degrees.
     hips, knees, ankles = points
     upper, lower = knees - hips, ankles - knees
     bones = np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
@@ -166,12 +156,7 @@ def lowering(
     up: Floats,
     extended: float = 1.0,
 ) -> Floats:
-    """Return how far the body must be lowered so that all ankle targets are in reach.
-
-    ``points``: (N, J, 3), world positions of the joints. ``shifts``: sequence of (N, 3),
-    translation of each leg's ankle. ``rate``: frames per second. ``up``: (3,), the up axis. Returns
-    (N,), distances along the up axis, smooth over time.
-    """
+    """Return how far along ``up`` the body must sink (N,), smoothly, to bring ankles into reach."""
     needed = np.zeros(len(points))
     for leg, shift in zip(legs, shifts, strict=True):
         hips, knees, ankles = (points[:, joint] for joint in (leg.hip, leg.knee, leg.ankle))
@@ -204,13 +189,10 @@ _FEWEST = 4  # minimum number of legs
 
 
 def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
-    """Return the legs of an animal with at least four legs, left ones first.
+    """Return the legs of an animal with at least four, left ones first; else none.
 
-    ``parents``: (J,), -1 for a root. ``points``: (J, 3), positions of the joints of a standing
-    animal. ``up``: (3,), the up axis. Hip, knee and ankle are the ends of its two long bones,
-    without a scapula. The ankle is the hock of a hind leg and the wrist of a front leg. Chains
-    without a counterpart on the other side, such as a tail, are omitted. Empty if there are fewer
-    than four legs.
+    Hip, knee and ankle are the ends of the two long bones, without a scapula; the ankle is a hind
+    leg's hock or a front leg's wrist. Chains without a counterpart, such as a tail, are left out.
     """
     heights = points @ up - (points @ up).min()
     size = float(heights.max())

@@ -101,11 +101,10 @@ def plant(
     up: Floats,
     feet: list[FootPath] | None = None,
 ) -> tuple[SampledClip, PlantedFeet]:
-    """Return a motion with its feet planted during contacts, unchanged if it would not improve.
+    """Plant the feet of a motion during contacts, unless that would not improve it.
 
-    ``clip``: rows in the order of frames. ``worlds``: its matrices, as of ``body``. ``up``: (3,).
-    ``feet``: the paths of the feet that decide when those of the body stand: those of the source of
-    a driven figure; None for the body's own, which may slide.
+    ``worlds`` are the matrices of ``body``. ``feet``: paths that decide when the body's feet stand,
+    those of the source of a driven figure; None for the body's own, which may slide.
     """
     is_own = feet is None
     feet = body.paths(worlds) if feet is None else feet
@@ -236,10 +235,7 @@ class FootPlan:
             yield contact, slice(contact.start, contact.stop), ground
 
     def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
-        """Return the horizontal displacements of a planted foot from row to row.
-
-        ``points``: ((N, 3), (N, 3)), paths of the ball and the heel.
-        """
+        """Return a planted foot's horizontal displacements from row to row, (n, 3)."""
         rows = slice(contact.start, contact.stop)
         toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
         moved = np.where(contact.on_toe[:, None], toe, heel)
@@ -262,10 +258,7 @@ class FootPlan:
         return result
 
     def gap(self, heights: Floats) -> float:
-        """Return the largest distance of a planted foot from the ground.
-
-        ``heights`` are the heights of the lowest point of each foot, (N, L).
-        """
+        """Return planted feet's largest distance from the ground; ``heights`` (N, L): of soles."""
         stands, largest = self.holds() >= 1.0, 0.0
         for foot in range(len(self.contacts)):
             for _, rows, ground in self.stances(foot):
@@ -274,11 +267,7 @@ class FootPlan:
         return largest
 
     def floor(self, foot: int) -> Floats:
-        """Return the height below which a foot with contacts must not sink: (N,).
-
-        This is the ground of the previous or next contact, whichever is lower. If the source's foot
-        sinks below this ground, the limit follows it.
-        """
+        """Return the height (N,) below which a foot must not sink: the lower contact around it."""
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))
         after = np.searchsorted([contact.start for contact in contacts], rows, side="right")
@@ -287,6 +276,7 @@ class FootPlan:
         levels = np.array(self.grounds[foot])
         stands = np.array([contact.height for contact in contacts])
         lowest = np.minimum(levels[before], levels[after])
+        # Where the source's foot itself sinks below this ground, the limit follows it.
         sunk = np.minimum(stands[before], stands[after]) - path.lowest(self.up)
         return lowest - np.maximum(sunk - limits.SUNK * self.size, 0.0)
 
@@ -299,11 +289,7 @@ def foot_plan(
     up: Floats,
     ease: float = 0.0,
 ) -> FootPlan:
-    """Return the contacts of the source, and the heights of the ground under the figure.
-
-    ``feet``, ``spans``, ``rate``, ``up``: as in ``FootPlan``. ``ease``: duration of the beginning
-    and the end of a contact, as in ``foot_contacts``.
-    """
+    """Return the contacts of the source and the heights of the ground under the figure."""
     size, clearance = shape
     contacts = foot_contacts(feet, spans, rate, size, up, ease)
     if not any(contacts):
@@ -356,10 +342,7 @@ _TILTED = (np.cos(np.radians(55.0)), np.cos(np.radians(35.0)))
 
 
 def levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan) -> SampledClip:
-    """Return a motion whose standing soles are level.
-
-    ``worlds``: (N, K, 4, 4), their world matrices.
-    """
+    """Return a motion whose standing soles are level."""
     legs, up = body.legs, plan.up
     ankles, toes = [leg.ankle for leg in legs], [leg.toe for leg in legs]
     old = matrix_to_quaternion(unscaled(worlds[..., :3, :3]))
@@ -480,21 +463,15 @@ def _foot_shifts(
     heights: Floats,
     straight: Floats,
 ) -> tuple[list[Floats], Floats]:
-    """Return the translations of all feet and of the body.
+    """Return translations of every foot, (N, 3) each, and of the body, (N, 3).
 
-    A foot is corrected while it is on the ground. The body smoothly follows planted feet on
-    straight legs, so that these legs need not bend; other feet follow the body.
-
-    ``plan``: positions and times at which the feet must be planted, with at least one contact.
-    ``points``: list of ((N, 3), (N, 3)), paths of the balls and the heels. ``heights``: (N, L),
-    heights of the soles. ``straight``: (N, L), distance from hip to ankle relative to that of the
-    rest pose, see ``BodyLegs.straightness``. Returns ``shifts``: list of (N, 3); ``sway``: (N, 3).
+    ``heights`` (N, L): of the soles. ``straight`` (N, L): see ``BodyLegs.straightness``.
     """
-    # Feet and body depend on each other: a foot in the air moves with the body, and the body
-    # follows the feet on the ground. Two rounds settle this. 1. Feet relative to a body that is
-    # moved by one constant, the usual rise. 2. The body: the mean of its planted feet, and the
-    # quick part that they share, of which a second pass finds what the first one left. 3. Feet
-    # relative to it.
+    # The body follows planted feet, so that straight legs need not bend. Feet and body depend on
+    # each other: a foot in the air moves with the body, and the body follows the feet on the
+    # ground. Two rounds settle this. 1. Feet relative to a body that is moved by one constant, the
+    # usual rise. 2. The body: the mean of its planted feet, and the quick part that they share, of
+    # which a second pass finds what the first one left. 3. Feet relative to it.
     every = [_wanted(plan, foot, points[foot], heights[:, foot]) for foot in range(len(points))]
     # A bent leg can lengthen, so its foot needs no help of the body; a straight one cannot.
     bent = falling((straight - _STRAIGHT[0]) / (_STRAIGHT[1] - _STRAIGHT[0]))
@@ -510,19 +487,16 @@ def _foot_shifts(
 
 
 def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
-    """Return the corrections of a foot.
-
-    At the beginning and end of a contact, the foot follows the source's foot. A capture's own foot
-    does not follow itself: there its correction only gets weaker, as its own steps are noise.
-    """
+    """Return the corrections of a foot."""
     path = plan.feet[foot]
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
     is_flat, holds = np.zeros(len(heights), dtype=np.bool_), np.zeros(len(heights))
     low = path.lowest(plan.up)
     for contact, rows, ground in plan.stances(foot):
         # With hold h, the foot is to move by (1 - h) times the step of the source's foot: not at
-        # all while it stands, like the source when it leaves. The correction is what is missing,
-        # and its mean is 0, so that no direction of the slide is preferred.
+        # all while it stands, like the source when it leaves. A capture's own steps are noise, so
+        # there the correction only gets weaker. It is what is missing, and its mean is 0, so that
+        # no direction of the slide is preferred.
         loose = np.zeros_like(contact.hold) if plan.is_own else 1.0 - contact.hold
         wanted = loose[:, None] * plan.steps((path.toe, path.heel), contact)
         steps = np.cumsum(plan.steps(points, contact) - wanted, axis=0)
@@ -536,10 +510,8 @@ def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: F
 
 
 def _level(low: Floats, contact: Contact) -> Floats:
-    """Return the heights from which the source's foot rises in the rows of a contact: (N,).
-
-    A standing foot may drift; when it lifts, its correction continues without a jump.
-    """
+    """Return the heights (N,) from which the source's foot rises in the rows of a contact."""
+    # A standing foot may drift. When it lifts, its correction continues from there without a jump.
     held = np.flatnonzero(contact.hold >= 1.0)
     if len(held) == 0:
         return np.full_like(low, contact.height)
@@ -547,10 +519,7 @@ def _level(low: Floats, contact: Contact) -> Floats:
 
 
 def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0) -> list[Floats]:
-    """Return the translations of the feet, which approach ``base`` away from contacts: (N, 3).
-
-    ``n_lifts`` is the number of passes that lift sinking feet.
-    """
+    """Return feet's translations (N, 3), ``base`` off contacts; ``n_lifts``: passes of lifting."""
     # Everything is relative to the body, base: then 0 is the target of a foot in the air, which is
     # what smooth curves with weight 1 decay to. Each foot has two curves, because rows can be held
     # at a height without a horizontal target: rows [0, count) of the arrays are horizontal, with 3
@@ -596,11 +565,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0
 
 
 def _calmed(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
-    """Return the targets of held rows without sudden jumps of the source, which the feet then keep.
-
-    Where the whole body of a recording jumps for a frame, a foot that stays in place makes the knee
-    jump instead.
-    """
+    """Return the targets of held rows without the source's sudden jumps, which knees would make."""
     # A jump is what a curve of 0.03 s does not follow. Below 0.2 % of the body (3 mm) it is noise
     # that the foot may hide, above 0.4 % it is passed on, in between partly. Heights pass on at
     # most 0.07 % (1 mm): a foot above the ground is seen more easily than one that slips.
@@ -631,11 +596,7 @@ def _smoothed(plan: FootPlan, targets: Floats, weights: Floats, seconds: float =
 
 
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
-    """Return the mean translation of the planted feet, (N, 3), smooth over time.
-
-    ``weights`` are the weights of the feet, (N, L); ``usual`` is the translation without planted
-    feet, (N, 3).
-    """
+    """Return planted feet's mean translation (N, 3), smooth over time; ``usual`` without any."""
     # In each row, the weighted mean of the shifts of the feet on the ground. The usual translation
     # takes part with a small weight: it decides in flight and hardly counts beside a planted foot,
     # without a division by 0 or a case in between.
@@ -659,11 +620,10 @@ def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) 
 
 
 def _shake(plan: FootPlan, shifts: list[Floats]) -> Floats:
-    """Return the quick translation that all planted feet have in common: (N, 3).
-
-    Noise of the source's root moves body and feet alike. If the feet stay in place and the body
-    does not follow them, this noise moves the knees. Noise of one leg must not move the others.
-    """
+    """Return the quick translation (N, 3) that planted feet share: noise of the source's root."""
+    # This noise moves body and feet alike: if the feet stay in place and the body does not follow
+    # them, it moves the knees. Noise of one leg must not move the others.
+    #
     # Quick: what a smooth curve of 0.1 s does not follow. The weight of a foot is the fourth power
     # of its smoothed hold, so that a foot counts only well inside a contact, where its shift is
     # exact.
@@ -689,11 +649,7 @@ _STILL = 10.0  # smallest acceleration with which others are compared, rad/s^2
 def _knee_accelerations(
     worlds: Floats, legs: Sequence[Leg], spans: Sequence[tuple[int, int]], rate: float
 ) -> Floats:
-    """Return the largest angular acceleration of each knee: (L,) in rad/s^2.
-
-    ``worlds``: (N, K, 4, 4), world matrices of the joints. ``spans``: ranges of rows without gaps.
-    ``rate``: rows per second.
-    """
+    """Return the largest angular acceleration of each knee (L,), rad/s^2."""
     result = np.zeros(len(legs))
     for number, leg in enumerate(legs):
         hips, knees, ankles = (worlds[:, joint, :3, 3] for joint in (leg.hip, leg.knee, leg.ankle))

@@ -44,12 +44,7 @@ class Soles:
     """(N, 4). The point of the sole below each ankle at rest, in the ankle's space, homogeneous."""
 
     def heights(self, world: Floats, axis: Floats, scale: float) -> Floats:
-        """Return the height of the lowest point of each foot.
-
-        ``world``: (F, J, 4, 4), joint space to figure space. ``axis``: (4,), row of the placement
-        matrix that yields the height. ``scale``: scene units per figure unit. Returns (F, N),
-        heights along the scene's up axis.
-        """
+        """Return each foot's lowest height (F, N); ``axis`` (4,): placement's row that gives it."""
         points = np.append(self.places, np.ones((len(self.places), 1)), axis=1)
         result = np.full((len(world), len(self.joints)), np.inf)
         for mover in set(self.movers.tolist()):
@@ -77,10 +72,7 @@ def _axis(figure: Figure) -> int:
 
 
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
-    """Return the soles of a skeleton whose joint names identify two feet, or None.
-
-    ``is_bound``: whether its bindings are valid; otherwise joints are used instead of the mesh.
-    """
+    """Return the soles if names identify two feet; of joints, not the mesh, unless ``is_bound``."""
     skeleton = figure.skeleton
     if skeleton is None:
         return None
@@ -93,10 +85,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
 
 
 def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool) -> Soles:
-    """Return the soles of the given feet of a figure with a skeleton.
-
-    ``is_bound``: whether its bindings are valid; otherwise joints are used instead of the mesh.
-    """
+    """Return the soles of given feet; of joints, not the mesh, unless ``is_bound``."""
     skeleton = figure.require_skeleton()
     sole, _ = extent(figure)
     parts = []

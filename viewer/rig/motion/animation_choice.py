@@ -20,14 +20,7 @@ NONE = "none"
 
 
 def animation_labels(figure: Figure) -> tuple[str, ...]:
-    """Return a unique label for each animation: its name, or its number if it has none.
-
-    >>> from viewer.rig.mesh import Mesh
-    >>> named = [Animation(name, 0.0, 1.0, lambda: None) for name in ("walk", "", "walk")]
-    >>> figure = Figure("f", Mesh([[0, 0, 0]], [[0, 0, 1]], [[0, 0, 0]]), animations=tuple(named))
-    >>> animation_labels(figure)
-    ('walk', 'animation 2', 'walk (2)')
-    """
+    """Return unique labels: the name, "animation 2" without one, "walk (2)" if it repeats."""
     labels, counts = [], Counter[str]()
     for number, animation in enumerate(figure.animations, 1):
         counts[animation.name] += 1
@@ -38,12 +31,10 @@ def animation_labels(figure: Figure) -> tuple[str, ...]:
 
 
 def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None:
-    """Return the animation that a text selects.
+    """Return the animation that a name, label or number from 1 selects; RigError if there is none.
 
-    ``wanted``: a name or label, matched exactly or, if there is no exact match, ignoring case; a
-    number from 1; ``NONE``; or an empty string for the first animation. The result is None for
-    ``NONE``, and if there are no animations and none is requested. Raises ``RigError`` if there is
-    no such animation.
+    An exact match precedes one that ignores case. An empty text selects the first, if there is one;
+    ``NONE`` selects none.
     """
     longest = max(figures, key=lambda figure: len(figure.animations), default=None)
     every = () if longest is None else longest.animations
@@ -74,11 +65,9 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
 
 
 def counterpart(figure: Figure, animation: Animation) -> int:
-    """Return the index of a figure's counterpart of another figure's animation, or -1.
-
-    An animation of a file may move several figures, and two of its animations may have the same
-    name. If the file's numbers are unknown, the range distinguishes animations of equal name.
-    """
+    """Return the index of a figure's part of another's animation, or -1."""
+    # An animation of a file may move several figures, and two of its animations may have the same
+    # name. If the file's numbers are unknown, the range tells these apart.
     span = animation.start, animation.end
     found = [
         (other is not animation, (other.start, other.end) != span, index)
@@ -94,11 +83,7 @@ def _is_same(one: Animation, other: Animation) -> bool:
 
 
 def own_first(figure: Figure, others: Sequence[Figure]) -> int:
-    """Return 0 if a figure shares no animation with the others of its file, else -1.
-
-    Such a figure is an independent character, which plays its first animation regardless of the
-    others.
-    """
+    """Return 0 if a figure shares no animation with others and so plays its own first, else -1."""
     mine = figure.animations
     shared = any(
         counterpart(other, animation) >= 0
@@ -110,14 +95,10 @@ def own_first(figure: Figure, others: Sequence[Figure]) -> int:
 
 
 def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) -> None:
-    """Let an actor play one of its figure's animations, or none, in place.
+    """Let an actor play one of its animations (-1: none), in place; ``clip``: its edited keys.
 
-    Joints that the animation does not move return to the pose stored in the file. The figure's
-    placement and blend shapes that neither animation moves are unchanged.
-
-    ``actor``: an actor, which has a pose if it has animations. ``clip``: edited keys of the
-    animation; the file's keys if omitted. Raises ``FormatError`` if the keys are invalid; the actor
-    is then unchanged.
+    Joints that it does not move return to the file's pose; the placement and blend shapes stay.
+    FormatError if the keys are invalid: the actor is then unchanged.
     """
     chosen: TransformClip | None = None
     if index >= 0:
@@ -141,10 +122,7 @@ def _returned(actor: Actor, pose: Pose) -> Pose:
 
 
 def has_own_animations(actor: Actor) -> bool:
-    """Return whether an actor has animations and plays either one of them, edited or not, or none.
-
-    False if constraints also move its joints, because keys do not contain their effect.
-    """
+    """Return whether keys alone move an actor with animations: not if constraints do, too."""
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None or skeleton.constraints:
         return False
@@ -159,12 +137,9 @@ def keeps_keys(scene: Scene, actor: Actor) -> bool:
 def own_animations(
     actor: Actor, only_played: bool = False, refused: list[FormatError] | None = None
 ) -> tuple[TransformClip, ...]:
-    """Return the animations of an actor, including edits of the one that it plays.
+    """Return an actor's animations that have keys, the played one with its edits.
 
-    Animations without keys are omitted.
-
-    ``actor``: see ``has_own_animations``. ``only_played``: return only the one that it plays.
-    Raises ``FormatError`` if the keys of an animation are invalid, and ``refused`` is not given.
+    FormatError if keys are invalid and ``refused`` does not collect it.
     """
     played = actor.transforms
     if only_played:

@@ -107,15 +107,9 @@ class ParameterMotion:
 
 
 def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return a body motion as a clip of a figure; joints are matched by name.
+    """Return a clip of a figure with the family's joint names, and notes about data not used.
 
-    If the root rotates about the origin, the figure's translation is t = T - J0 + R J0, where
-    J0 is the root joint of the frame's own shape, so the vertices are exactly R X + T. A rotation W
-    of the whole body makes the root's rotation W R and the translation T - J0 + W J0.
-
-    ``figure``: figure with the family's joint names; joints without a vector stay at rest. Returns
-    ``notes``: messages about data that could not be used. Raises ``RigError`` if the figure has
-    none of the joints.
+    RigError if the figure has none of the joints; those without a vector stay at rest.
     """
     motion, said = _in_space_of(motion, figure)
     skeleton = figure.skeleton
@@ -157,8 +151,9 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     elif motion.places_root:
         translations = translations - root_positions(figure, weights)
     if origin_rotations is not None:
-        # t = T - J0 + R J0: skinning rotates about the rest root J0, the file rotates about the
-        # origin.
+        # t = T - J0 + R J0: skinning rotates about the rest root J0 of the frame's own shape, the
+        # file about the origin, so the vertices are exactly R X + T. A rotation W of the whole
+        # world adds to the root's: W R, and t = T - J0 + W J0.
         root = root_positions(figure, weights)
         matrices = quaternion_to_matrix(origin_rotations)
         rotated_roots = np.einsum("nab,nb->na", matrices, root + 0.0 * translations)
@@ -174,10 +169,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
 
 
 def parameter_clip(motion: ParameterMotion, figure: Figure) -> SampledClip:
-    """Return a motion of a figure with model parameters, in metres.
-
-    Raises ``RigError`` if the figure has no model parameters, or the number of values is wrong.
-    """
+    """Return a clip in metres; RigError unless the figure has these model parameters."""
     if len(motion.parameters) == 0:
         raise RigError("expected model parameters of at least one frame")
     skeleton = figure.require_skeleton()
@@ -201,15 +193,10 @@ def parameter_clip(motion: ParameterMotion, figure: Figure) -> SampledClip:
 def parameter_pose(
     figure: Figure, parameters: Floats, identity: Floats, expression: Floats
 ) -> Pose:
-    """Return the pose that SAM 3D Body stores for MHR.
+    """Return the pose that SAM 3D Body stores for MHR: its points are 0.01 (x, -y, -z) of ours.
 
-    The tool's vertices and joints are the pose's vertices and joints times 0.01, with y and z
-    negated.
-
-    ``parameters``: (P,), ``mhr_model_params``: placement, pose and scales. ``identity``,
-    ``expression``: (N,), (M,), ``shape_params`` and ``expr_params``; missing trailing ones are
-    treated as 0. Raises ``RigError`` if the figure has no model parameters, or the number of values
-    is wrong.
+    ``parameters`` (P,): placement, pose, scales; ``identity``, ``expression``: missing ends are 0.
+    RigError unless the figure has these model parameters.
     """
     if figure.parameters is None:
         raise RigError(f"figure {figure.name} has no model parameters")

@@ -149,11 +149,7 @@ def evaluate(channel: Channel, times: Floats) -> Floats:
 
 
 def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
-    """Return the values of all curves of a clip at many times; see ``evaluate``.
-
-    ``times``: (T,), seconds. Returns ``targets``: (C,), rows of the skeleton's DOF table;
-    ``values``: (T, C), lengths or radians; channels without keys are 0.
-    """
+    """Return all curves' targets (C,), DOF rows, and values (T, C); 0 for channels without keys."""
     table = _tables.get(clip, (), lambda: _table(clip.channels))
     return table.targets, _values(table, np.atleast_1d(times))
 
@@ -178,13 +174,10 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
 
 
 def slopes(channel: Channel) -> Floats:
-    """Return the slopes on both sides of every key, according to their tangent rules.
+    """Return incoming and outgoing slope of each key (N, 2), value per second.
 
-    flat is 0; linear is the slope of the span on that side; smooth is the slope from the previous
-    key to the next. The first and last keys use their only span.
-
-    Returns (N, 2), incoming and outgoing slope, value per second; 0 over a span of zero duration,
-    and if all keys are simultaneous.
+    flat is 0, linear is the slope of the span on its side, smooth the slope from the previous key
+    to the next. End keys use their only span. Slopes over a span of no duration are 0.
     """
     times, values = channel.times, channel.values
     count = len(times)
@@ -328,10 +321,7 @@ def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
 
 
 def is_course_rig(skeleton: Skeleton) -> bool:
-    """Return whether a skeleton's DOFs are the DOFs of ``.anim`` channels, in that order.
-
-    These are translations x, y, z of the root, then rotations x, y, z of joints 0, 1, 2 and so on.
-    """
+    """Return whether DOFs are those of ``.anim``: root x, y, z, then rotations x, y, z a joint."""
     count = skeleton.n_joints
     if skeleton.n_dofs != 3 + 3 * count:
         return False

@@ -36,14 +36,10 @@ def add_key(
     value: float | None = None,
     tangents: tuple[Tangent, Tangent] | None = None,
 ) -> tuple[Channel, int]:
-    """Return a channel with one more key, and its index.
+    """Return a channel with a key at a time, changing one that is there, and its index.
 
-    Without value and tangents, a key between others preserves the curve exactly: it gets the slope
-    of the curve there, and neighbours whose rules depend on adjacent keys get their current slopes
-    as explicit values. An existing key at this time is changed instead.
-
-    ``value``: length or radians; the value of the curve if omitted. ``tangents``: (incoming,
-    outgoing), rules or slopes; smooth by default if a value is given, or outside the keys.
+    Without value and tangents, a key between others keeps the curve: it and neighbours whose rules
+    look at adjacent keys get their slopes there as numbers. Otherwise tangents are smooth.
     """
     there = np.flatnonzero(np.abs(channel.times - time) <= SHORTEST)
     if len(there):
@@ -100,12 +96,7 @@ def slope_at(channel: Channel, time: float) -> float:
 def move_keys(
     channel: Channel, keys: Iterable[int], dt: float, dv: float, gap: float = 0.0
 ) -> Channel:
-    """Return a channel with some keys moved together.
-
-    ``dt``: seconds; reduced if a key would otherwise pass an unmoved key. ``dv``: length or
-    radians. ``gap``: minimum distance in seconds to unmoved keys that are at least this far away
-    initially.
-    """
+    """Move keys by ``dt`` seconds, less to stay ``gap`` away from unmoved ones, and by ``dv``."""
     moved = np.zeros(len(channel.times), dtype=np.bool_)
     moved[list(keys)] = True
     pairs = np.flatnonzero(moved[1:] != moved[:-1])
@@ -155,10 +146,7 @@ def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
 
 
 def set_tangent(channel: Channel, key: int, side: int, tangent: Tangent) -> Channel:
-    """Return a channel with a new rule or slope on one side of a key: 0 incoming, 1 outgoing.
-
-    Raises ``RigError`` if the rule is unknown or the slope is not finite.
-    """
+    """Set a rule or finite slope on one side of a key, 0 incoming, 1 outgoing; else RigError."""
     pairs = list(channel.tangents)
     incoming, outgoing = pairs[key]
     pairs[key] = (incoming, tangent) if side else (tangent, outgoing)
@@ -209,11 +197,7 @@ def clip_from_pose(
 def key_pose(
     clip: Clip, skeleton: Skeleton, pose: Pose, time: float, only_changed: bool = False
 ) -> Clip:
-    """Return a clip with a pose's DOFs keyed at one time.
-
-    ``pose``: lengths and radians. ``only_changed``: skip DOFs whose value equals the clip's value
-    at that time, clamped to the limits.
-    """
+    """Key a pose's DOFs at a time; ``only_changed``: those that differ from the clamped clip."""
     targets, values = evaluate_all(clip, np.array([time]))
     now = np.zeros(skeleton.n_dofs)
     now[targets] = values[0]
@@ -234,12 +218,7 @@ def key_pose(
 def clip_from_frames(
     name: str, dofs: Floats, times: Floats, rule: Tangent = "linear", present: Bools | None = None
 ) -> Clip:
-    """Return a clip with a key per frame.
-
-    ``dofs``: (F, D), lengths and radians. A constant DOF gets a single key. ``times``: (F,),
-    seconds, increasing. ``present``: (F,) bool, frames that get keys; all if omitted. Raises
-    ``RigError`` if there are no frames.
-    """
+    """Return a clip with a key per present frame from (F, D) DOFs; one if a DOF is constant."""
     keep = np.ones(len(times), dtype=np.bool_) if present is None else present
     if not keep.any():
         raise RigError(f"clip {name}: expected at least one frame, found none")

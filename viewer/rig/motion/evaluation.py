@@ -85,11 +85,7 @@ def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
 
 
 def scene_rate(actors: Iterable[Actor]) -> float:
-    """Return the frames per second of a scene's timeline.
-
-    This is the rate of its longest capture or, without captures, of its longest motion of keyed
-    transforms.
-    """
+    """Return the rate of the timeline: that of the longest capture, or else of the longest keys."""
     clips = [actor.clip for actor in actors if actor.clip is not None]
     captured = [clip for clip in clips if clip.timing is not None]
     keyed = [clip for clip in clips if clip.kind == "transforms"]
@@ -98,11 +94,9 @@ def scene_rate(actors: Iterable[Actor]) -> float:
 
 
 def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
-    """Pose actors by their clips at one time of the scene's clock, in place.
+    """Pose actors with clips at a time of the scene's clock: ``pose``, ``points``, ``is_present``.
 
-    Sets ``pose``, ``points`` and ``is_present``. Actors with the same figure and clip, each at its
-    own offset, are posed together; those without a clip are unchanged. ``interpolate`` crosses gaps
-    of captures instead of marking actors as absent.
+    ``interpolate`` crosses gaps of captures instead of marking actors as absent.
     """
     groups: dict[tuple[int, int], list[Actor]] = {}
     for actor in actors:
@@ -131,11 +125,7 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
 def set_poses(
     found: Samples, rows: NDArray[np.intp], skeleton: Skeleton, poses: Sequence[Pose]
 ) -> None:
-    """Set some rows of samples in as many poses, in place.
-
-    Rotations become DOFs of ball joints, and quaternions elsewhere, see ``rotate_joints``.
-    Translations become DOFs unless the motion sets these, and otherwise offsets of the poses.
-    """
+    """Set some rows of samples in as many poses, in place."""
     dofs = np.stack([pose.dofs for pose in poses])
     parts = list[tuple[str, Ints | slice, Floats]]()
     if len(found.targets):
@@ -230,11 +220,10 @@ def frames_of(
     base: Pose | None = None,
     interpolate: bool = False,
 ) -> Frames:
-    """Return a figure's poses at many times.
+    """Return a figure's poses at times (F,) of the motion's own clock.
 
-    ``times``: (F,), seconds on the motion's own clock. ``base``: provides what the motion does not
-    set; the pose of the file if omitted. ``interpolate``: interpolate across gaps. Raises
-    ``RigError`` if the figure has no skeleton, or the joint counts differ.
+    ``base`` provides what the motion does not set; the pose of the file if omitted. RigError
+    without a skeleton, or if joint counts differ.
     """
     if figure.skeleton is None:
         raise RigError(f"figure {figure.name} has no skeleton to animate")
@@ -356,11 +345,7 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
 
 
 def world_frames(figure: Figure, frames: Frames) -> Floats:
-    """Return every joint's world matrix in every frame; all frames are computed together.
-
-    Returns (F, J, 4, 4), joint space to figure space, including the figure's own scale and
-    translation.
-    """
+    """Return world matrices of all frames (F, J, 4, 4), with the figure's own scale and place."""
     skeleton = figure.require_skeleton()
     frames = _constrained(figure, frames)
     linear = quaternion_to_matrix(frames.rotations)
@@ -384,14 +369,10 @@ def rest_translations_of(figure: Figure, shape_weights: Floats) -> Floats:
 
 
 def joint_positions(figure: Figure, frames: Frames) -> Floats:
-    """Return the joints' positions in every frame, as ``world_frames`` does, but faster.
-
-    For a joint with the rotation R and translation t, whose parent has the world rotation Q and the
-    position p, these are Q R and p + Q t. The frames are the last axis, so that few operations
-    multiply the matrices of all frames.
-
-    Returns (F, J, 3), positions in figure space, including the figure's own scale and translation.
-    """
+    """Return the positions (F, J, 3) of ``world_frames``, faster."""
+    # A joint with rotation R and offset t, whose parent has the world rotation Q and the position
+    # p, has Q R and p + Q t. Frames are the last axis, so that few operations multiply the matrices
+    # of all frames.
     skeleton = figure.require_skeleton()
     if skeleton.constraints or (frames.scales != 1.0).any():
         return world_frames(figure, frames)[..., :3, 3]

@@ -11,11 +11,7 @@ from viewer.rig.skinning import joint_matrices
 
 
 def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
-    """Return a joint's position, or the mean of all joints or captured points.
-
-    Returns (3,) or None, scene space; None while the actor is absent or has neither joints nor
-    points.
-    """
+    """Return a joint's scene position (3,), or all joints' or points' mean; None while absent."""
     if not actor.is_present:
         return None
     if actor.points is not None:

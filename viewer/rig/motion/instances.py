@@ -25,20 +25,13 @@ from viewer.rig.skeleton import Skeleton
 
 
 def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
-    """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs).
-
-    ``poses``: DOFs in lengths and radians. Returns (A, J, 3, 3), matrices for column vectors.
-    """
+    """Return R(quaternion) R(DOFs) of each pose's joints (A, J, 3, 3)."""
     beneath = quaternion_to_matrix(np.stack([pose.rotations for pose in poses]))
     return beneath @ dof_rotations(skeleton, np.stack([pose.dofs for pose in poses]))
 
 
 def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None) -> Floats:
-    """Return the world matrices of poses; see ``viewer.rig.kinematics.world_matrices``.
-
-    ``poses``: DOFs in lengths and radians. ``rotations``: (A, J, 3, 3), ``local_rotations`` of the
-    poses, if already computed. Returns (A, J, 4, 4), joint-to-figure matrices.
-    """
+    """Return poses' world matrices (A, J, 4, 4); ``rotations``: their local ones, if known."""
     rotations = local_rotations(skeleton, poses) if rotations is None else rotations
     parts = (
         np.stack([getattr(pose, name) for pose in poses])
@@ -50,12 +43,7 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
 def posed_worlds(
     skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None
 ) -> Floats:
-    """Return ``worlds``; missing matrices are computed in one batch and cached in the poses.
-
-    ``poses``: at least one; DOFs in lengths and radians. ``rotations``: (A, J, 3, 3),
-    ``local_rotations`` of the poses, if already computed. Returns (A, J, 4, 4), joint-to-figure
-    matrices.
-    """
+    """Return ``worlds``; missing ones are computed in one batch and cached in the poses."""
     rows = [row for row, pose in enumerate(poses) if not is_posed(skeleton, pose)]
     missing = [poses[row] for row in rows]
     if missing:
@@ -68,10 +56,7 @@ def posed_worlds(
 
 
 def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
-    """Return the skinning matrices of poses of one shape: M[a, j] = W[a, j] inverse(B[j]).
-
-    Returns (A, J, 4, 4), bind-to-posed matrices, without the figure's own placement.
-    """
+    """Return skinning matrices M[a, j] = W[a, j] inverse(B[j]) (A, J, 4, 4) without placement."""
     figure = shaped(figure, poses[0].shape_weights)
     return skinning_matrices(
         worlds(figure.require_skeleton(), poses), figure.require_skin().inverse_bind

@@ -49,13 +49,10 @@ def motion_path(
     base: Pose | None = None,
     min_confidence: float = 0.0,
 ) -> MotionPath:
-    """Return the paths of joints, or of captured points.
+    """Return paths of joints, or of a ``PointClip``'s points, at times of the motion's own clock.
 
-    ``figure``: figure with a skeleton, or with captured points for a ``PointClip``. ``joints``:
-    joints, or points of a ``PointClip``. ``times``: (F,), seconds on the motion's own clock;
-    ``path_times`` if omitted. ``base``: provides shape and placement if the motion has none.
-    ``min_confidence``: points with a lower confidence are absent, as are invisible points. Raises
-    ``RigError`` if the motion does not match the figure.
+    ``times``: ``path_times`` if omitted. ``base`` provides shape and placement if the motion has
+    none. Points below ``min_confidence`` are absent. RigError if motion and figure do not match.
     """
     times = path_times(motion) if times is None else np.asarray(times, dtype=np.float64)
     chosen: Ints = np.asarray(joints, dtype=np.int32)
@@ -86,11 +83,7 @@ def _point_path(
 
 
 def segments(path: MotionPath) -> tuple[Floats, Floats, Ints]:
-    """Return the segments between successive times at which the point is present.
-
-    Returns ``points``: (S, 2, 3), both ends, figure space; ``times``: (S, 2), times of both ends;
-    ``which``: (S,) int32, index of the path, 0 to N - 1.
-    """
+    """Return segments between present times: ends (S, 2, 3), times (S, 2), path indices (S,)."""
     which, first = np.nonzero((path.present[:-1] & path.present[1:]).T)
     ends = np.stack([first, first + 1], axis=1)
     points = path.points[ends, which[:, None]]

@@ -52,12 +52,10 @@ def sample_animation(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
 ) -> SampledAnimation:
-    """Sample an actor's clip at a fixed rate.
+    """Sample an actor's clip at a rate; by default ``frame_rate``, which keeps captured frames.
 
-    ``rate``: frames per second; the result of ``frame_rate`` if omitted, which reproduces captured
-    frames exactly. ``frames``: first frame and end frame, exclusive (None: the clip's end), counted
-    from the clip's start at that rate; all if omitted. Raises ``RigError`` if there is no clip, or
-    no frame in the range.
+    ``frames``: first and end frame (exclusive; None: the clip's end) from the clip's start at that
+    rate. RigError without a clip, or if no frame is in the range.
     """
     motion, figure = actor.joint_motion, actor.figure
     if motion is None or figure.skeleton is None:
@@ -84,10 +82,7 @@ def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
 def frame_range(
     motion: Motion, rate: float, frames: tuple[int, int | None] | None
 ) -> tuple[int, int]:
-    """Return the first frame and the exclusive end; see ``sample_animation`` for the arguments.
-
-    Raises ``RigError`` if no frame is in the range.
-    """
+    """Return first and end frame (exclusive) for ``sample_animation``; RigError if none is left."""
     count = frame_at(motion.end - motion.start, rate) + 1
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
@@ -107,11 +102,9 @@ def upright_animation(
     interpolate: bool = False,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Sample an actor's clip, rotated upright if its world is upside down.
+    """Sample an actor's clip, rotated upright if its world hangs, and the frames' up axis.
 
-    ``actor``, ``rate``, ``frames``, ``interpolate``: as for ``sample_animation``. The actor's
-    placement in the scene is ignored. Returns ``animation``: the sampled frames; ``up``: up axis of
-    the frames; negative axes occur only if ``keeps_world`` is True.
+    Placement in the scene is ignored. An axis is negative only if ``keeps_world``.
     """
     animation = sample_animation(actor, rate, frames, interpolate)
     up, hangs = own_up(scene, actor)
@@ -130,13 +123,9 @@ def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
 
 
 def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
-    """Return frames in a rotated world: the root's rotation and its path.
-
-    With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
-
-    ``rotation``: (4,), q, a unit quaternion of a rotation by a multiple of 90 degrees about an
-    axis.
-    """
+    """Rotate frames and the root's path by q (4,), a multiple of 90 degrees about an axis."""
+    # The root joint is at p = s (rest + t) + T in the figure. R' = Q R, and T' = Q p - s (rest + t)
+    # brings it to Q p.
     rotations = frames.rotations.copy()
     roots = np.flatnonzero(figure.require_skeleton().parents < 0)
     rotations[:, roots] = multiply(rotation, rotations[:, roots])
@@ -151,12 +140,7 @@ def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
 def baked(
     figure: Figure, clip: TransformClip, rate: float | None = None, base: Pose | None = None
 ) -> SampledClip:
-    """Return a clip's poses at a fixed rate, from its start to its last whole frame.
-
-    ``rate``: frames per second; the rate of the keys if omitted. ``base``: provides what the clip
-    does not animate; the figure's own pose if omitted. Raises ``RigError`` if the figure has no
-    skeleton.
-    """
+    """Return poses from start to the last whole frame; ``rate``: the keys' if omitted."""
     rate = clip.frame_rate if rate is None else rate
     times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(figure, clip, times, base)

@@ -100,11 +100,7 @@ class SampledClip:
     def sample(
         self, skeleton: Skeleton | None, times: Floats, interpolate: bool = False
     ) -> Samples:
-        """Return all joints at times (T,), in seconds; ``interpolate``: also across gaps.
-
-        Rotations are interpolated along the shorter arc, other values linearly. Exactly at a frame,
-        the stored values are returned unchanged.
-        """
+        """Return all joints at times (T,); exactly at a frame, stored values are unchanged."""
         before, after, fraction = self.timing.locate(times, interpolate)
         present = before >= 0
         before, after = np.maximum(before, 0), np.maximum(after, 0)
@@ -172,10 +168,7 @@ def _stacked(clips: Sequence[_Captured], name: str) -> Any:
 
 
 def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:
-    """Return a clip with the same frames at a different rate; its start time is unchanged.
-
-    ``clip``: clip, returned unchanged if it already has that rate. ``rate``: frames per second.
-    """
+    """Return a clip with the same frames and start at another rate; itself if it has that rate."""
     if clip.timing.frame_rate == rate:
         return clip
     return replace(clip, timing=replace(clip.timing, frame_rate=rate))

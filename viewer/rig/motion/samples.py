@@ -21,10 +21,7 @@ def _no_values() -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Values that a motion sets at T times; a pose keeps all others.
-
-    Rows are undefined where ``present`` is False.
-    """
+    """Values that a motion sets at T times, undefined unless ``present``; poses keep all others."""
 
     present: Bools
     """(T,). Whether the actor is present."""
@@ -61,10 +58,7 @@ def joint_samples(
     shape_weights: Floats | None = None,
     scales: Floats | None = None,
 ) -> Samples:
-    """Return samples of all joints: ``rotations`` (T, J, 4), ``translations`` (T, J, 3).
-
-    Translation DOFs stay as close to 0 as their limits allow.
-    """
+    """Return samples of all joints; translation DOFs stay as near to 0 as limits allow."""
     count, n_joints = rotations.shape[:2]
     joints = np.arange(n_joints, dtype=np.int32)
     moves, held = _no_indices(), np.zeros(0)

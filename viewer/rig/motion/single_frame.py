@@ -20,12 +20,9 @@ from viewer.rig.scene import Actor, Scene
 def single_frame(
     actor: Actor, rate: float = DEFAULT_RATE, number: int = 0, time: float = 0.0
 ) -> SampledAnimation:
-    """Return an actor's current pose as an animation of one frame.
+    """Return the current pose as an animation of one frame, missing while the actor is absent.
 
-    ``actor``: actor with joints; the frame of an absent actor is missing. ``rate``: nominal frames
-    per second of the animation. ``time``: time of the frame in seconds. Returns an animation whose
-    ``motion`` also contains the frame: one key per DOF for rigs with keyed clips. Raises
-    ``RigError`` if there are no joints.
+    ``motion`` has it too: one key per DOF for rigs with keyed clips. RigError without joints.
     """
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
@@ -51,13 +48,7 @@ def upright_single_frame(
     time: float = 0.0,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Return an actor's current pose, rotated upright if its world is upside down.
-
-    ``actor``, ``rate``, ``number``, ``time``: as for ``single_frame``. The actor's placement in the
-    scene is ignored. ``keeps_world``: keep the orientation of the actor's own world, as in
-    ``upright_animation``. Returns ``animation``: animation of one frame; ``up``: up axis of the
-    frame; negative axes occur only if ``keeps_world`` is True.
-    """
+    """Return ``single_frame`` upright, and its up axis, as ``upright_animation`` does."""
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
         return single_frame(actor, rate, number, time), f"-{up}" if hangs else up

@@ -32,13 +32,11 @@ _MOST_TRACKS = 4
 
 
 class SpringMotion:
-    """Simulation of an actor's spring joints; ``Actor.springs`` holds it while springs are enabled.
+    """Simulation of spring joints that ``Actor.springs`` holds while enabled; copies may share it.
 
-    Copies of an actor may share it. Results are cached until the clip, or the part of the pose that
-    the clip does not animate, changes.
-
-    ``up``: (3,), up direction of the clip's world in figure space; the up axis of the figure if
-    omitted. Gravity is rotated with it.
+    It is cached until the clip, or what the clip does not animate, changes. ``up`` (3,): up
+    direction of the clip's world in figure space, with which gravity rotates; by default the
+    figure's up axis.
     """
 
     def __init__(self, up: Floats | None = None) -> None:
@@ -46,10 +44,7 @@ class SpringMotion:
         self._tracks: dict[tuple[int, PoseKey], tuple[JointMotion, SpringTrack]] = {}
 
     def swing(self, actor: Actor, time: float) -> None:
-        """Rotate the spring joints of an actor that has just been posed by its clip, in place.
-
-        ``actor``: actor with a pose; nothing happens without springs or a motion of joints.
-        """
+        """Rotate an actor's spring joints, in place, once its clip has posed it."""
         clip, skeleton = actor.joint_motion, actor.figure.skeleton
         if clip is None or skeleton is None or skeleton.springs is None:
             return
@@ -93,10 +88,7 @@ class SpringMotion:
 
 
 def springs_for(actor: Actor, up: str) -> SpringMotion | None:
-    """Return the simulation of an actor in a scene; None without spring joints.
-
-    ``up``: either "y" or "z", up axis of the scene.
-    """
+    """Return an actor's simulation in a scene whose up axis is ``up``; None without springs."""
     if not has_springs(actor):
         return None
     above = np.zeros(3)
@@ -118,11 +110,7 @@ def release_springs(actor: Actor) -> None:
 
 
 def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
-    """Return an actor's motion as frames that include the rotations of its spring joints.
-
-    ``rate``: frames per second; if omitted, the motion's rate, or the simulation's rate for DOF
-    curves. Raises ``RigError`` if the actor has no motion of joints.
-    """
+    """Return frames with springs at a rate: the motion's, or the simulation's, if omitted."""
     clip, skeleton = actor.joint_motion, actor.figure.require_skeleton()
     if clip is None or skeleton.springs is None:
         raise RigError(f"{actor.name} has no motion of spring joints")

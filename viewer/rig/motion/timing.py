@@ -25,16 +25,12 @@ _AT_FRAME = 1e-3
 
 
 def is_rate(rate: float) -> bool:
-    """Return whether a number is a supported frame rate.
-
-    >>> is_rate(29.97), is_rate(1e-320), is_rate(float("nan"))
-    (True, False, False)
-    """
+    """Return whether a frame rate is supported: 29.97 is, 1e-320 and nan are not."""
     return SLOWEST <= rate <= FASTEST
 
 
 def frame_at(seconds: float, rate: float) -> int:
-    """Return the frame that is shown at a time since frame 0: the last one that has begun.
+    """Return the last frame that has begun at a time since frame 0.
 
     >>> frame_at(0.99, 10.0), frame_at(33.299999237060547, 30.0)  # the single precision of 33.3
     (9, 999)
@@ -90,11 +86,7 @@ class Timing:
         return self.start + frame / self.frame_rate
 
     def locate(self, times: Floats, interpolate: bool = False) -> tuple[Ints, Ints, Floats]:
-        """Return the rows on either side of each time, and the interpolation fraction.
-
-        ``times``: (T,), seconds. Returns ``before``, ``after``: (T,), rows; both are -1 if there is
-        no data; ``fraction``: (T,), 0 at ``before``, 1 at ``after``; exactly 0 on a frame.
-        """
+        """Return rows before and after times (T,), -1 without data, and fractions, 0 on a frame."""
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         nothing = np.full(len(times), -1, dtype=np.int32)
         if not self.n_frames or not self.present.any():

@@ -48,11 +48,7 @@ _tables: Memo[TransformClip, _TransformTable] = Memo(kept=1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransformChannel:
-    """The keys of one property of one joint, or of the weights of blend shapes.
-
-    Before its first key and after its last key, a channel has the value of that key (glTF 2.0,
-    section 3.11).
-    """
+    """Keys of one property of a joint or of blend shapes; constant beyond its ends (glTF 3.11)."""
 
     joint: int
     """Joint that moves; -1 for ``"weights"``."""
@@ -156,10 +152,9 @@ class TransformClip:
 class Animation:
     """An animation of a figure.
 
-    ``name``: as in the file; may repeat or be empty. ``start``, ``end``: playback range in seconds.
-    ``read``: returns the keys, or raises a ``FormatError``; called at most once. ``place``: JSON
-    pointer to the animation in the file; empty if unknown. ``number``: index of the animation in
-    its file, which may move several figures; -1 if unknown.
+    ``name``: as in the file; may repeat or be empty. ``start``, ``end``: seconds. ``read``: returns
+    the keys, or raises a ``FormatError``; called at most once. ``place``: JSON pointer in the file;
+    empty if unknown. ``number``: index in its file, which may move several figures; -1 if unknown.
     """
 
     __slots__ = ("_clip", "_read", "end", "name", "number", "place", "start")
@@ -182,10 +177,7 @@ class Animation:
         return clip is not None and clip is self._clip
 
     def clip(self) -> TransformClip:
-        """Return the motion; always the same object.
-
-        Raises ``FormatError`` if the file's keys are invalid, or the file can no longer be read.
-        """
+        """Return the motion, always the same object; FormatError if its keys cannot be read."""
         if self._clip is None:
             self._clip = self._read()
         return self._clip
@@ -197,17 +189,7 @@ class Animation:
 
 
 def sample_transforms(clip: TransformClip, times: Floats) -> Samples:
-    """Return the values of all channels at given times; translations include those at rest.
-
-    Linear: p0 + u (p1 - p0); for rotations, spherical along the shorter arc. Step: p0. Cubic, over
-    a span of h seconds (glTF 2.0, appendix C):
-    (2 u^3 - 3 u^2 + 1) p0 + h (u^3 - 2 u^2 + u) b0 + (3 u^2 - 2 u^3) p1 + h (u^3 - u^2) a1, with
-    incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
-    first key and after its last key, a channel has the value of that key.
-
-    ``times``: (T,), seconds. At the time of a key, the result is exactly the key's value; rotations
-    are normalised.
-    """
+    """Return all channels at times (T,), exactly the keys at theirs; translations include rest."""
     table = _tables.get(clip, (), lambda: _transform_table(clip.channels))
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     spans, fractions = _places(table.timelines, times)
@@ -277,6 +259,8 @@ def _cubics(curves: _Curves, timelines: _Timelines, spans: Ints, fractions: Floa
     u, start = fractions.take(curves.timelines, axis=1), curves.values.take(rows)
     rise = curves.values.take(following) - start
     leaving, arriving = curves.outgoing.take(rows), curves.incoming.take(following)
+    # glTF 2.0, appendix C, over a span of h seconds: (2 u^3 - 3 u^2 + 1) p0 + h (u^3 - 2 u^2 + u)
+    # b0 + (3 u^2 - 2 u^3) p1 + h (u^3 - u^2) a1, with incoming tangents a and outgoing tangents b.
     # The basis functions of both values sum to 1, so this form gives exactly p0 at u = 0.
     bend = (u - 1.0) * (u - 1.0) * leaving + u * (u - 1.0) * arriving
     return start + u * u * (3.0 - 2.0 * u) * rise + durations * u * bend
@@ -485,11 +469,10 @@ def _components(path: str, channels: list[TransformChannel]) -> slice:
 
 
 def key_rate(clip: TransformClip) -> float:
-    """Return the frame rate of a clip's keys.
+    """Return the first usual rate whose frames hold all keys, counted from the clip's start.
 
-    Returns the first usual rate at which all keys lie on frames, counted from the start of the
-    clip. Otherwise the rate of keys at equal distances, multiplied to at least 24 frames per
-    second. ``DEFAULT_RATE`` if the keys are at irregular times.
+    Otherwise that of evenly spaced keys, multiplied to at least 24 per second; ``DEFAULT_RATE`` if
+    keys are irregular.
     """
     return _regular_rate(clip) or DEFAULT_RATE
 

@@ -32,11 +32,7 @@ _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
 
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
-    """Return the up axis of an actor's own world, before its placement.
-
-    Returns ``up``: the axis that is mapped to the scene's up axis; the scene's up axis if that is
-    x; ``hangs``: whether that axis points down.
-    """
+    """Return the actor's axis that placement maps to the scene's up, and whether it points down."""
     along = np.zeros(3)
     along["xyz".index(scene.up)] = 1.0
     own = np.linalg.solve(actor.placement[:3, :3], along)
@@ -49,10 +45,8 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
 def upright_actor(scene: Scene, actor: Actor) -> Actor:
     """Return an actor whose figure records the up axis of its pose, rotated if upside down.
 
-    A body in a z-up capture is upright along z, regardless of the up axis of its model.
-
-    ``actor``: actor in the scene; not modified. Returns an actor with the same placement, which no
-    longer applies to it; the given actor if nothing changes.
+    A body in a z-up capture is upright along z, whatever its model's up axis is. Its placement is
+    kept, but no longer applies.
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
@@ -74,12 +68,7 @@ def upright_placement(scene: Scene, actor: Actor) -> Floats:
 
 
 def guess_up(actors: Iterable[Actor]) -> str:
-    """Return the axis along which heads are above pelvises, on average.
-
-    ``actors``: bodies with sampled clips, and captured keypoints; only frames read so far are used,
-    and other actors and all placements are ignored. Returns ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``;
-    ``_CUSTOM`` if there is no evidence, or people lie along x.
-    """
+    """Return the axis, such as "-y", along which heads are above pelvises on average so far."""
     directions = [np.zeros((0, 3))]
     for actor in actors:
         clip = actor.captured
@@ -97,10 +86,7 @@ def guess_up(actors: Iterable[Actor]) -> str:
 
 
 def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
-    """Return a pose rotated by 180 degrees, Q: R' = Q R and s l' + T' = Q (s l + T) at roots.
-
-    The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
-    """
+    """Return a pose rotated by 180 degrees, Q: R' = Q R and s l' + T' = Q (s l + T) at roots."""
     skeleton = shaped_skeleton(figure, pose.shape_weights)
     upright = pose.copy()
     roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)

@@ -12,21 +12,14 @@ _MOST_DIGITS = 9  # maximum number of decimals; more would show rounding errors 
 
 
 def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:
-    """Return a DOF value as text: ``"28.6°"``, or a length ``"0.25"``.
-
-    ``value``: radians, or a length in the figure's unit.
-    """
+    """Return a DOF's radians or length as text: ``"28.6°"``, ``"0.25"``."""
     if skeleton.dof_kinds[dof] >= FIRST_ROTATION:
         return f"{number_text(math.degrees(value), f'.{digits}f')}\N{DEGREE SIGN}"
     return number_text(value, f".{digits + 3}g")
 
 
 def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str = "") -> Phrase:
-    """Return a message for a DOF beyond its limits: ``"a.x is 0.0°; its limits are …"``.
-
-    ``value``: radians, or a length in the figure's unit; outside the limits. ``when``: inserted
-    after the value: ``" in frame 3"``.
-    """
+    """Return ``"a.x is 0.0° in frame 3; its limits are …"`` with " in frame 3" for ``when``."""
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
     limit = low if value < low else high
     digits = 1

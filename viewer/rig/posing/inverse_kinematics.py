@@ -41,11 +41,7 @@ class Reach:
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
-    """Return the joints that may rotate to move a joint: the nearest ancestors with free rotations.
-
-    ``length``: maximum number of joints, not counting joints without a free rotation. Returns (N,)
-    int32, N <= length, the nearest first.
-    """
+    """Return the nearest ancestors (N,) with free rotations, at most ``length``, nearest first."""
     rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
     able = set(skeleton.dof_joints[rotates].tolist())
     chain: list[int] = []
@@ -58,15 +54,10 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
 
 
 def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, rows: Ints) -> Floats:
-    """Return the Jacobian of a joint's position with respect to rotation DOFs of its ancestors.
-
-    With the parent's linear part A, the rotation axis a in the parent's frame (after the rows that
-    are applied later) and the vector y from the rotating joint to the moved joint, the column of a
-    DOF is A (a x A^-1 y); this also holds with scales.
-
-    ``pose``: lengths and radians. ``world``: (J, 4, 4), ``world_matrices`` of that pose. ``rows``:
-    (N,), rotation DOFs of its ancestors. Returns (3, N), figure units per radian.
-    """
+    """Return d(position of a joint)/d(its ancestors' rotation DOFs ``rows``): (3, N) per radian."""
+    # With the parent's linear part A, the rotation axis a in the parent's frame (after the rows
+    # that are applied later) and the vector y from the rotating joint to the moved one, the column
+    # of a DOF is A (a x A^-1 y), also with scales.
     columns = np.zeros((3, len(rows)))
     end = world[joint, :3, 3]
     for turning in np.unique(skeleton.dof_joints[rows]):
@@ -80,10 +71,7 @@ def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, ro
 
 
 def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Floats]:
-    """Return the current rotation axis of each rotation DOF of a joint.
-
-    Returns a dict of int to (3,), unit vectors in the parent's frame, by row of the DOF table.
-    """
+    """Return the axis of each rotation DOF of a joint, (3,) in its parent's frame, by DOF row."""
     own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
     after = quaternion_to_matrix(pose.rotations[joint])
     axes = {}
@@ -97,11 +85,9 @@ def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Float
 def reach(
     skeleton: Skeleton, pose: Pose, joint: int, target: Floats, length: int = 2, rounds: int = 60
 ) -> Reach:
-    """Return the DOFs that move a joint as close to a target as its chain allows.
+    """Move a joint as near to a target (3,) as its chain allows, never farther than the pose.
 
-    ``pose``: start of the search; not modified. ``target``: (3,), target position, figure units.
-    Returns a pose that is not farther from the target than the start. A start outside its limits is
-    clamped first. Raises ``RigError`` if no joint above it can rotate.
+    A start outside its limits is clamped first. RigError if no joint above it can rotate.
     """
     chain = chain_above(skeleton, joint, length)
     if not len(chain):
@@ -187,11 +173,9 @@ class _Solver:
         return np.clip(start + step, self.low, self.high) - start
 
     def _bend(self, error: Floats) -> bool:
-        """Bend a chain that is collinear with its target: no small rotation moves it closer.
-
-        Each DOF is tried in the direction with more room to its limits; the bend after which the
-        next step comes closest to the target is used.
-        """
+        """Bend a chain that is collinear with its target, which no small rotation brings nearer."""
+        # Each DOF bends in the direction with more room to its limits. The bend counts after which
+        # a few steps come nearest to the target.
         start, damping = self.pose.dofs[self.rows].copy(), self.damping
         best, nearest = None, float(np.linalg.norm(error))
         for place in range(len(start)):

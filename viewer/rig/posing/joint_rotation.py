@@ -40,10 +40,7 @@ class RotationFit:
 
 
 def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
-    """Return the rows of a joint's rotation DOFs, in order of application.
-
-    Returns (N,) int32, rows of the DOF table.
-    """
+    """Return the DOF rows (N,) of a joint's rotations, in order of application."""
     chosen = (skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION)
     if free:
         chosen &= ~skeleton.locked
@@ -58,11 +55,9 @@ def rotates_freely(skeleton: Skeleton, joint: int) -> bool:
 
 
 def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -> RotationFit:
-    """Return the DOFs that rotate a joint as close to a rotation as possible.
+    """Return the DOFs that rotate a joint as near as possible to (3, 3), relative to its parent.
 
-    ``pose``: current pose, not modified; of equally good solutions, the one closest to its DOFs is
-    used. ``rotation``: (3, 3), target rotation relative to its parent: R(quaternion) R(DOFs) of
-    ``joint_rotations``. Returns the fit, exact if limits and axes allow it.
+    Of equally good solutions, the one nearest to the pose's DOFs is used.
     """
     rows = rotation_dofs(skeleton, joint)
     low, high = skeleton.dof_limits[rows].T

@@ -79,11 +79,7 @@ class PoseRecord:
 
 
 class PosePartError(RigError):
-    """A part of a pose that cannot be applied to a figure.
-
-    ``part``: ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
-    ``name``: name of the DOF; empty for other parts.
-    """
+    """A part of a pose that cannot be applied: ``part`` of the record, ``name`` of a DOF or ""."""
 
     def __init__(self, problem: RigError, part: str, name: str = "") -> None:
         self.part, self.name = part, name

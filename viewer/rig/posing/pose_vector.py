@@ -43,11 +43,7 @@ class PoseLayout:
 
 
 def rotation_rows(skeleton: Skeleton) -> Ints:
-    """Return the DOF rows of ball joints, about x, y, z in this order.
-
-    Returns (J, 3) int32, rows; all three are -1 for a joint that does not have exactly these
-    rotations. Read-only.
-    """
+    """Return ball joints' DOF rows about x, y, z (J, 3); -1 for joints with other rotations."""
     return _ball_rows.get(skeleton, None, lambda: _rows_of_balls(skeleton))
 
 
@@ -65,15 +61,7 @@ def _rows_of_balls(skeleton: Skeleton) -> Ints:
 def set_joint_rotations(
     skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, clamp: bool = True
 ) -> None:
-    """Set the rotations of joints relative to their parents, in place.
-
-    A ball joint's DOFs are set to the angles about x, y, z; other joints keep their DOFs as
-    close to 0 as the limits allow and store the remaining rotation as a quaternion.
-
-    ``pose``: modified in place. ``joints``: (N,), joints to rotate. ``rotations``: (N, 3, 3),
-    rotation of each of these joints relative to its parent. ``clamp``: whether DOFs are clamped to
-    their limits.
-    """
+    """Set joints' rotations (N, 3, 3) relative to parents, in place, as ``rotate_joints`` does."""
     dofs = pose.dofs[None].copy()
     pose.rotations[joints] = rotate_joints(skeleton, dofs, joints, rotations[None], clamp)[0]
     pose.dofs[:] = dofs[0]
@@ -82,9 +70,10 @@ def set_joint_rotations(
 def rotate_joints(
     skeleton: Skeleton, dofs: Floats, joints: Ints, rotations: Floats, clamp: bool = True
 ) -> Floats:
-    """Set the DOFs (T, D) of joints of many poses, in place; return their quaternions (T, N, 4).
+    """Set DOFs (T, D), in place, to rotations (T, N, 3, 3) of joints; return quaternions (T, N, 4).
 
-    As for ``set_joint_rotations``, with ``rotations`` (T, N, 3, 3).
+    A ball joint's DOFs become the angles about x, y, z; other joints keep their DOFs as near to 0
+    as limits allow, and the quaternion has the rest. ``clamp``: clamp DOFs to their limits.
     """
     joints = np.asarray(joints)
     rows = rotation_rows(skeleton)[joints]
@@ -110,22 +99,14 @@ def rotate_joints(
 
 
 def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
-    """Return each joint's three rotation values in the convention of the model's files.
-
-    ``rotations``: (J, 3, 3), rotation of each joint relative to its parent. Returns (J, 3),
-    radians.
-    """
+    """Return rotations (J, 3, 3) as three values a joint (J, 3), as in the model's files."""
     numbers = matrix_to_rotation_vector(rotations)
     numbers[layout.is_euler] = matrix_to_euler(rotations[layout.is_euler])[:, ::-1]
     return numbers
 
 
 def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return a pose as the model's own pose vector.
-
-    ``layout``: none for a model whose pose vector consists of its DOFs. Returns (N,), lengths and
-    radians.
-    """
+    """Return a pose as the model's own vector (N,); ``layout`` is None if that is its DOFs."""
     if layout is None:
         return pose.dofs.copy()
     vector = np.zeros(layout.n_numbers)
@@ -139,12 +120,7 @@ def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> F
 
 
 def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vector: Floats) -> None:
-    """Set a pose from the model's own pose vector, in place.
-
-    ``layout``: none for a model whose pose vector consists of its DOFs. ``pose``: modified, except
-    for its shape. ``vector``: (N,), lengths and radians. Raises ``RigError`` if the number of
-    values is wrong for the model.
-    """
+    """Set a pose, except its shape, from the model's vector (N,); RigError if N is wrong."""
     wanted = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) != wanted:
         raise RigError(f"expected {wanted} pose numbers, found {len(vector)}")

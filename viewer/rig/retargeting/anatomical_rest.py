@@ -189,10 +189,7 @@ def anatomical_rest(
 def _with_means(
     fixed: dict[int, Floats], postures: Postures, skeleton: Skeleton, axes: tuple[Floats, Floats]
 ) -> Floats:
-    """Return the rotations of all joints, of which most have their mean local rotation.
-
-    ``axes``: those of the body in each frame, (F, 3, 3), and of the standing body, (3, 3).
-    """
+    """Return all joints' rotations, where joints not ``fixed`` have their mean local rotation."""
     parents, (body, stands) = skeleton.parents, axes
     hands = _hands(skeleton, postures.joints)
     result = np.empty((len(parents), 3, 3))
@@ -322,10 +319,7 @@ def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Float
 
 
 def _hands(skeleton: Skeleton, joints: dict[str, int]) -> dict[int, tuple[Floats, Floats]]:
-    """Return the directions of hands whose arms are straight in the zero pose.
-
-    For each wrist, this is the direction of the forearm in the axes of forearm and hand.
-    """
+    """Return the forearm's direction in the axes of forearm and hand, of straight arms' wrists."""
     parents, found = skeleton.parents, {}
     turns, offsets = quaternion_to_matrix(skeleton.rest_rotations), skeleton.rest_translations
     for side in SIDES:
@@ -379,11 +373,9 @@ _CHAINS = ("spine2", "spine3", "neck", "head", "wrist")
 
 
 def _has_parallel_axes(limbs: Sequence[LimbAxes]) -> bool:
-    """Return whether bones and bending axes of all limbs are close to axes of their joints.
-
-    The bending axis is the same axis of both joints of a limb. Limbs with arbitrary roll, which a
-    threshold alone would often accept, therefore differ: about one skeleton in 10,000 is accepted.
-    """
+    """Return whether bones and bending axes of all limbs are close to axes of their joints."""
+    # A threshold alone would often accept limbs with arbitrary roll. Together with the same bending
+    # axis at both joints of a limb, about one skeleton in 10,000 passes by chance.
     bones = np.abs([limb.bones for limb in limbs]).max(axis=-1)
     seen = [limb for limb in limbs if limb.is_seen]
     return bool((bones > _BONE).all() and len(seen) >= _SEEN and all(map(_has_one_axis, seen)))
@@ -404,17 +396,12 @@ def _has_one_axis(limb: LimbAxes) -> bool:
 def _parallel_rest(
     estimate: Floats, postures: Postures, skeleton: Skeleton, stands: Floats
 ) -> Floats:
-    """Return an estimated rest pose with the axes of trunk and limbs parallel to the body's.
-
-    ``estimate``: (J, 3, 3), world rotations in the estimated rest pose. ``stands``: (3, 3), axes of
-    the standing body as columns: left, up and forward. Returns (J, 3, 3), world rotations. Joints
-    beyond the last named ones keep their estimated local rotation.
-    """
+    """Return world rotations (J, 3, 3) with trunk and limbs parallel to the body's ``stands``."""
     # The estimate is a few degrees off, as a mean over a motion is. Rounded to the nearest of the
     # 24 orientations whose axes are those of the body, it is exact. Trunk and limbs are rounded in
     # the world; a chain such as spine or hand has the axes of its parent unless it differs from
     # them by more than an estimate can err; unnamed joints in between are rounded relative to their
-    # parent.
+    # parent. Joints beyond the last named ones keep their estimated local rotation.
     parents = skeleton.parents
     names = {joint: name for name, joint in postures.joints.items()}
     inner = _above(parents, names)
@@ -451,10 +438,7 @@ def _is_finger(name: str) -> bool:
 
 
 def _angle_of_wrists(estimate: Floats, postures: Postures, parents: Ints) -> float:
-    """Return the smaller angle between a hand's axes and those of its parent joint, in radians.
-
-    Both hands have the same convention, and forearms can be twisted in the whole motion.
-    """
+    """Return the smaller angle between a hand's and its parent's axes: forearms may be twisted."""
     wrists = [postures.joints[f"{side}_wrist"] for side in SIDES]
     return min(_angle(estimate[parents[wrist]].T @ estimate[wrist]) for wrist in wrists)
 

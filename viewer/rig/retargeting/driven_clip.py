@@ -27,11 +27,7 @@ _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 
 def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return the motion of a drive as a clip of a figure, before ``Drive.finish``.
-
-    Returns ``notes``: messages as returned by ``retarget``. Raises ``RigError``: as ``retarget``
-    does.
-    """
+    """Return ``retarget``'s clip and notes for a drive, before ``Drive.finish``."""
     found = retargeted(drive.motion, figure, drive.joint_map, drive.source_rest)
     clip, notes = found.clip, found.notes
     if drive.plants_feet:
@@ -46,10 +42,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
 
 
 def matches_of(drive: Drive, figure: Figure) -> Matches:
-    """Return the match of a drive's joints with a figure's, which may be too small to drive it.
-
-    Raises RigError if the joint map names a missing joint or lists a joint twice.
-    """
+    """Match a drive's joints, maybe too few to drive; RigError if its map is invalid."""
     source = drive.motion.figure
     skeletons = source.require_skeleton(), figure.require_skeleton()
     titles = source.name, figure.name
@@ -63,10 +56,7 @@ def full_map(drive: Drive, figure: Figure) -> JointMap:
 
 
 def aligned_rests(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
-    """Return the joints of the motion and of the figure in the rest poses that are aligned.
-
-    Returns (S, 3), (J, 3), positions in the figure's axes, each in its own unit.
-    """
+    """Return source (S, 3) and figure (J, 3) joints in the aligned rest poses, in figure axes."""
     motion = with_source_rest(with_upright_rest(drive.motion), drive.source_rest)[0].figure
     axes = up_rotation(motion.up, figure.up)
     source = rest_of(motion.require_skeleton(), axes, figure.up).points
@@ -74,12 +64,7 @@ def aligned_rests(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
 
 
 def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Floats:
-    """Return the axes of a front view: left of the body, up, and forward, as rows: (3, 3).
-
-    The left side of the body is found from known joints; without such joints, it is along x.
-
-    ``points``: (J, 3), positions, up along ``up``. ``up``: either "y" or "z", up axis.
-    """
+    """Return left, up and forward of a body as rows (3, 3); left is x without known joints."""
     upward = np.eye(3)["xyz".index(up)]
     joints = dict(zip(matches.names, range(len(matches.names)), strict=True))
     short = _SHORT * (float(np.ptp(points, axis=0).max()) or 1.0)

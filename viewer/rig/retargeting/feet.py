@@ -35,11 +35,7 @@ _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's h
 def plant_feet(
     found: Retargeted, figure: Figure, hangs: bool = False
 ) -> tuple[SampledClip, PlantedFeet | None]:
-    """Return the motion of a driven figure with its feet planted.
-
-    Returns ``clip``: the motion; unchanged if it would not improve; ``changes``: changes made; None
-    if the figure or the source has no recognised legs, or the figure has the source's proportions.
-    """
+    """Plant a driven figure's feet; no changes without legs or if proportions are the source's."""
     pairs = _leg_pairs(found, figure)
     rest_up = np.eye(3)["xyz".index(figure.up)]
     up = -rest_up if hangs else rest_up
@@ -113,12 +109,7 @@ def _source_paths(
     vectors: list[tuple[Floats, Floats]],
     up: Floats,
 ) -> list[FootPath]:
-    """Return the paths of the source's feet, in the axes and the unit of the figure.
-
-    ``vectors``: list of ((N, 3), (N, 3)), vectors from the ankles of the figure to its balls and
-    heels; they replace the source's if it has no ball joints or no standing rest pose. ``up``:
-    (3,), the up axis.
-    """
+    """Return the source's feet in the figure's axes and unit, shaped as the figure's if unknown."""
     skeleton = found.source.figure.require_skeleton()
     chains = chains_to(
         skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]

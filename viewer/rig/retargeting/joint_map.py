@@ -21,11 +21,7 @@ UNMAPPED = -2
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """Target joints and the source joints that drive them, by label.
-
-    Each target joint is listed at most once; a source joint may drive several. Target joints that
-    are not listed are matched automatically.
-    """
+    """Target joints by label, each at most once, and their source joints; others match by names."""
 
     pairs: tuple[tuple[str, str], ...]
     """Labels of a target joint and of its source joint, as in ``joint_labels``; the second is empty
@@ -42,10 +38,7 @@ def map_from_pairs(mapping: Mapping[str, str]) -> JointMap:
 
 
 def joint_map_of(partners: Ints, source: Skeleton, target: Skeleton) -> JointMap:
-    """Return a map that lists every joint of a match, including those at rest.
-
-    ``partners``: (J,), source joint of each target joint, -1 for none.
-    """
+    """Return a map of every joint of a match ``partners`` (J,), those at rest (-1) included."""
     sources, targets = joint_labels(source), joint_labels(target)
     pairs = [
         (targets[joint], sources[partners[joint]] if partners[joint] >= 0 else "")
@@ -57,13 +50,7 @@ def joint_map_of(partners: Ints, source: Skeleton, target: Skeleton) -> JointMap
 def mapped_partners(
     joint_map: JointMap, source: Skeleton, target: Skeleton, titles: tuple[str, str]
 ) -> Ints:
-    """Return the source joint of each target joint: (J,) int32.
-
-    The result is -1 for joints that stay at rest, -2 for joints that the map does not list.
-
-    Raises ``RigError`` if a name in the map is missing or ambiguous in a skeleton, or a joint is
-    listed twice.
-    """
+    """Return each target joint's source (J,): -1 stays at rest, -2 is not listed; else RigError."""
     partners = np.full(target.n_joints, UNMAPPED, dtype=np.int32)
     joints = _joints_by_label(source), _joints_by_label(target)
     for row, (mine, theirs) in enumerate(joint_map.pairs):

@@ -52,12 +52,8 @@ def match_joints(
 ) -> Matches:
     """Match joints by mapping, then by the meaning of names, then by equal names.
 
-    A source joint of the mapping is not matched again automatically. A mapping that equals the
-    automatic match has the same result as no mapping.
-
-    ``is_complete``: whether enough joints must match to drive the target; otherwise the match is a
-    beginning, to be completed by the user. Raises ``RigError`` if too few joints match although
-    enough must, or the mapping names a missing joint or lists a joint twice.
+    A mapping that equals the automatic match changes nothing. RigError if too few match although
+    ``is_complete``, or the mapping names a missing joint or one twice.
     """
     plain = _comparable(source.names), _comparable(target.names)
     meanings = joint_meanings(source), joint_meanings(target)

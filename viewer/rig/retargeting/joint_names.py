@@ -127,10 +127,7 @@ _TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "f
 
 
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the side and the remaining word of every name, in any program's convention.
-
-    Returns a list of J (str, str), ``"left"``, ``"right"`` or ``""``, and the remaining word in
-    lower case.
+    """Return each name's side, "left", "right" or "", and its remaining word in lower case.
 
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
@@ -145,22 +142,14 @@ def _known_keys(names: tuple[str, ...]) -> tuple[_Key, ...]:
 
 
 def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return the SMPL family's name for each joint, as stated by its file or implied by its name.
-
-    ``skeleton``: its humanoid, if it has one, takes precedence over its names. Returns names as
-    returned by ``canonical_names``.
-    """
+    """Return ``canonical_names``; the humanoid that a file states takes precedence."""
     if skeleton.humanoid is not None:
         return _stated(skeleton.humanoid, skeleton.n_joints)
     return canonical_names(skeleton.names, skeleton.parents)
 
 
 def joints_by_place(skeleton: Skeleton) -> set[int]:
-    """Return the joints identified by their position in the hierarchy, not by their names.
-
-    These are the pelvis above two legs, and the head at the end of a spine. A skeleton with a
-    humanoid has none.
-    """
+    """Return joints known by place, not name: a pelvis above two legs, a head at a spine's end."""
     if skeleton.humanoid is not None or skeleton.n_joints > _MOST:
         return set()
     meanings = canonical_names(skeleton.names, skeleton.parents)
@@ -182,13 +171,10 @@ def _stated(humanoid: Humanoid, n_joints: int) -> tuple[str, ...]:
 
 
 def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
-    """Return the SMPL family's name for each joint: ``left_hip``, ``spine2`` and so on.
+    """Return each joint's name in the SMPL family, unique, or "" without an equivalent.
 
-    The names are judged together, as the module states. Chains of spine joints are numbered from
-    the pelvis; if there are more than three, the first, middle and last are used. Without a pelvis,
-    the joint above both legs is the pelvis.
-
-    ``parents``: (J,), -1 for a root. Returns unique names; empty for joints without an equivalent.
+    Spine joints are numbered from the pelvis; of more than three, the first, middle and last count.
+    Without a pelvis, the joint above both legs is it.
 
     >>> import numpy as np
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
@@ -459,10 +445,7 @@ def _fingers(keys: Sequence[_Key], helpers: set[int]) -> dict[int, str]:
 
 
 def _finger(word: str) -> tuple[str, int]:
-    """Return finger and number of ``HandIndex2``, ``IndexIntermediate``, ``Finger11`` and so on.
-
-    The finger is empty for other words, and the number 0 if there is none.
-    """
+    """Return finger and number of ``HandIndex2``, ``Finger11`` and so on; else "", 0."""
     biped = _BIPED_FINGER.fullmatch(word)
     if biped:
         return _NUMBERED_FINGERS[int(biped[1])], int(biped[2] or 0) + 1

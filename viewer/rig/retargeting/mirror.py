@@ -22,11 +22,7 @@ _NEAR = 0.02
 
 
 def mirror_axis(figure: Figure) -> int:
-    """Return the axis across which a figure is symmetric: 0 for x, 1 for y.
-
-    With a symmetry map, it is the axis with the smallest error; otherwise it is y for z-up figures,
-    whose left is +y, and x for y-up figures.
-    """
+    """Return the axis of symmetry: the map's best, or else 1 for z-up figures and 0 for others."""
     if figure.symmetry is None or figure.mesh is None:
         return 1 if figure.up == "z" else 0
     errors = [_mirror_distances(figure, axis).max() for axis in range(3)]
@@ -34,10 +30,7 @@ def mirror_axis(figure: Figure) -> int:
 
 
 def asymmetry(figure: Figure) -> Floats:
-    """Return each rest vertex's distance from its counterpart's mirror image: (V,), figure units.
-
-    Raises ``RigError`` if the figure has no symmetry map.
-    """
+    """Return rest vertices' distances from mirrored counterparts (V,); RigError without a map."""
     if figure.symmetry is None or figure.mesh is None:
         raise RigError(f"figure {figure.name} has no symmetry map")
     return _mirror_distances(figure, mirror_axis(figure))
@@ -52,12 +45,9 @@ def _mirror_distances(figure: Figure, axis: int) -> Floats:
 
 
 def joint_partners(figure: Figure) -> Ints:
-    """Return each joint's mirror counterpart, the joint itself if it is central: (J,) int32.
+    """Return each joint's mirror counterpart (J,), nearest at the same depth; itself if central.
 
-    The counterpart is the joint nearest to the mirrored position among the joints at the same depth
-    of the hierarchy.
-
-    Raises ``RigError`` if a joint has no counterpart within 2 % of the figure's size.
+    RigError if a joint has none within 2 % of the figure's size.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -91,14 +81,11 @@ def joint_partners(figure: Figure) -> Ints:
 
 
 def posing_partners(figure: Figure) -> Ints:
-    """Return each joint's counterpart for mirrored poses: (J,) int32.
+    """Return counterparts (J,) for mirrored poses; -1 for joints of one side, such as a sword.
 
-    For symmetric skeletons, the result equals the result of ``joint_partners``. Pairs of other
-    humanoids are found by the bones that their file states and by names (``Ear_L``, ``Ear_R``), and
-    joints in the mirror plane are their own counterparts; -1 for joints on one side only, such as a
-    sword.
-
-    Raises ``RigError`` if a joint has no counterpart, and the file states no human bones.
+    They are ``joint_partners`` if the skeleton is symmetric. Otherwise stated human bones and names
+    (``Ear_L``, ``Ear_R``) find them, and joints in the mirror plane are their own. RigError if the
+    file states no human bones.
     """
     try:
         return joint_partners(figure)

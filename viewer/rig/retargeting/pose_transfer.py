@@ -91,10 +91,7 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
 
 
 def dof_layout(figure: Figure) -> str:
-    """Return a digest of the meaning of a figure's DOFs: if equal, values can be exchanged.
-
-    Blend shapes are ignored: their number does not change any joint's rotation.
-    """
+    """Return a digest of the meaning of DOFs, without blend shapes: if equal, values fit."""
     import hashlib
 
     skeleton = figure.require_skeleton()
@@ -119,14 +116,10 @@ def has_layout_of(source: JointRotations, figure: Figure) -> bool:
 
 
 def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
-    """Restore the base rotations, translations and scales beneath the DOFs, in place.
+    """Restore the rotations, translations and scales beneath the DOFs, in place.
 
-    They differ from the rest pose if a motion scales a joint, or rotates it about axes for which
-    it has no DOFs.
-    The stored world rotations are ignored: they are out of date once the DOFs are edited.
-
-    ``is_whole``: whether all DOFs of the source's pose are applied: joints that it does not contain
-    are then reset to the rest pose; by default, their values are unchanged.
+    A motion may scale joints, or rotate them about axes without DOFs. ``is_whole``: joints that
+    ``source`` lacks go to rest. Its world rotations are out of date once DOFs are edited.
     """
     if source.rotations is not None:
         pose.rotations[:] = source.rotations
@@ -141,11 +134,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
 
 
 def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
-    """Return the match of each target joint: the source joint with its name.
-
-    ``source``, ``target``: joint names; empty and repeated names match nothing. Returns (J,) int32,
-    source joints of the J target joints; -1 for none.
-    """
+    """Return the source joint of each target joint's name (J,); -1 for empty and repeated names."""
     counts, others = Counter(source), Counter(target)
     place = {name: joint for joint, name in enumerate(source)}
     return np.array(
@@ -157,12 +146,9 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
 def rotate_joints(
     source: JointRotations, target: Figure, start: Pose
 ) -> tuple[Pose, list[Diagnostic]]:
-    """Return a figure's pose with its joints rotated like another figure's joints.
+    """Return ``start`` with joints rotated like another figure's, within limits, and notes.
 
-    ``start``: pose of the target; not modified. Provides unmatched joints, placement, size, shape
-    and joint translations. Returns ``pose``: pose of the target, within the limits; ``notes``:
-    messages about the number of matched joints, unmatched joints, and unreachable rotations. Raises
-    ``RigError`` if the figures have no joint name in common.
+    RigError if the figures have no joint name in common.
     """
     other = target.skeleton
     if other is None:
@@ -202,10 +188,7 @@ def _partners(source: JointRotations, target: Skeleton) -> Ints:
 
 
 def left_of(figure: Figure) -> Floats:
-    """Return the left of a figure whose file states human bones; +x, the usual left, for others.
-
-    Characters of VRM 0.x face -z: their left is -x.
-    """
+    """Return the left (3,): -x for characters of VRM 0.x, which face -z; +x without human bones."""
     skeleton, usual = figure.require_skeleton(), np.array([1.0, 0.0, 0.0])
     if skeleton.humanoid is None:
         return usual

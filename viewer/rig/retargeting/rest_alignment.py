@@ -54,11 +54,7 @@ def up_rotation(source: str, target: str) -> Floats:
 
 
 def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
-    """Return a skeleton's rest pose, with all DOFs at 0.
-
-    ``to_common``: (3, 3), rotation from its own axes to the common axes. ``up``: either "y" or "z",
-    up axis of the common axes.
-    """
+    """Return a skeleton's rest pose, DOFs at 0, rotated ``to_common`` (3, 3) axes."""
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     points = world_matrices(skeleton, pose)[:, :3, 3]
@@ -69,10 +65,7 @@ def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
 
 
 def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> bool:
-    """Return whether all bones point in nearly the same direction, regardless of their lengths.
-
-    ``parents``: (J,), parents of the target's joints.
-    """
+    """Return whether all bones point in nearly the same direction, whatever their lengths."""
     inner = np.flatnonzero(parents >= 0)
     bones = target.points[inner] - target.points[parents[inner]]
     partners = matches.partners
@@ -83,22 +76,15 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
 
 
 def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> Floats:
-    """Return the rotations from the target's rest pose to the source's at every matched joint.
-
-    In limbs, the bone is rotated to the source's direction by the smallest rotation from the body's
-    orientation, in fingers from the hand's, and therefore without twist. For hands with fingers,
-    the knuckle line is also aligned. Trunk and feet only follow the body, unless their directions
-    differ by more than 25 degrees. The last joint of a limb follows the joint before it.
-
-    ``parents``: (J,), parents of the target's joints. Returns (J, 3, 3), rotations in the common
-    axes; the identity for unmatched joints.
-    """
+    """Return rotations (J, 3, 3) from the target's rest pose to the source's, in common axes."""
     # B of the module retarget: W_t = W_s R_s^-1 B R_t. If the target's rest pose, rotated by B at
     # each joint, is the source's rest pose, then the target shows the source's pose in every frame.
     # A bone gives two of the three degrees of freedom of B, its direction; the rest, the twist
     # about the bone, comes from a rotation that both bodies have: of the whole body (stands) or of
     # the nearest matched ancestor (reference). Joints are visited from the root down, so that the
-    # reference is known.
+    # reference is known. So limbs rotate from the body without twist, fingers from the hand; hands
+    # with fingers also align the knuckle line; trunk and feet follow the body unless they differ
+    # greatly, and the last joint of a limb follows the one before it.
     stands = _standing(source, target, matches)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
     above = _matched_above(matches, parents)

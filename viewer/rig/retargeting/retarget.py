@@ -64,20 +64,14 @@ def retarget(
     mapping: Mapping[str, str] | JointMap | None = None,
     source_rest: SourceRest = "zero",
 ) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return a motion made for another skeleton as a clip of a figure.
+    """Return a motion made for another skeleton as a clip of a figure, and notes.
 
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
     spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
-    the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
-
-    ``source_rest``: the motion's rest pose, see ``viewer.rig.retargeting.source_rest``; with
-    "auto", a motion of the figure's own skeleton keeps its own rest pose. Returns ``clip``: clip
-    for this figure. A skinned figure moves as a whole (``figure_translations``), a skeleton without
-    a skin moves at its root; ``notes``: messages about matched and unmatched joints, the rest pose,
-    and the scale of the path. Raises ``RigError`` if too few joints match, the mapping names a
-    missing joint, or a frame is missing.
+    the same hierarchy and nearly the same rest pose, local rotations are copied unchanged. RigError
+    if too few joints match, the mapping names a missing joint, or a frame is missing.
     """
     found = retargeted(motion, figure, mapping, source_rest)
     return found.clip, found.notes
@@ -154,11 +148,7 @@ class Retargeted:
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
-    """Return a skeleton and its motion with all lengths scaled, for instance from cm to m.
-
-    ``motion``: motion in any unit. ``unit``: unit of the scaled lengths, as in ``Figure.unit``.
-    Raises ``RigError`` if the factor is not positive.
-    """
+    """Return a motion with all lengths times a factor and in ``unit``; RigError unless positive."""
     if not 0.0 < factor < np.inf:
         raise RigError(f"expected a factor above 0, found {factor:g}")
     figure, clip = motion.figure, motion.clip
@@ -254,10 +244,7 @@ def _unit(quaternions: Floats) -> Floats:
 
 
 def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and the kind of lengths compared.
-
-    Legs are compared if both have them, otherwise arms, otherwise all matched joints.
-    """
+    """Return target over source length, of legs, else arms, else all joints; and of which."""
     partners, names = matches.partners, matches.names
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
 
@@ -422,15 +409,13 @@ def _ground_offset(job: _Job, scale: float) -> Floats:
 def ground_offset(
     source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
 ) -> Floats:
-    """Return the offset that moves the target's feet to the feet of the scaled source.
+    """Return the offset (3,) along ``up`` that brings the target's feet to the scaled source's.
 
-    The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
-    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
-
-    ``source``, ``target``: (J', 3), (J, 3), joints of both skeletons in the source's rest pose, in
-    common axes. ``up``: (3,), the up axis. Returns (3,), offset along the up axis, in the target's
-    unit; 0 if pelvis or feet are unmatched, or the source does not stand in its rest pose.
+    ``source`` (J', 3), ``target`` (J, 3): joints in the source's rest pose, common axes. 0 if
+    pelvis or feet are unmatched, or the source does not stand.
     """
+    # The path is scaled by the ratio of leg lengths from hip to ankle, but feet and hips may have
+    # another ratio: without the offset, a body with high ankles sinks into the ground.
     place = {
         name: joint for joint, name in enumerate(matches.names) if matches.partners[joint] >= 0
     }
@@ -449,12 +434,7 @@ def ground_offset(
 def expression_weights(
     expressions: Mapping[str, Floats], figure: Figure
 ) -> tuple[Floats | None, list[Diagnostic]]:
-    """Return a figure's blend shape weights over time; other shapes keep their rest weights.
-
-    ``expressions``: mapping of str to (N,), weights by the names of VRM 1.0. Returns ``weights``:
-    (N, S) or None, none if no expression moves a shape of the figure; ``notes``: the expressions
-    that the figure does not have.
-    """
+    """Return blend shape weights (N, S), None if none moves, and notes on missing expressions."""
     shapes = figure.blend_shapes
     names = () if shapes is None else shapes.names
     # Expressions come after the morph targets, whose names they may share.
@@ -492,12 +472,7 @@ def _plain(name: str) -> str:
 def _limbs_at_rest(
     motion: SkeletonMotion, figure: Figure, matches: Matches, rotations: Floats
 ) -> list[Diagnostic]:
-    """Return warnings about thighs, knees, upper arms and elbows that stay at rest throughout.
-
-    Mostly their names have no known meaning, or a wrong one.
-
-    ``rotations`` (N, J, 4): local rotations of the figure.
-    """
+    """Warn of limbs that never move: their names mostly have no known meaning, or a wrong one."""
     source, target = motion.figure.require_skeleton(), figure.require_skeleton()
     mine, theirs = joint_labels(target), joint_labels(source)
     places = {name: joint for joint, name in enumerate(matches.names) if name}

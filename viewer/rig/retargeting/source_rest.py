@@ -63,13 +63,11 @@ def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
 def with_source_rest(
     motion: SkeletonMotion, choice: SourceRest
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
-    """Return a motion whose skeleton has the requested rest pose; the motion itself is unchanged.
+    """Return a motion whose skeleton has the requested rest pose, and a note of which.
 
-    ``choice``: the frame that is the rest pose; the skeleton's own rest pose; or the latter if it
-    is a standing pose or its limbs have no known names, otherwise the T-pose with parallel joint
-    axes, otherwise the best T- or A-pose among the frames, otherwise an estimate from the anatomy.
-    Returns ``motion``: the same clip, with another rest pose of the skeleton; ``notes``: the chosen
-    rest pose, unless it is the skeleton's. Raises ``RigError`` if there is no such frame.
+    "auto": the skeleton's own if it stands or its limbs have no known names; otherwise the T-pose
+    with parallel joint axes, the best T- or A-pose among the frames, or an estimate from anatomy.
+    RigError if there is no such frame.
     """
     fault = rest_fault(motion, choice)
     if fault is not None:
@@ -104,11 +102,9 @@ def with_source_rest(
 
 
 def with_upright_rest(motion: SkeletonMotion) -> SkeletonMotion:
-    """Return a motion whose rest pose stands along the up axis; the motion itself is unchanged.
-
-    Some programs rotate the root of a skeleton with y up into a world with z up, in which its rest
-    pose lies. Skeletons whose legs are not along an axis, or have no known names, are unchanged.
-    """
+    """Return a motion whose rest pose stands along the up axis."""
+    # Some programs rotate the root of a skeleton with y up into a world with z up, in which its
+    # rest pose lies. Skeletons whose legs are along no axis, or have no known names, stay.
     skeleton, up = motion.figure.skeleton, np.eye(3)["xyz".index(motion.figure.up)]
     still = None if skeleton is None else rest_posture(skeleton, motion.figure.up)
     if skeleton is None or still is None:
@@ -188,10 +184,7 @@ def _row(motion: SkeletonMotion, frame: int) -> int:
 
 
 def _is_body(still: Postures) -> bool:
-    """Return whether a rest pose is a body's: legs apart from the trunk, limbs unfolded.
-
-    The body need not be upright, and may be an animal's, whose legs are perpendicular to its trunk.
-    """
+    """Return whether a rest pose is a body's, upright or not: legs off trunk, limbs unfolded."""
     trunk = still.trunk()[0]
     side = still.direction("right_hip", "left_hip")[0]
     for name, sign in zip(SIDES, (1.0, -1.0), strict=True):

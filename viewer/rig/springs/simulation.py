@@ -101,12 +101,10 @@ class Simulation:
     def step(
         self, tails: Tails, world: Floats, local: Floats, scales: Floats, place: Floats
     ) -> tuple[Tails, Floats]:
-        """Return the points after one step, and the rotations of the spring joints.
+        """Return the points after a step, and the spring joints' rotations in parents (N, 4).
 
-        ``world``, ``local``: (J, 4, 4), matrices of all joints in the pose at the end of the step,
-        without springs; local ones without scale. ``scales``: (J, 3), scale factors of the joints.
-        ``place``: (4, 4), placement of the whole figure. Returns ``rotations``: (N, 4), complete
-        rotations relative to the parents: unit quaternions (x, y, z, w).
+        ``world``, ``local`` (J, 4, 4): the pose at the end of the step, without springs; local ones
+        without ``scales`` (J, 3). ``place`` (4, 4): of the whole figure.
         """
         springs, world = self._springs, world.copy()
         now = np.empty_like(tails.now)
@@ -194,11 +192,7 @@ class Simulation:
 
 
 def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
-    """Return the spring joints and all joints below them, each after those it depends on.
-
-    A joint depends on its parent, and a spring joint on the moving joints of its colliders, except
-    where these in turn depend on it.
-    """
+    """Return spring joints and all below them, after their parents and colliders' joints."""
     depths = np.full(skeleton.n_joints, -1)
     is_spring = np.zeros(skeleton.n_joints, dtype=np.bool_)
     is_spring[springs.joints] = True
@@ -264,10 +258,7 @@ def _inverse(matrices: Floats) -> Floats:
 
 
 def _regular(linear: Floats) -> Floats:
-    """Return matrices (N, 3, 3), with singular ones replaced by the identity.
-
-    A scale of 0 hides joints, whose points then cannot swing.
-    """
+    """Return (N, 3, 3) with singular matrices, those of joints of scale 0, as identities."""
     is_flat = np.abs(np.linalg.det(linear)) < _FLAT
     found: Floats = np.where(is_flat[:, None, None], np.eye(3), linear)
     return found
@@ -306,11 +297,7 @@ _PosesAt = Callable[[Floats], PosedJoints]
 
 
 class SpringTrack:
-    """Rotations of the spring joints of one skeleton during one motion.
-
-    ``start``, ``end``: range of the motion in seconds; the rotations are constant outside this
-    range.
-    """
+    """Rotations of spring joints from ``start`` to ``end`` seconds, constant outside of these."""
 
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:
         self._simulation, self._start = Simulation(skeleton), start
@@ -319,11 +306,7 @@ class SpringTrack:
         self._blocks: dict[int, Floats] = {}
 
     def rotations(self, times: Floats, poses_at: _PosesAt) -> Floats:
-        """Return the complete rotations of the spring joints relative to their parents.
-
-        ``times``: (F,), seconds on the motion's own clock. Returns (F, N, 4), unit quaternions (x,
-        y, z, w).
-        """
+        """Return the spring joints' rotations in parents (F, N, 4) at times (F,) of the motion."""
         steps = np.clip((times - self._start) * STEPS_PER_SECOND, 0.0, self._last)
         before: Ints = np.floor(steps + _ON_STEP).astype(np.int32)
         fractions = np.maximum(steps - before, 0.0)

@@ -51,13 +51,7 @@ def move_transform_keys(
     dv: float,
     gap: float,
 ) -> TransformClip:
-    """Return a clip with some keys moved together.
-
-    ``places``: iterable of (row, key), selected keys. ``dt``: seconds; reduced if a key would
-    otherwise come closer than ``gap`` to an unmoved key. ``dv``: change of the value of each
-    selected component: radians, length, factor or weight. ``gap``: minimum distance between keys,
-    seconds, above 0.
-    """
+    """Move keys (row, key) by ``dt``, no nearer than ``gap`` > 0 to others, and by ``dv``."""
     for index, chosen in _by_channel(clip, skeleton, places).items():
         channel = clip.channels[index]
         for key, components in chosen.items():
@@ -90,11 +84,9 @@ def set_transform_key(
 def add_transform_key(
     clip: TransformClip, row: TransformRow, time: float, value: Floats | None = None
 ) -> TransformClip:
-    """Return a clip with a key added to a channel; an existing key at this time is changed instead.
+    """Return a clip with a key at a time, or the one there changed; a new channel needs a value.
 
-    ``row``: any component; if it has no channel, one is added. ``value``: (C,), value of the key, a
-    quaternion for rotations; by default the value of the curve, whose shape is then unchanged.
-    Required if the row has no channel.
+    ``value`` (C,): a quaternion for rotations; without it, the curve's shape is unchanged.
     """
     if row.channel >= 0:
         channel = added_key(clip.channels[row.channel], time, value)[0]
@@ -146,9 +138,7 @@ def set_clip_range(clip: TransformClip, start: float, end: float) -> TransformCl
 def key_transform_pose(
     clip: TransformClip, figure: Figure, pose: Pose, time: float, only_changed: bool = False
 ) -> TransformClip:
-    """Return a clip with a key of the pose at one time.
-
-    Properties that differ from the file's pose and have no channel get one.
+    """Key a pose at a time, with new channels for what differs from the file's pose.
 
     ``only_changed``: key only properties that differ from the clip at this time.
     """
@@ -305,11 +295,9 @@ def value_at(channel: TransformChannel, time: float) -> Floats:
 def added_key(
     channel: TransformChannel, time: float, value: Floats | None = None
 ) -> tuple[TransformChannel, int]:
-    """Return a channel with one more key, and its index.
+    """Return a channel with a key (C,), changing one that is there, and its index.
 
-    ``time``: seconds. An existing key at this time is changed instead. ``value``: (C,), its value;
-    by default the shape of the curve is unchanged. A cubic key with a value gets the slope between
-    its neighbours.
+    Without a value the curve is unchanged; a cubic key with one gets the slope of its neighbours.
     """
     there = _key_at(channel, time)
     if there >= 0:

@@ -97,11 +97,7 @@ def key_values(channel: TransformChannel, skeleton: Skeleton) -> Floats:
 def row_values(
     clip: TransformClip, skeleton: Skeleton, chosen: Sequence[int], times: Floats
 ) -> Floats:
-    """Return some curves of a clip at many times.
-
-    ``chosen``: indices into ``rows_of``. ``times``: (T,), seconds. Returns (T, C), radians,
-    lengths, factors or weights; 0 for rotations without keys.
-    """
+    """Return curves ``chosen`` of ``rows_of`` at times: (T, C); 0 for rotations without keys."""
     rows = [rows_of(clip, skeleton)[index] for index in chosen]
     used = tuple(sorted({row.channel for row in rows if row.channel >= 0}))
 
