@@ -18,8 +18,10 @@ from viewer.rig.scene import Scene
 
 ROOT = Path(viewer.__file__).parent
 KEY = re.compile(r"([A-Z]\d{3}\.[a-z0-9-]+): (.+)", re.DOTALL)
-CALLS = {"fault", "refuse", "warn", "found", "Phrase", "note", "Diagnostic"}
-"""Functions that take a sentence and its values."""
+CALLS = {"fault", "refuse", "warn", "found", "note", "Diagnostic"}
+"""Functions that take a key with its sentence, and the values."""
+PHRASES = {"Phrase", "InvalidValueError", "RecordError", "fail", "fault"}
+"""Functions that take a sentence without a key, some of them after another argument."""
 SHARED = {name: text for name, text in vars(wording).items() if name.isupper()}
 
 
@@ -74,8 +76,8 @@ def test_every_call_supplies_the_values_of_its_sentence() -> None:
             if not isinstance(call, ast.Call) or not call.args:
                 continue
             name = getattr(call.func, "attr", getattr(call.func, "id", ""))
-            text = _text_of(call.args[0])
-            if name not in CALLS or text is None or (name != "Phrase" and not KEY.match(text)):
+            text = next(filter(None, map(_text_of, call.args[:2])), None)
+            if text is None or name not in (CALLS if KEY.match(text) else PHRASES):
                 continue
             given = _names_of(call)
             if given is None:

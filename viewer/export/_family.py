@@ -138,8 +138,7 @@ def family_frames(
             notes.append(
                 Diagnostic(
                     "X003.other-shape-space: the shape coefficients of {own} do not apply to "
-                    "{other} "
-                    "and are written as 0",
+                    "{other} and are written as 0",
                     values=values,
                 )
             )

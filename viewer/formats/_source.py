@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -318,11 +318,16 @@ def _indices(places: ArrayLike) -> Ints:
 
 
 class InvalidValueError(Exception):
-    """An invalid value, ``expected …, found …``; the caller adds the file and the line."""
+    """An invalid value, with a sentence ``expected …, found …``; the caller adds file and line."""
 
-    def __init__(self, problem: Phrase) -> None:
-        self.problem = problem
-        super().__init__(str(problem))
+    def __init__(self, problem: str | Phrase, **values: object) -> None:
+        self.problem = phrased(problem, values)
+        super().__init__(str(self.problem))
+
+
+def phrased(problem: str | Phrase, values: Mapping[str, object]) -> Phrase:
+    """Return a sentence with its values, or a whole phrase unchanged."""
+    return problem if isinstance(problem, Phrase) else Phrase(problem, **values)
 
 
 def remark_on(key: str, fault: Diagnostic) -> Diagnostic:

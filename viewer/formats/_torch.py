@@ -13,7 +13,7 @@ import zipfile
 from functools import partial
 from typing import Literal
 
-from viewer.diagnostics import Phrase, wording
+from viewer.diagnostics import wording
 from viewer.formats._archive.values import Archive
 from viewer.formats._archive.zip import DAMAGE, StoredFile, ZipDirectory
 from viewer.formats._pickle.machine import Machine
@@ -79,19 +79,19 @@ class _Storages:
         """Return the storage of a persistent id, after comparing its size with the archive's."""
         found = storage_of(persistent)
         if found is None:
-            raise InvalidValueError(Phrase(wording.TENSOR_PERSISTENT))
+            raise InvalidValueError(wording.TENSOR_PERSISTENT)
         key, storage = found
         member = self._members.get(self._folder + key)
         if member is None:
-            raise InvalidValueError(Phrase(wording.TENSOR_KEY, item=quoted(key)))
+            raise InvalidValueError(wording.TENSOR_KEY, item=quoted(key))
         if member.file_size != storage.size:
             values = {"item": quoted(key), "expected": storage.size, "found": member.file_size}
             raise InvalidValueError(
-                Phrase("expected a storage {item} of {expected} bytes, found {found}", **values)
+                "expected a storage {item} of {expected} bytes, found {found}", **values
             )
         known = self._known.setdefault(key, storage)
         if (known.code, known.count) != (storage.code, storage.count):
-            raise InvalidValueError(Phrase(wording.TENSOR_STORAGES, item=quoted(key)))
+            raise InvalidValueError(wording.TENSOR_STORAGES, item=quoted(key))
         known.order, known.load = self._order, partial(_read_member, self._file, member)
         return known
 
@@ -113,7 +113,7 @@ def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
                 done += len(piece)
     except DAMAGE as problem:
         reason = printable(problem, 100)
-        raise storage.fault(member.filename, Phrase(wording.NPY_DAMAGED, reason=reason)) from None
+        raise storage.fault(member.filename, wording.NPY_DAMAGED, reason=reason) from None
     return memoryview(room).toreadonly()
 
 
@@ -138,19 +138,17 @@ def read_bytes(outer: Machine, data: Span) -> object:
     found = read_stream(inner)
     outer.rejoin(inner)
     if not isinstance(found, Storage):
-        raise outer.fail(
-            Phrase("expected a storage saved by torch, found {found}", found=noun(found))
-        )
+        raise outer.fail("expected a storage saved by torch, found {found}", found=noun(found))
     return found
 
 
 def read_stream(machine: Machine) -> object:
     """Return the value of a legacy stream, with its storages in place."""
     if machine.run() != _NUMBER:
-        raise machine.fail(Phrase("expected a torch file, found a pickle of a different kind"))
+        raise machine.fail("expected a torch file, found a pickle of a different kind")
     if machine.run() != _PROTOCOL:
         raise machine.fail(
-            Phrase("expected torch protocol {expected}, found a different one", expected=_PROTOCOL)
+            "expected torch protocol {expected}, found a different one", expected=_PROTOCOL
         )
     system = machine.run()
     is_little = not isinstance(system, dict) or system.get("little_endian") is not False
@@ -162,7 +160,7 @@ def read_stream(machine: Machine) -> object:
     for key in keys if isinstance(keys, list) else []:
         _take(machine, storages, key)
     if any(storage.load is None for storage in storages.values()):
-        raise machine.fail(Phrase(wording.TENSOR_NO_STORAGE))
+        raise machine.fail(wording.TENSOR_NO_STORAGE)
     return found
 
 
@@ -170,12 +168,12 @@ def _declare(storages: dict[str, Storage], order: Literal["<", ">"], persistent:
     """Return the storage of a persistent id, the same one for the same key."""
     found = storage_of(persistent)
     if found is None:
-        raise InvalidValueError(Phrase(wording.TENSOR_PERSISTENT))
+        raise InvalidValueError(wording.TENSOR_PERSISTENT)
     key, storage = found
     storage.order = order
     known = storages.setdefault(key, storage)
     if (known.code, known.count) != (storage.code, storage.count):
-        raise InvalidValueError(Phrase(wording.TENSOR_STORAGES, item=quoted(key)))
+        raise InvalidValueError(wording.TENSOR_STORAGES, item=quoted(key))
     return known
 
 
@@ -184,7 +182,7 @@ def _take(machine: Machine, storages: dict[str, Storage], key: object) -> None:
     name = key.text() if isinstance(key, Span) and key.coding is not None else ""
     storage = storages.get(name)
     if storage is None or storage.load is not None:
-        raise machine.fail(Phrase(wording.TENSOR_KEY, item=quoted(name)))
+        raise machine.fail(wording.TENSOR_KEY, item=quoted(name))
     count = machine.number(8, is_signed=True)
     if count != storage.count:
         values = {
@@ -192,8 +190,6 @@ def _take(machine: Machine, storages: dict[str, Storage], key: object) -> None:
             "expected": counted(storage.count, "element"),
             "found": count,
         }
-        raise machine.fail(
-            Phrase("expected {expected} in the storage {item}, found {found}", **values)
-        )
+        raise machine.fail("expected {expected} in the storage {item}, found {found}", **values)
     start = machine.skip(storage.size)
     storage.load = Span(machine.data, start, machine.at).view

@@ -58,9 +58,8 @@ _MOST_COMPONENTS = 44
 _FLAGS = ("flat_hand_mean", "use_pca")
 _OWN = ("present", "up")
 _BESIDES = (
-    "num_betas mocap_time_length dmpls marker_data "
-    "marker_labels markers labels vids markers_latent latent_labels markers_latent_vids "
-    "smpl_scaling smpl_loss"
+    "num_betas mocap_time_length dmpls marker_data marker_labels markers labels vids "
+    "markers_latent latent_labels markers_latent_vids smpl_scaling smpl_loss"
 )
 _KNOWN = {
     *_POSES, *_TRANSLATIONS, *_SHAPES, *_EXPRESSIONS, *_FLAGS, *_OWN, *_BESIDES.split(),

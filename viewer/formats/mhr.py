@@ -95,8 +95,7 @@ def _files(source: Source) -> tuple[Source, Source]:
     if _RIG not in names:
         raise source.fault(
             "F002.mhr-folder: expected rig.npz and lod*.npz in the folder: MHR's "
-            "`convert_assets.py` writes them, and its `download_assets.py --lod 1` downloads "
-            "them"
+            "`convert_assets.py` writes them, and its `download_assets.py --lod 1` downloads them"
         )
     rig = source if source.path.name == _RIG else place(_RIG)
     named = _LOD.fullmatch(source.path.name)

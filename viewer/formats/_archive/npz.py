@@ -140,22 +140,20 @@ def _read_header(storage: StoredFile, key: str, stream: IO[bytes], size: int) ->
     lead = stream.read(8)
     layout = _LEAD.get(lead[6:8])
     if not lead.startswith(b"\x93NUMPY") or layout is None:
-        raise storage.fault(key, Phrase("expected an .npy header, found {found}", found=lead))
+        raise storage.fault(key, "expected an .npy header, found {found}", found=lead)
     width = struct.calcsize(layout)
     length = int.from_bytes(stream.read(width), "little")
     if length >= _LONGEST_HEADER:
         raise storage.fault(
-            key, Phrase("expected a header smaller than 64 KiB, found {found} bytes", found=length)
+            key, "expected a header smaller than 64 KiB, found {found} bytes", found=length
         )
     text = stream.read(length)
     if len(text) < length:
         raise storage.fault(
             key,
-            Phrase(
-                "expected a header of {expected} bytes, found {found}",
-                expected=length,
-                found=len(text),
-            ),
+            "expected a header of {expected} bytes, found {found}",
+            expected=length,
+            found=len(text),
         )
     if _RECORD.search(text):
         return Opaque(Phrase("structured array"))
@@ -172,10 +170,8 @@ def _parse_header(
     if rest != b"{}" or shape is None or descr is None or order is None:
         raise storage.fault(
             key,
-            Phrase(
-                "expected a header with descr, fortran_order and shape, found {found}",
-                found=text[:80],
-            ),
+            "expected a header with descr, fortran_order and shape, found {found}",
+            found=text[:80],
         )
     code = descr.decode("latin-1")
     dtype = array_dtype(code)
@@ -189,12 +185,10 @@ def _parse_header(
         left = max(size - offset, 0)
         raise storage.fault(
             key,
-            Phrase(
-                "expected {shape} {dtype}, found {found} bytes",
-                shape=axes(shape),
-                dtype=dtype.name,
-                found=left,
-            ),
+            "expected {shape} {dtype}, found {found} bytes",
+            shape=axes(shape),
+            dtype=dtype.name,
+            found=left,
         )
     return _Header(dtype, shape, order == b"True", n_items, offset)
 
@@ -261,7 +255,7 @@ def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
 
 
 def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
-    return storage.fault(key, Phrase(wording.NPY_DAMAGED, reason=printable(problem, 100)))
+    return storage.fault(key, wording.NPY_DAMAGED, reason=printable(problem, 100))
 
 
 def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> NDArray[Any]:
@@ -270,9 +264,7 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
     try:
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
-        raise storage.fault(
-            key, Phrase("not enough memory: {size} bytes needed", size=size)
-        ) from None
+        raise storage.fault(key, "not enough memory: {size} bytes needed", size=size) from None
     _fill(storage, key, flat, stream)
     try:
         return shaped(flat, header.shape, header.is_fortran)
@@ -288,6 +280,6 @@ def _fill(storage: StoredFile, key: str, flat: NDArray[Any], stream: IO[bytes]) 
     while done < size:
         chunk = stream.read(min(_CHUNK, size - done))
         if not chunk:
-            raise storage.fault(key, Phrase(wording.NPY_CUT, expected=size, found=done))
+            raise storage.fault(key, wording.NPY_CUT, expected=size, found=done)
         room[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
         done += len(chunk)

@@ -63,21 +63,17 @@ class Sparse:
         parts = (self.data, self.indices, self.indptr)
         if any(part.ndim != 1 for part in parts) or self.data.dtype.kind not in "biuf":
             raise InvalidValueError(
-                Phrase(
-                    "data, indices and index pointers of a sparse matrix must be one-dimensional"
-                )
+                "data, indices and index pointers of a sparse matrix must be one-dimensional"
             )
         if self.indices.dtype.kind not in "iu" or self.indptr.dtype.kind not in "iu":
             raise InvalidValueError(
-                Phrase("expected integer indices in a sparse matrix, found non-integers")
+                "expected integer indices in a sparse matrix, found non-integers"
             )
         if not all(0 <= side <= _MAX_SIDE for side in self.shape):
             raise InvalidValueError(
-                Phrase(
-                    "expected at most {most} rows and columns, found {shape}",
-                    most=_MAX_SIDE,
-                    shape=axes(self.shape),
-                )
+                "expected at most {most} rows and columns, found {shape}",
+                most=_MAX_SIDE,
+                shape=axes(self.shape),
             )
         if self.layout == "coo":
             self._check_indices(self.indices, self.shape[0])
@@ -89,24 +85,19 @@ class Sparse:
         across, along = self.shape if self.layout == "csc" else self.shape[::-1]
         if len(self.indptr) != along + 1:
             raise InvalidValueError(
-                Phrase(
-                    "expected {expected} index pointers in a sparse {shape} matrix, found {found}",
-                    expected=along + 1,
-                    shape=axes(self.shape),
-                    found=len(self.indptr),
-                )
+                "expected {expected} index pointers in a sparse {shape} matrix, found {found}",
+                expected=along + 1,
+                shape=axes(self.shape),
+                found=len(self.indptr),
             )
         count = len(self.data)
         # Unsigned differences wrap around, so compare instead of subtracting.
         ordered = bool((self.indptr[1:] >= self.indptr[:-1]).all())
         if not ordered or int(self.indptr[0]) != 0 or int(self.indptr[-1]) != count:
             raise InvalidValueError(
-                Phrase(
-                    "expected index pointers in ascending order from 0 to {count} in a sparse "
-                    "matrix, "
-                    "found them unsorted",
-                    count=count,
-                )
+                "expected index pointers in ascending order from 0 to {count} in a sparse matrix, "
+                "found them unsorted",
+                count=count,
             )
         self._check_indices(self.indices, across)
 
@@ -115,23 +106,19 @@ class Sparse:
         count = len(self.data)
         if len(indices) != count:
             raise InvalidValueError(
-                Phrase(
-                    "expected {expected} indices in a sparse matrix, found {found}",
-                    expected=count,
-                    found=len(indices),
-                )
+                "expected {expected} indices in a sparse matrix, found {found}",
+                expected=count,
+                found=len(indices),
             )
         if count == 0:
             return
         low, high = int(indices.min()), int(indices.max())
         if low < 0 or high >= across:
             raise InvalidValueError(
-                Phrase(
-                    "expected indices 0 to {last} in a sparse matrix, found {low} to {high}",
-                    last=across - 1,
-                    low=low,
-                    high=high,
-                )
+                "expected indices 0 to {last} in a sparse matrix, found {low} to {high}",
+                last=across - 1,
+                low=low,
+                high=high,
             )
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
@@ -461,7 +448,5 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
     if array.dtype.kind == "U" and array.size:
         last = int(array.reshape(-1).view(np.uint32).max())
         if last > _LAST_LETTER:
-            raise InvalidValueError(
-                Phrase("invalid Unicode code point {found} in a string", found=last)
-            )
+            raise InvalidValueError("invalid Unicode code point {found} in a string", found=last)
     return array

@@ -11,13 +11,14 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import IO, cast, overload
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import unreadable
-from viewer.formats._source import Source
+from viewer.formats._source import Source, phrased
 from viewer.phrases import Remedy, printable
 
 DAMAGE = (
@@ -180,10 +181,17 @@ class StoredFile:
             )
         return file
 
-    def fault(self, key: str, problem: Phrase) -> FormatError:
+    def fault(self, key: str, problem: str | Phrase, **values: object) -> FormatError:
         """Return an error that states the file and the key."""
-        values = {"item": printable(key, 60), "problem": problem}
-        return FormatError(Diagnostic(wording.ARCHIVE_VALUE, self.path, values=values))
+        return value_fault(self.path, key, problem, values)
+
+
+def value_fault(
+    path: Path, key: str, problem: str | Phrase, values: dict[str, object]
+) -> FormatError:
+    """Return an error in the value of a key."""
+    values = {"item": printable(key, 60), "problem": phrased(problem, values)}
+    return FormatError(Diagnostic(wording.ARCHIVE_VALUE, path, values=values))
 
 
 def _reason(problem: Exception) -> object:
@@ -236,9 +244,7 @@ class FileWindow:
             while start < stop:
                 piece = file.read(min(_PIECE, stop - start))
                 if not piece:
-                    raise self._storage.fault(
-                        "", Phrase(wording.NPY_CUT, expected=stop, found=start)
-                    )
+                    raise self._storage.fault("", wording.NPY_CUT, expected=stop, found=start)
                 pieces.append(piece)
                 start += len(piece)
         return b"".join(pieces)

@@ -89,14 +89,12 @@ class Machine(pickle._Unpickler):
                 step = _STEPS.get(code)
                 if step is None:
                     raise self.fail(
-                        Phrase(
-                            "expected a pickle opcode, found {found}", found=quoted(bytes([code]))
-                        )
+                        "expected a pickle opcode, found {found}", found=quoted(bytes([code]))
                     )
                 step(self)
             return self.stack.pop()
         except UnicodeError:
-            raise self.fail(Phrase(wording.PICKLE_BYTES)) from None
+            raise self.fail(wording.PICKLE_BYTES) from None
         except InvalidValueError as problem:
             raise self.source.fault("F002.pickle: {problem}", problem=problem.problem) from None
         except _DAMAGE:
@@ -116,15 +114,13 @@ class Machine(pickle._Unpickler):
         self._budget -= count
         if self._budget < 0:
             raise self.fail(
-                Phrase("expected at most {most} opcodes in a pickle, found more", most=self._most)
+                "expected at most {most} opcodes in a pickle, found more", most=self._most
             )
 
     def nested(self, data: Data, start: int, end: int) -> Machine:
         """Return a machine for a pickle inside this one; it continues with the same budget."""
         if self.depth >= _DEEPEST:
-            raise self.fail(
-                Phrase("expected at most {most} nested pickles, found more", most=_DEEPEST)
-            )
+            raise self.fail("expected at most {most} nested pickles, found more", most=_DEEPEST)
         inner = Machine(self.source, data, start, end)
         inner.depth, inner._budget, inner._most = self.depth + 1, self._budget, self._most
         return inner
@@ -167,45 +163,38 @@ class Machine(pickle._Unpickler):
         start = self.at
         end = self.data.find(b"\n", start, self.end)
         if end < 0:
-            raise self.fail(
-                Phrase("expected the end of a line, found the end of the file (truncated?)")
-            )
+            raise self.fail("expected the end of a line, found the end of the file (truncated?)")
         if longest is not None and end - start > longest:
             raise self.fail(
-                Phrase(
-                    "expected at most {most} characters in a line, found {found}",
-                    most=longest,
-                    found=end - start,
-                )
+                "expected at most {most} characters in a line, found {found}",
+                most=longest,
+                found=end - start,
             )
         self.at = end + 1
         return start, end
 
     # Errors.
 
-    def fail(self, problem: Phrase) -> FormatError:
+    def fail(self, problem: str, **values: object) -> FormatError:
         """Return an error with the offset of the current opcode."""
+        found = Phrase(problem, **values)
         return self.source.fault(
-            "F002.pickle-step: {problem} at byte {at}", problem=problem, at=self._step_at
+            "F002.pickle-step: {problem} at byte {at}", problem=found, at=self._step_at
         )
 
     def misfit(self) -> FormatError:
         """Return the error for an opcode that does not fit the values before it."""
         return self.fail(
-            Phrase(
-                "expected an opcode that fits the values before it, found {found}",
-                found=quoted(bytes([self.data[self._step_at]])),
-            )
+            "expected an opcode that fits the values before it, found {found}",
+            found=quoted(bytes([self.data[self._step_at]])),
         )
 
     def cut_short(self, wanted: int, found: int) -> FormatError:
         """Return the error for a length that exceeds the rest of the file."""
         return self.fail(
-            Phrase(
-                "expected {expected} more bytes, found {found} (truncated?)",
-                expected=wanted,
-                found=found,
-            )
+            "expected {expected} more bytes, found {found} (truncated?)",
+            expected=wanted,
+            found=found,
         )
 
     def damaged_line_ends(self) -> FormatError:
@@ -224,7 +213,7 @@ class Machine(pickle._Unpickler):
     def persistent_load(self, pid: object) -> object:
         """Replace a persistent id by its value, if files of this kind define one."""
         if self.persistent is None:
-            raise InvalidValueError(Phrase(wording.PICKLE_REFUSED, found=Phrase("a persistent id")))
+            raise InvalidValueError(wording.PICKLE_REFUSED, found=Phrase("a persistent id"))
         return self.persistent(pid)
 
     def _instantiate(self, klass: object, args: list[object]) -> None:
@@ -240,7 +229,7 @@ def _span(width: int, coding: str | None = None, *, is_signed: bool = False) -> 
 
 def _refused(key: str) -> _Step:
     def refuse(machine: Machine) -> None:
-        raise InvalidValueError(Phrase(wording.PICKLE_REFUSED, found=Phrase(key)))
+        raise InvalidValueError(wording.PICKLE_REFUSED, found=Phrase(key))
 
     return refuse
 
@@ -248,7 +237,7 @@ def _refused(key: str) -> _Step:
 def _protocol(machine: Machine) -> None:
     protocol = machine.number(1)
     if protocol > _LAST_PROTOCOL:
-        raise machine.fail(Phrase("expected pickle protocol 0 to 5, found {found}", found=protocol))
+        raise machine.fail("expected pickle protocol 0 to 5, found {found}", found=protocol)
 
 
 def _frame(machine: Machine) -> None:
@@ -261,11 +250,9 @@ def _long_integer(machine: Machine) -> None:
     size = machine.number(4, is_signed=True)
     if not 0 <= size <= _MAX_INTEGER:
         raise machine.fail(
-            Phrase(
-                "expected an integer of at most {most} bytes, found {found}",
-                most=_MAX_INTEGER,
-                found=size,
-            )
+            "expected an integer of at most {most} bytes, found {found}",
+            most=_MAX_INTEGER,
+            found=size,
         )
     machine.append(machine.number(size, is_signed=True))
 
@@ -282,9 +269,7 @@ def _quoted(machine: Machine) -> None:
         return
     # Pairs of backslashes are matched first, so that every other backslash begins an escape.
     if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
-        raise machine.fail(
-            Phrase("expected a string as written by Python 2, found an unknown escape")
-        )
+        raise machine.fail("expected a string as written by Python 2, found an unknown escape")
     data = codecs.escape_decode(text[1:-1])[0]
     machine.append(Span(data, 0, len(data), "latin-1"))
 
@@ -337,9 +322,7 @@ def _loaded_bytes(machine: Machine, function: StandIn, arguments: object) -> obj
         case (Span(coding=None | "latin-1") as data,) if machine.load_bytes is not None:
             return machine.load_bytes(machine, data)
     found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
-    raise InvalidValueError(
-        Phrase(wording.PICKLE_ARGUMENTS, name=function.name, found=listed(found))
-    )
+    raise InvalidValueError(wording.PICKLE_ARGUMENTS, name=function.name, found=listed(found))
 
 
 def _new(machine: Machine) -> None:
@@ -383,9 +366,9 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
     kind, padding = state.get("subclass"), state.get("numpy_array_alignment_bytes")
     is_usual = isinstance(kind, StandIn) and kind.role == "ndarray"
     if not is_usual or not is_sizes(shape) or not isinstance(dtype, Dtype):
-        raise InvalidValueError(Phrase(wording.JOBLIB_WRAPPER, name=wrapper.of.name))
+        raise InvalidValueError(wording.JOBLIB_WRAPPER, name=wrapper.of.name)
     if not isinstance(order, Span) or order.raw() not in (b"C", b"F"):
-        raise InvalidValueError(Phrase(wording.JOBLIB_WRAPPER, name=wrapper.of.name))
+        raise InvalidValueError(wording.JOBLIB_WRAPPER, name=wrapper.of.name)
     if dtype.code.startswith("O"):
         return _objects(machine)
     if padding is not None:
@@ -396,11 +379,9 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
         # The size of the elements is unknown, and therefore also the position at which the pickle
         # continues.
         raise InvalidValueError(
-            Phrase(
-                "expected an array of numbers or strings, found {shape} of {dtype}",
-                dtype=dtype.what(),
-                shape=axes(shape),
-            )
+            "expected an array of numbers or strings, found {shape} of {dtype}",
+            dtype=dtype.what(),
+            shape=axes(shape),
         )
     start = machine.skip(n_items * found.itemsize)
     array = Array()
@@ -415,7 +396,7 @@ def _objects(machine: Machine) -> object:
     machine.at = inner.at
     machine.rejoin(inner)
     if not isinstance(found, Array):
-        raise InvalidValueError(Phrase("expected an array of objects, found a different value"))
+        raise InvalidValueError("expected an array of objects, found a different value")
     return found
 
 

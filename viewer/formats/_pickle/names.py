@@ -83,19 +83,15 @@ def find(module: str, name: str) -> StandIn:
     role = _ROLES.get((module, name))
     if module.startswith("joblib.numpy_pickle") and name in _OLD_WRAPPERS:
         raise InvalidValueError(
-            Phrase(
-                "expected arrays in the file, found {name}, which stores them in separate files: "
-                "load and save it again with joblib 0.10 or later",
-                name=full,
-            )
+            "expected arrays in the file, found {name}, which stores them in separate files: "
+            "load and save it again with joblib 0.10 or later",
+            name=full,
         )
     if role is None:
         raise InvalidValueError(
-            Phrase(
-                'expected arrays and plain data, found the global "{name}", which is not allowed; '
-                "nothing was executed",
-                name=full,
-            )
+            'expected arrays and plain data, found the global "{name}", which is not allowed; '
+            "nothing was executed",
+            name=full,
         )
     return StandIn(full, role)
 
@@ -104,9 +100,7 @@ def call(function: object, arguments: object) -> tuple[object, int]:
     """Return the result of calling a ``StandIn``, and the number of copied items."""
     if not isinstance(function, StandIn) or function.role not in (*_CALLS, *TORCH_CALLS):
         raise InvalidValueError(
-            Phrase(
-                "expected a call of a known function, found a call of {found}", found=noun(function)
-            )
+            "expected a call of a known function, found a call of {found}", found=noun(function)
         )
     if isinstance(arguments, tuple) and len(arguments) <= _MOST_ARGUMENTS:
         made = _called(function.role, arguments)
@@ -115,9 +109,7 @@ def call(function: object, arguments: object) -> tuple[object, int]:
             sizes = [len(each) for each in arguments if isinstance(each, list | Span)]
             return made, sum(sizes) if copies else 0
     found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
-    raise InvalidValueError(
-        Phrase(wording.PICKLE_ARGUMENTS, name=function.name, found=listed(found))
-    )
+    raise InvalidValueError(wording.PICKLE_ARGUMENTS, name=function.name, found=listed(found))
 
 
 def _called(role: str, arguments: tuple[object, ...]) -> object:
@@ -131,7 +123,7 @@ def create(of: object, arguments: object) -> Instance:
     """Return a new object of a class, whose state is set later by ``build``."""
     if not isinstance(of, StandIn) or of.role not in _CLASSES or arguments != ():
         raise InvalidValueError(
-            Phrase("expected a new instance of a known class, found {found}", found=noun(of))
+            "expected a new instance of a known class, found {found}", found=noun(of)
         )
     return Instance(of)
 
@@ -153,7 +145,7 @@ def build(target: object, state: object) -> None:
         target.state = state
     else:
         raise InvalidValueError(
-            Phrase("expected an object that accepts a state, found {found}", found=noun(target))
+            "expected an object that accepts a state, found {found}", found=noun(target)
         )
 
 
@@ -168,7 +160,7 @@ def as_key(value: object) -> str | bytes | int:
     if type(value) is int and abs(value) < _LARGEST_KEY:
         return value
     raise InvalidValueError(
-        Phrase("expected a string or a number as a key, found {found}", found=noun(value))
+        "expected a string or a number as a key, found {found}", found=noun(value)
     )
 
 
@@ -304,9 +296,7 @@ def _build_array(target: Array, state: object) -> None:
                 target.what, target.items = dtype.what(), payload
                 target.shape, target.is_fortran = shape, bool(order)
                 return
-    raise InvalidValueError(
-        Phrase("expected the state of an array, found {found}", found=noun(state))
-    )
+    raise InvalidValueError("expected the state of an array, found {found}", found=noun(state))
 
 
 def _build_dtype(target: Dtype, state: object) -> None:
@@ -315,7 +305,7 @@ def _build_dtype(target: Dtype, state: object) -> None:
             letter = _short(order)
             if letter is None or letter not in _ORDERS:
                 raise InvalidValueError(
-                    Phrase("expected the byte order of an array, found {found}", found=noun(order))
+                    "expected the byte order of an array, found {found}", found=noun(order)
                 )
             if any(part is not None for part in (sub, names, fields)):
                 target.code = "V"  # records may have any size
@@ -323,6 +313,4 @@ def _build_dtype(target: Dtype, state: object) -> None:
             dtype = target.dtype()
             if dtype is None or size in (-1, dtype.itemsize):
                 return
-    raise InvalidValueError(
-        Phrase("expected the state of a dtype, found {found}", found=noun(state))
-    )
+    raise InvalidValueError("expected the state of a dtype, found {found}", found=noun(state))

@@ -24,9 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive, Opaque, Sparse, Value
+from viewer.formats._archive.zip import value_fault
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.names import SPARSE
 from viewer.formats._pickle.tensors import Storage, Tensor
@@ -192,9 +193,8 @@ class _Resolver:
     def __init__(self, path: Path, key: str, budget: int) -> None:
         self.path, self.key, self.budget = path, key, budget
 
-    def fail(self, problem: Phrase) -> FormatError:
-        values = {"item": printable(self.key, 60), "problem": problem}
-        return FormatError(Diagnostic(wording.ARCHIVE_VALUE, self.path, values=values))
+    def fail(self, problem: str | Phrase, **values: object) -> FormatError:
+        return value_fault(self.path, self.key, problem, values)
 
     def value(self, value: object, depth: int) -> Value:
         self.budget -= 1
@@ -219,7 +219,7 @@ class _Resolver:
         try:
             return span.text()
         except UnicodeError:
-            raise self.fail(Phrase(wording.PICKLE_BYTES)) from None
+            raise self.fail(wording.PICKLE_BYTES) from None
 
     def thing(self, value: object) -> Deferred | Sparse | Opaque:
         if isinstance(value, Array):
@@ -238,13 +238,13 @@ class _Resolver:
             if isinstance(value, Dtype):
                 return Opaque(Phrase("element type"))
             return Opaque(Phrase("{name}", name=value.name))
-        raise self.fail(Phrase("unexpected object in the pickle"))
+        raise self.fail("unexpected object in the pickle")
 
     def sparse(self, matrix: Instance) -> Sparse:
         state = matrix.state or {}
         shape = state.get("_shape", state.get("shape"))
         if not is_sizes(shape) or len(shape) != 2:
-            raise self.fail(Phrase("expected a sparse matrix with a shape, found none"))
+            raise self.fail("expected a sparse matrix with a shape, found none")
         names = ("row", "col") if matrix.of.role == "coo" else ("indices", "indptr")
         coordinates = state.get("coords")  # rows and columns, since SciPy 1.13
         if names[0] == "row" and isinstance(coordinates, tuple) and len(coordinates) == 2:
@@ -259,7 +259,7 @@ class _Resolver:
         array = state.get(name)
         later = array.deferred(self.fail) if isinstance(array, Array) else None
         if later is None:
-            raise self.fail(Phrase("expected a sparse matrix with {part}, found none", part=name))
+            raise self.fail("expected a sparse matrix with {part}, found none", part=name)
         return later.values()
 
     def expression(self, value: Instance, depth: int) -> Deferred | Opaque:
@@ -296,9 +296,7 @@ class _Resolver:
         count, found = math.prod(wanted), math.prod(chosen.shape)
         if count != found:
             values = {"expected": printable(count, 40), "name": name, "found": found}
-            raise self.fail(
-                Phrase("expected {expected} indices in {name}, found {found}", **values)
-            )
+            raise self.fail("expected {expected} indices in {name}, found {found}", **values)
         return Deferred(wanted, whole.dtype, partial(self.take, whole, chosen, wanted))
 
     def take(self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]) -> NDArray[Any]:
@@ -306,11 +304,9 @@ class _Resolver:
         if indices.size and (int(indices.min()) < 0 or int(indices.max()) >= len(flat)):
             low, high = int(indices.min()), int(indices.max())
             raise self.fail(
-                Phrase(
-                    "expected indices 0 to {last}, found {low} to {high}",
-                    last=len(flat) - 1,
-                    low=low,
-                    high=high,
-                )
+                "expected indices 0 to {last}, found {low} to {high}",
+                last=len(flat) - 1,
+                low=low,
+                high=high,
             )
         return flat.take(indices.reshape(-1).astype(np.intp)).reshape(shape)

@@ -68,7 +68,7 @@ class Storage:
         """Return the elements as a type of this size, as stored."""
         if self._bytes is None:
             if self.load is None:
-                raise InvalidValueError(Phrase(wording.TENSOR_NO_STORAGE))
+                raise InvalidValueError(wording.TENSOR_NO_STORAGE)
             self._bytes = np.frombuffer(self.load(), np.uint8)
         dtype = _stored(code).newbyteorder(self.order)
         whole = len(self._bytes) // dtype.itemsize * dtype.itemsize
@@ -95,22 +95,17 @@ class Tensor:
         if n_items is None or (n_items and last >= room) or self.offset > room:
             values = {"shape": axes(self.shape), "strides": self.strides, "offset": self.offset}
             raise InvalidValueError(
-                Phrase(
-                    "expected a tensor within {found} of its storage, found {shape} with strides "
-                    "{strides} from element {offset}",
-                    **values,
-                    found=counted(room, "element"),
-                )
+                "expected a tensor within {found} of its storage, found {shape} with strides "
+                "{strides} from element {offset}",
+                **values,
+                found=counted(room, "element"),
             )
         if n_items * size > max(SMALL, MAX_RATIO * self.storage.size):
             raise InvalidValueError(
-                Phrase(
-                    "expected a tensor of at most {most} times the size of its storage, found "
-                    "{shape} "
-                    "elements",
-                    shape=axes(self.shape),
-                    most=MAX_RATIO,
-                )
+                "expected a tensor of at most {most} times the size of its storage, found {shape} "
+                "elements",
+                shape=axes(self.shape),
+                most=MAX_RATIO,
             )
 
     def deferred(self, fail: Callable[[Phrase], Exception]) -> Deferred:

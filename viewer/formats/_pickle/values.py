@@ -147,12 +147,10 @@ class Array:
         if n_items is None or n_items * found.itemsize != len(packed):
             size = len(packed)
             raise InvalidValueError(
-                Phrase(
-                    "expected {shape} {dtype}, found {found} bytes",
-                    shape=axes(shape),
-                    dtype=found.name,
-                    found=size,
-                )
+                "expected {shape} {dtype}, found {found} bytes",
+                shape=axes(shape),
+                dtype=found.name,
+                found=size,
             )
         self.shape, self.dtype, self.payload = shape, found, packed
         self.is_fortran = is_fortran
@@ -169,9 +167,7 @@ class Array:
     def values(self) -> NDArray[Any]:
         """Return the values, as a view of the file if byte and memory order allow it."""
         if self.payload is None or self.dtype is None:
-            raise InvalidValueError(
-                Phrase("expected an array of numbers, found {found}", found=self.what)
-            )
+            raise InvalidValueError("expected an array of numbers, found {found}", found=self.what)
         flat = np.empty(0, self.dtype)
         if len(self.payload):  # numpy cannot create a view of zero bytes
             n_items = len(self.payload) // self.dtype.itemsize

@@ -94,11 +94,9 @@ def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) 
     if count == _VPOSER:
         raise RecordError(
             "poses",
-            Phrase(
-                "expected rotations, found {found} numbers, a VPoser latent vector, which needs "
-                "the VPoser network to decode: export full poses from EasyMocap",
-                found=count,
-            ),
+            "expected rotations, found {found} numbers, a VPoser latent vector, which needs "
+            "the VPoser network to decode: export full poses from EasyMocap",
+            found=count,
         )
     layout = _LAYOUTS.get(count)
     if layout is None:
@@ -308,7 +306,7 @@ class BodyRows(Rows):
                 is_good = (np.abs(rows) <= limit).all(axis=1)
                 for row in np.flatnonzero(~is_good & keep):
                     odd = rows[row][~(np.abs(rows[row]) <= limit)][0]
-                    problem = RecordError(key, within_text(odd, limit), "F003")
+                    problem = RecordError(key, within_text(odd, limit), code="F003")
                     faults.append((int(row), key, problem))
                 keep &= is_good
         if faults:

@@ -38,9 +38,11 @@ class RecordError(InvalidValueError):
     ``key``: key of the invalid value; empty for the record itself. ``code``: a key of ``CODES``.
     """
 
-    def __init__(self, key: str, problem: Phrase, code: str = "F002") -> None:
+    def __init__(
+        self, key: str, problem: str | Phrase, *, code: str = "F002", **values: object
+    ) -> None:
         self.key, self.code = key, code
-        super().__init__(problem)
+        super().__init__(problem, **values)
 
 
 # Created only once, because creating a decoder is slow.
@@ -132,7 +134,7 @@ def person_of(record: Any, place: int) -> int | str:
         return person
     if not isinstance(record, dict):
         raise RecordError(
-            "", Phrase("expected a person with named values, found {found}", found=describe(record))
+            "", "expected a person with named values, found {found}", found=describe(record)
         )
     given = (value for key in ("id", "personID") if (value := record.get(key)) is not None)
     person = next(given, place)
@@ -145,14 +147,14 @@ def person_of(record: Any, place: int) -> int | str:
         person = int(person)
     if isinstance(person, bool) or not isinstance(person, int):
         raise RecordError(
-            "id", Phrase("expected an integer or a name, found {found}", found=describe(person))
+            "id", "expected an integer or a name, found {found}", found=describe(person)
         )
     if abs(person) >= 1 << 31:
         raise RecordError(
             "id",
-            Phrase(
-                "expected an id below {limit}, found {found}", limit=1 << 31, found=describe(person)
-            ),
+            "expected an id below {limit}, found {found}",
+            limit=1 << 31,
+            found=describe(person),
         )
     return person
 
@@ -169,7 +171,7 @@ def row_of(record: Record, key: str) -> list[Any]:
         values = values[0]
     if not isinstance(values, list):
         found = describe(record[key]) if key in record else Phrase("no value")
-        raise RecordError(key, Phrase("expected numbers, found {found}", found=found))
+        raise RecordError(key, "expected numbers, found {found}", found=found)
     return values
 
 
@@ -186,7 +188,7 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
     limit = limit_of(key)
     odd = [number for number in numbers if not abs(number) <= limit]
     if odd:
-        raise RecordError(key, within_text(odd[0], limit), "F003")
+        raise RecordError(key, within_text(odd[0], limit), code="F003")
     return count
 
 
@@ -205,20 +207,16 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
     if len(values) != count:
         raise RecordError(
             key,
-            Phrase(
-                "expected {expected}, found {found}",
-                expected=counted(count, "number"),
-                found=len(values),
-            ),
+            "expected {expected}, found {found}",
+            expected=counted(count, "number"),
+            found=len(values),
         )
     found = describe(_odd_one(values))
     raise RecordError(
         key,
-        Phrase(
-            "expected {expected}, found {found} among them",
-            expected=counted(count, "number"),
-            found=found,
-        ),
+        "expected {expected}, found {found} among them",
+        expected=counted(count, "number"),
+        found=found,
     )
 
 

@@ -171,7 +171,8 @@ class Reading:
             if person in self._names.values():
                 raise RecordError(
                     "id",
-                    Phrase("expected a name as in earlier records, found {found}", found=person),
+                    "expected a name as in earlier records, found {found}",
+                    found=person,
                 )
             self._numbers.add(person)
             return person
@@ -380,7 +381,7 @@ class _PointRows(Rows):
     def check_any(self) -> None:
         """Refuse rows without a valid keypoint, which must not determine the layout of others."""
         if _is_odd(self._rows()).all():
-            raise RecordError(_POINTS, Phrase("expected rows of 3 or 4 finite numbers, found none"))
+            raise RecordError(_POINTS, "expected rows of 3 or 4 finite numbers, found none")
 
     def _take(self, rows: Any, key: str, count: int) -> None:
         try:
@@ -398,24 +399,18 @@ class _PointRows(Rows):
         if not isinstance(rows, list):
             raise RecordError(
                 key,
-                Phrase(
-                    "expected {expected}, found {found}",
-                    expected=counted(count, "keypoint"),
-                    found=describe(rows),
-                ),
+                "expected {expected}, found {found}",
+                expected=counted(count, "keypoint"),
+                found=describe(rows),
             )
         if len(rows) != count:
             raise RecordError(
                 key,
-                Phrase(
-                    "expected {expected}, found {found}",
-                    expected=counted(count, "keypoint"),
-                    found=len(rows),
-                ),
+                "expected {expected}, found {found}",
+                expected=counted(count, "keypoint"),
+                found=len(rows),
             )
-        raise RecordError(
-            key, Phrase("expected rows of 3 or 4 numbers, found rows of different lengths")
-        )
+        raise RecordError(key, "expected rows of 3 or 4 numbers, found rows of different lengths")
 
     def points(self) -> tuple[Floats, list[RowFault]]:
         """Return the points (N, K, 4), and the errors in invalid rows."""
@@ -428,11 +423,8 @@ class _PointRows(Rows):
                 "",
                 RecordError(
                     _POINTS,
-                    Phrase(
-                        "{n} with non-finite numbers or negative confidence, treated as not "
-                        "visible",
-                        n=counted(int(is_odd[row].sum()), "keypoint"),
-                    ),
+                    "{n} with non-finite numbers or negative confidence, treated as not visible",
+                    n=counted(int(is_odd[row].sum()), "keypoint"),
                 ),
             )
             for row in np.flatnonzero(is_odd.any(axis=1))
@@ -483,15 +475,13 @@ def _count(record: dict[str, Any], key: str) -> int:
     rows = record[key]
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
         raise RecordError(
-            key, Phrase("expected rows of 3 or 4 numbers, found {found}", found=describe(rows))
+            key, "expected rows of 3 or 4 numbers, found {found}", found=describe(rows)
         )
     if len(rows) > _MOST_POINTS:
         raise RecordError(
             key,
-            Phrase(
-                "expected at most {most} keypoints, found {found}",
-                most=_MOST_POINTS,
-                found=len(rows),
-            ),
+            "expected at most {most} keypoints, found {found}",
+            most=_MOST_POINTS,
+            found=len(rows),
         )
     return len(rows)

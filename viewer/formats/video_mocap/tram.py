@@ -98,8 +98,7 @@ def _results(people: dict[int, Archive], camera: Archive | None) -> Results:
             ):
                 raise camera.fault(
                     "F002.video-camera: {item}: expected a camera in each frame of person "
-                    "{person}, "
-                    "found {n}",
+                    "{person}, found {n}",
                     item="cam_T",
                     n=counted(len(placed), "frame"),
                     person=person,
