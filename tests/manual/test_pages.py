@@ -37,6 +37,14 @@ def commands(path: Path) -> list[str]:
 ALL_COMMANDS = [(path.name, line) for path in PATHS for line in commands(path)]
 
 
+@pytest.mark.parametrize("topic", PAGES)
+def test_every_page_has_one_title_and_complete_tables(topic: str) -> None:
+    prose = "".join(page_text(topic).split("```")[::2])
+    assert prose.startswith("# ") and len(re.findall("^# ", prose, re.MULTILINE)) == 1
+    for table in re.findall(r"(?:^\|.*\n)+", prose, re.MULTILINE):
+        assert len({len(re.findall(r"(?<!\\)\|", row)) for row in table.splitlines()}) == 1
+
+
 def test_page_table_is_exactly_the_folder() -> None:
     assert {path.stem for path in FOLDER.glob("*.md")} == set(PAGES)
     assert not set(PAGES) & set(COMMANDS), "viewer help would be ambiguous"

@@ -24,6 +24,7 @@ from viewer.app.files.saving import save_screenshot
 from viewer.app.interface import draw_interface
 from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
+from viewer.app.manual import Manual
 from viewer.app.mouse import drop_motion_before_press, handle_mouse, is_held, stops_time
 from viewer.app.overlays import draw_hints
 from viewer.app.pace import Pace, Step, picture_key
@@ -214,6 +215,7 @@ class Frame:
         for work in (self.state.job, self.state.of(Files).stream):
             if work is not None:
                 work.cancel()
-        for item in (self.target, self._preview, self.outlines, self.renderer):
+        manual = self.state.of(Manual)
+        for item in (self.target, self._preview, self.outlines, self.renderer, manual):
             if item is not None:
                 item.release()
