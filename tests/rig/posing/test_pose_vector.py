@@ -8,6 +8,10 @@ from numpy.testing import assert_allclose
 from rig.hand_made import skeleton, turn_x, turn_y, turn_z
 
 from viewer.errors import RigError
+from viewer.rig.figure import Figure
+from viewer.rig.motion.evaluation import pose_actors
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import joint_rotations, rest_pose
 from viewer.rig.posing.pose_vector import (
     PoseLayout,
@@ -17,6 +21,7 @@ from viewer.rig.posing.pose_vector import (
     set_joint_rotations,
     write_vector,
 )
+from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 
 BALLS = ball_skeleton(tuple("abcd"), np.array([-1, 0, 1, 1]), np.eye(4, 3))
@@ -160,8 +165,26 @@ def test_limits_apply_to_ball_joints_unless_disabled():
     joint = np.array([0])
     set_joint_rotations(bones, pose, joint, turn_x(0.5)[None])
     assert_allclose(pose.dofs, [0.1, 0, 0], atol=1e-15)
-    set_joint_rotations(bones, pose, joint, turn_x(0.5)[None], clamp=False)
+    set_joint_rotations(bones, pose, joint, turn_x(0.5)[None], "dofs")
     assert_allclose(pose.dofs, [0.5, 0, 0], atol=1e-15)
+
+
+def test_motion_beyond_limits_is_posed_as_it_is_exported():
+    dofs = [(joint, axis, 0.0, -0.2, 0.3) for joint in range(2) for axis in "xyz"]
+    bones = replace(skeleton([-1, 0], dofs), rest_rotations=[[0, 0, 0, 1], [0.5, 0.5, 0.5, 0.5]])
+    # About z by 0.25, and about (1, 2, 2) / 3 by 2 radians.
+    sine, cosine = np.sin(1.0) / 3.0, np.cos(1.0)
+    turned = [[0, 0, np.sin(0.125), np.cos(0.125)], [sine, 2 * sine, 2 * sine, cosine]]
+    clip = SampledClip("c", Timing(1.0, [0, 1]), np.array([turned[::-1], turned]))
+    actor = Actor(Figure("f", skeleton=bones), clip=clip)
+    pose_actors([actor], 1.0)
+    wanted = [turn_z(0.25), about(np.array([1.0, 2.0, 2.0]) * 2.0 / 3.0)]
+    assert_allclose(joint_rotations(bones, actor.pose), wanted, atol=1e-14)
+    assert (actor.pose.dofs >= -0.2).all() and (actor.pose.dofs <= 0.3).all()
+    # Within the limits, the DOFs have all of the rotation.
+    assert_allclose(actor.pose.dofs[:3], [0, 0, 0.25], atol=1e-15)
+    assert actor.pose.rotations[0].tolist() == [0, 0, 0, 1]
+    assert actor.pose.dofs[5] in (-0.2, 0.3)
 
 
 def test_rotation_beyond_a_hinge_is_stored_in_its_quaternion():

@@ -132,7 +132,8 @@ def set_poses(
         dofs[:, found.targets] = found.dofs[rows]
     if len(found.rotated):
         turns = quaternion_to_matrix(found.rotations[rows])
-        quaternions = rotate_joints(skeleton, dofs, found.rotated, turns)
+        # Sliders keep to their limits; a motion is shown as it is, as exports write it.
+        quaternions = rotate_joints(skeleton, dofs, found.rotated, turns, "quaternion")
         parts.append(("rotations", _span(found.rotated), quaternions))
     elif len(found.targets):
         dofs = clamp_dofs(skeleton, dofs)

@@ -51,7 +51,7 @@ class SpringMotion:
         rotations = self.rotations(actor, np.array([time]))[0]
         matrices = quaternion_to_matrix(rotations)
         pose = actor.require_pose()
-        set_joint_rotations(skeleton, pose, skeleton.springs.joints, matrices, clamp=False)
+        set_joint_rotations(skeleton, pose, skeleton.springs.joints, matrices, "dofs")
 
     def rotations(self, actor: Actor, times: Floats) -> Floats:
         """Return the rotations of the spring joints (F, N, 4) at times (F,) in seconds."""

@@ -98,7 +98,7 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
         upright.translations[roots] += shifts
     rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
     # The limits apply to the figure's original world, which is upside down.
-    set_joint_rotations(skeleton, upright, roots, rotations, clamp=False)
+    set_joint_rotations(skeleton, upright, roots, rotations, "dofs")
     return upright
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -58,22 +60,27 @@ def _rows_of_balls(skeleton: Skeleton) -> Ints:
     return rows
 
 
+Beyond = Literal["cut", "dofs", "quaternion"]
+"""Where a rotation beyond the limits of a ball joint goes: it is cut off at the limits, the DOFs
+exceed them, or the quaternion beneath the DOFs has what they lack."""
+
+
 def set_joint_rotations(
-    skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, clamp: bool = True
+    skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, beyond: Beyond = "cut"
 ) -> None:
     """Set joints' rotations (N, 3, 3) relative to parents, in place, as ``rotate_joints`` does."""
     dofs = pose.dofs[None].copy()
-    pose.rotations[joints] = rotate_joints(skeleton, dofs, joints, rotations[None], clamp)[0]
+    pose.rotations[joints] = rotate_joints(skeleton, dofs, joints, rotations[None], beyond)[0]
     pose.dofs[:] = dofs[0]
 
 
 def rotate_joints(
-    skeleton: Skeleton, dofs: Floats, joints: Ints, rotations: Floats, clamp: bool = True
+    skeleton: Skeleton, dofs: Floats, joints: Ints, rotations: Floats, beyond: Beyond
 ) -> Floats:
     """Set DOFs (T, D), in place, to rotations (T, N, 3, 3) of joints; return quaternions (T, N, 4).
 
     A ball joint's DOFs become the angles about x, y, z; other joints keep their DOFs as near to 0
-    as limits allow, and the quaternion has the rest. ``clamp``: clamp DOFs to their limits.
+    as limits allow, and the quaternion has the rest.
     """
     joints = np.asarray(joints)
     rows = rotation_rows(skeleton)[joints]
@@ -83,18 +90,21 @@ def rotate_joints(
     rest = skeleton.rest_rotations[joints]
     quaternions = np.broadcast_to(rest, (len(dofs), *rest.shape))
     within = np.swapaxes(quaternion_to_matrix(rest[balls]), -1, -2) @ rotations[:, balls]
-    dofs[:, rows[balls]] = matrix_to_euler(within)
+    angles = matrix_to_euler(within)
+    dofs[:, rows[balls]] = angles
     others = joints[~is_ball]
     if len(others):
         dofs[:, np.isin(skeleton.dof_joints, others) & (skeleton.dof_kinds >= 3)] = 0.0
-    if clamp:
+    if beyond != "dofs":
         np.clip(dofs, *skeleton.dof_limits.T, out=dofs)
-    if len(others):
-        # If limits keep the DOFs away from 0, the quaternion compensates for them.
-        held = dof_rotations(skeleton, dofs)[:, others]
-        left = rotations[:, ~is_ball] @ np.swapaxes(held, -1, -2)
-        quaternions = quaternions.copy()
-        quaternions[:, ~is_ball] = matrix_to_quaternion(left)
+    has_rest = np.broadcast_to(~is_ball, quaternions.shape[:-1]).copy()
+    if beyond == "quaternion":
+        has_rest[:, balls] = (dofs[:, rows[balls]] != angles).any(axis=-1)
+    if has_rest.any():
+        # R = Q R(DOFs), so Q = R R(DOFs)^T has what the DOFs lack.
+        held = dof_rotations(skeleton, dofs)[:, joints]
+        left = matrix_to_quaternion(rotations @ np.swapaxes(held, -1, -2))
+        quaternions = np.where(has_rest[..., None], left, quaternions)
     return quaternions
 
 
