@@ -76,7 +76,7 @@ from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 if TYPE_CHECKING:
-    from viewer.formats.bvh.streaming import BvhStream
+    from viewer.formats.bvh import LongMotion
 
 # Streamed conversion.
 _PEEK = 1 << 16  # bytes that identify the format
@@ -215,7 +215,7 @@ def convert_streamed(
     # None if the files or options need the whole motion in memory; the output is then unchanged.
     if not _is_streamable(asked, options.kind, output):
         return None
-    from viewer.formats.bvh.streaming import Irregular
+    from viewer.formats.bvh.motion import Irregular
 
     try:
         options = replace(options)
@@ -261,7 +261,7 @@ def _is_streamable(asked: SceneOptions, kind: str, output: Path) -> bool:
 class _Request:
     """A file that can be streamed, and a scene with its figure."""
 
-    stream: BvhStream
+    stream: LongMotion
     settings: MotionSettings
     scene: Scene
     warnings: list[str | Diagnostic]
@@ -284,7 +284,7 @@ class _Request:
 
 def _opened(asked: SceneOptions, options: ExportOptions) -> _Request | None:
     """Return the request, or None if the file must be read as a whole."""
-    from viewer.formats.bvh.streaming import open_stream
+    from viewer.formats.bvh import open_long
 
     source = Source.open(asked.paths[0], asked.size_limit)
     path = source.path
@@ -294,7 +294,7 @@ def _opened(asked: SceneOptions, options: ExportOptions) -> _Request | None:
     head = Source(path, source.peek(_PEEK))
     if detect(head) != "bvh" or len(head.diagnostics):
         return None
-    stream = open_stream(source)
+    stream = open_long(source)
     if stream is None:
         return None
     contents = Contents(

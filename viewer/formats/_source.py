@@ -108,12 +108,12 @@ class Source:
             report_bytes(0, len(self._data), name)
         return self._data
 
-    def line_parts(self, length: int) -> Iterator[bytes]:
+    def line_parts(self, length: int, start: int = 0) -> Iterator[bytes]:
         """Yield the data in parts of whole lines, ``length`` bytes or more, and report progress."""
         text = self._text()
-        total, done = len(text), 0
+        total, done = len(text), start
         report_bytes(done, total, f"reading {self.path.name}")
-        for part in line_parts(text, length):
+        for part in line_parts(text, length, start):
             yield part
             done += len(part)
             report_bytes(done, total)
@@ -372,9 +372,9 @@ class LongText:
         return read_part(self._path, self._first + start, max(min(end, len(self)) - start, 0))
 
 
-def line_parts(text: bytes | LongText, length: int) -> Iterator[bytes]:
+def line_parts(text: bytes | LongText, length: int, start: int = 0) -> Iterator[bytes]:
     """Yield parts of whole lines, ``length`` bytes or more; no line ending is divided."""
-    offset, rest = 0, b""
+    offset, rest = start, b""
     # Reading as much as is left over keeps the cost of a long line proportional to its length.
     while new := _between(text, offset, offset + max(length, len(rest))):
         offset += len(new)

@@ -29,9 +29,13 @@ from viewer.export._losses.posed_bodies import (
 )
 from viewer.export.bvh.body import Space, rest_matrices
 from viewer.formats import Source, bvh
-from viewer.formats.bvh.hierarchy import read_hierarchy
-from viewer.formats.bvh.motion import table_of
-from viewer.formats.bvh.streaming import Irregular, clip_of, parsed_rows
+from viewer.formats.bvh.motion import (
+    Irregular,
+    check_reach,
+    frame_parts,
+    offsets_of,
+    read_head,
+)
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import affine_matrices
@@ -69,8 +73,7 @@ class FileLosses:
         how: Skinning,
         n_frames: int,
     ) -> None:
-        source = Source("written.bvh", head)
-        self._head, self._table = head, table_of(source, read_hierarchy(source).joints)
+        self._head, self._table = head, read_head(Source("written.bvh", head)).table
         self._order, self._space, self._still, self._scale = order, space, still, scale
         self._figure: Figure | None = None  # the joints that were read back
         self._first_frame = 0
@@ -80,12 +83,14 @@ class FileLosses:
     def look(self, path: Path, text: bytes, part: SampledAnimation) -> None:
         """Read a part of the text back and compare it with the frames that it was written from."""
         try:
-            rows = parsed_rows(text, self._table.n_channels)
-            clip = clip_of(self._table, rows, part.name, part.frame_rate)
-            del rows  # as large as the text
+            (rows,) = frame_parts([text], self._table.n_channels)
+            check_reach(self._table, rows)
         except Irregular:
             bvh.read(Source(path, self._head + text))  # raises the error, with its line
             raise
+        base = offsets_of(self._table)
+        clip = bvh.clip_of(self._table, rows, base, part.name, part.frame_rate)
+        del rows  # as large as the text
         if self._figure is None:
             self._figure = bvh.skeleton_motion(self._table, clip).figure
             self._first_frame = part.first_frame

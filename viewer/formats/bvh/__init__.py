@@ -18,23 +18,42 @@ estimated, unless the user specifies them, and the motion records the method.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from viewer.formats._source import Source
-from viewer.formats.bvh.guess import frame_rate, guess_unit, guess_up
-from viewer.formats.bvh.hierarchy import read_hierarchy
-from viewer.formats.bvh.motion import Table, read_motion, rotations_of, table_of, translations_of
+from viewer.data_classes import dataclass
+from viewer.errors import FormatError
+from viewer.formats._source import LongText, Source, line_parts
+from viewer.formats.bvh.guess import examined_frames, frame_rate, guess_unit, guess_up
+from viewer.formats.bvh.motion import (
+    PART,
+    Irregular,
+    Table,
+    check_reach,
+    frame_parts,
+    inner_moves,
+    moves_inner,
+    placed,
+    read_head,
+    read_motion,
+    replaced_offsets,
+    rotations_of,
+    shifts_of,
+    translations_of,
+)
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import DEFAULT_RATE, Timing
-from viewer.rig.skeleton import Skeleton, ball_skeleton
+from viewer.rig.skeleton import ball_skeleton
 
 _LARGEST_RATIO = 8  # maximum ratio of rotations to numbers in the file
 _SMALL_CLIP = 1 << 24  # number of rotations up to which any ratio is accepted
+_HEAD = 1 << 20  # maximum number of bytes up to the frames of a file that stays on disk
 _THICKNESS = 0.1  # thickness of a joint's box, relative to the length of the bone
 
 # Limits of the thickness, relative to the length of a typical bone.
@@ -48,66 +67,147 @@ def read(source: Source) -> SkeletonMotion:
     position channels minus the OFFSET. End Sites are the far ends of the joints' boxes. Raises
     ``FormatError`` if the text violates the grammar; the error has the file and line.
     """
-    hierarchy = read_hierarchy(source)
-    table = table_of(source, hierarchy.joints)
-    starts = [joint.start for joint in hierarchy.joints if not joint.is_end]
-    source.remember("joints", starts.__getitem__)
-    motion = read_motion(source, hierarchy.motion, table.n_channels)
-    if has_few_channels(table, len(motion.values)):
+    head = read_head(source)
+    table = head.table
+    values, lost = read_motion(source, head)
+    has_frames = len(values) > 0
+    if not has_frames:
+        values = np.zeros((1, table.n_channels))
+    _check_channels(source, table, len(values))
+    rate = frame_rate(source, head.frame_time) if head.has_motion else DEFAULT_RATE
+    rows = np.arange(len(values), dtype=np.int32)
+    if lost is not None:
+        rows[lost] = -1
+    clip = SampledClip(
+        source.path.stem,
+        Timing(rate, rows),
+        rotations_of(table, values),
+        # Position channels replace the OFFSETs, so zeros would not be the rest pose.
+        translations_of(source, table, values) if has_frames else None,
+    )
+    return skeleton_motion(table, clip)
+
+
+def _check_channels(source: Source, table: Table, n_frames: int) -> None:
+    """Refuse a file that could exhaust memory: many frames for many joints without channels."""
+    rotations = n_frames * len(table.names)
+    if rotations > max(_SMALL_CLIP, _LARGEST_RATIO * n_frames * table.n_channels):
         raise source.fault(
             "F002.bvh-few-channels: expected channels for most joints, found {channels} for "
             "{joints} joints in {frames} frames",
             channels=table.n_channels,
             joints=len(table.names),
-            frames=len(motion.values),
+            frames=n_frames,
         )
-    has_motion = hierarchy.motion >= 0
-    rate = frame_rate(source, motion.frame_time) if has_motion else DEFAULT_RATE
-    rows = np.arange(len(motion.values), dtype=np.int32)
-    if motion.lost is not None:
-        rows[motion.lost] = -1
-    clip = SampledClip(
-        source.path.stem,
-        Timing(rate, rows),
-        rotations_of(table, motion.values),
-        # Position channels replace the OFFSETs, so zeros would not be the rest pose.
-        translations_of(source, table, motion.values) if motion.has_frames else None,
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LongMotion:
+    """A motion that stays in its file, from which parts of it are read."""
+
+    path: Path
+    """The file."""
+    table: Table
+    """Its joints."""
+    start: int
+    """Offset of the first frame in the file."""
+    base: Floats
+    """(M,). Part of the OFFSET that each position channel replaces."""
+    motion: SkeletonMotion
+    """The skeleton, with the few frames that the estimates need. The timing of its clip has all
+    frames, each of which refers to the row of one of these few."""
+
+    @property
+    def may_move_inner_joints(self) -> bool:
+        """Whether a joint other than a single root has position channels."""
+        if self.table.parents.count(-1) > 1:
+            return bool(self.table.moves)
+        return bool(inner_moves(self.table))
+
+    def clips(self, first: int, stop: int) -> Iterator[SampledClip]:
+        """Yield a range of frames as clips of consecutive parts, each starting at 0 seconds.
+
+        Raises Irregular if the file has changed, even if parts have already been yielded.
+        """
+        clip, count = self.motion.clip, 0
+        for values in _parts(self.path, self.start, self.table.n_channels):
+            chosen = values[max(first - count, 0) : max(stop - count, 0)]
+            count += len(values)
+            if len(chosen):
+                yield clip_of(self.table, chosen, self.base, clip.name, clip.timing.frame_rate)
+        if count != clip.timing.n_frames:
+            raise Irregular
+
+
+def _parts(path: Path, start: int, width: int) -> Iterator[Floats]:
+    """Yield the frames of a file part by part, (N, width) each."""
+    return frame_parts(line_parts(LongText(path, path.stat().st_size), PART, start), width)
+
+
+def open_long(source: Source) -> LongMotion | None:
+    """Return a motion that stays in its file, or None if the file must be read as a whole.
+
+    Only the whole file tells what is wrong with its frames, and which frames replace wrong ones.
+    Warnings are added to the source, unless the result is None.
+    """
+    start = Source(source.path, source.peek(_HEAD))
+    try:
+        head = read_head(start)
+        count, table = head.declared, head.table
+        first = start.next_word(head.start)
+        is_cut = first is None or first.end() == len(start.data)
+        if is_cut or not (count and head.frame_time and table.n_channels):
+            return None
+        _check_channels(start, table, count)
+        rate = frame_rate(start, head.frame_time)
+        examined = examined_frames(count).astype(np.int64)
+        rows, n_frames, moves = np.zeros((len(examined), table.n_channels)), 0, False
+        for values in _parts(source.path, head.start, table.n_channels):
+            found = (examined >= n_frames) & (examined < n_frames + len(values))
+            rows[found] = values[examined[found] - n_frames]
+            check_reach(table, values)
+            moves = moves or moves_inner(table, values)
+            n_frames += len(values)
+        if n_frames != count:
+            return None
+    except (FormatError, Irregular, OSError):
+        return None
+    base = replaced_offsets(start, table, moves)
+    timing = Timing(
+        rate, (np.searchsorted(examined, np.arange(count), "right") - 1).astype(np.int32)
     )
-    return skeleton_motion(table, clip)
+    clip = replace(clip_of(table, rows, base, source.path.stem, rate), timing=timing)
+    for note in start.diagnostics:
+        source.diagnostics.add(note)
+    return LongMotion(source.path, table, head.start, base, skeleton_motion(table, clip))
 
 
-def has_few_channels(table: Table, n_frames: int) -> bool:
-    """Return whether a file could exhaust memory: many frames for many joints without channels."""
-    rotations = n_frames * len(table.names)
-    return rotations > max(_SMALL_CLIP, _LARGEST_RATIO * n_frames * table.n_channels)
+def clip_of(table: Table, values: Floats, base: Floats, name: str, rate: float) -> SampledClip:
+    """Return frames (N, C) as a clip, for the offsets (M,) that position channels replace."""
+    translations = placed(table, shifts_of(table, values, base)) if table.moves else None
+    rows = np.arange(len(values), dtype=np.int32)
+    return SampledClip(name, Timing(rate, rows), rotations_of(table, values), translations)
 
 
 def skeleton_motion(table: Table, clip: SampledClip) -> SkeletonMotion:
     """Return the joints of a file with their motion, and estimates of unit and up axis."""
-    skeleton = _skeleton(table)
-    points = _rest_points(table, skeleton)
+    parents = np.array(table.parents, dtype=np.int32)
+    # Offsets are used as written, because differences of positions would be rounded.
+    skeleton = ball_skeleton(table.names, parents, np.zeros((len(parents), 3)))
+    boxes = _boxes(table, parents)
+    skeleton = replace(
+        skeleton, rest_translations=table.offsets, boxes=boxes, boxes_from_bones=True
+    )
+    joints = np.zeros((skeleton.n_joints, 3))
+    for joint, parent in enumerate(table.parents):
+        joints[joint] = table.offsets[joint] + (joints[parent] if parent >= 0 else 0.0)
+    tips = [joints[joint] + offset for joint, offset in table.ends]
+    points = np.concatenate([joints, np.reshape(tips, (-1, 3))])
     unit, facts, unit_note = guess_unit(points)
     figure = Figure(clip.name, skeleton=skeleton, unit=unit)
     up, more, up_notes = guess_up(figure, clip, points)
     facts += (*more, ("frames", f"{clip.timing.n_frames} at {clip.timing.frame_rate:g} fps"))
     return SkeletonMotion(replace(figure, up=up, facts=facts), clip, unit_note, up_notes)
-
-
-def _skeleton(table: Table) -> Skeleton:
-    parents = np.array(table.parents, dtype=np.int32)
-    # Offsets are used as written, because differences of positions would be rounded.
-    skeleton = ball_skeleton(table.names, parents, np.zeros((len(parents), 3)))
-    boxes = _boxes(table, parents)
-    return replace(skeleton, rest_translations=table.offsets, boxes=boxes, boxes_from_bones=True)
-
-
-def _rest_points(table: Table, skeleton: Skeleton) -> Floats:
-    """Return the positions of joints and End Sites in the rest pose: (P, 3)."""
-    joints = np.zeros((skeleton.n_joints, 3))
-    for joint, parent in enumerate(table.parents):
-        joints[joint] = table.offsets[joint] + (joints[parent] if parent >= 0 else 0.0)
-    tips = [joints[joint] + offset for joint, offset in table.ends]
-    return np.concatenate([joints, np.reshape(tips, (-1, 3))])
 
 
 def _boxes(table: Table, parents: Ints) -> Floats:

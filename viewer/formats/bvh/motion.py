@@ -7,6 +7,7 @@ numbers do not fit. Angles are degrees. A joint's rotation channels multiply fro
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,11 @@ from viewer.errors import FormatError
 from viewer.formats._frame_gaps import gap_notes, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
+from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats._text.numbers import is_infinite, parse_numbers, to_number
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.formats._translation_limit import FARTHEST, is_beyond
-from viewer.formats.bvh.hierarchy import BvhJoint, called
+from viewer.formats.bvh.hierarchy import BvhJoint, called, read_hierarchy
 from viewer.phrases import brief, counted, optional, quoted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import align_signs
@@ -29,23 +31,10 @@ _FRAMES = re.compile(rb"\s*Frames[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?\s*(\S*)", re.IGNORECASE)
 _LINE = re.compile(rb"[^\r\n]+")
 _ROUNDING = 1e-4  # positions of 0 in files with few decimals, relative to the longest OFFSET
+PART = 1 << 19
+"""Bytes of text from which frames are read together, and the rest of the last line."""
 _CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
 _Places = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Motion:
-    """The channel values of all frames."""
-
-    values: Floats
-    """(N, C). One column per channel: lengths and degrees."""
-    frame_time: bytes | None
-    """Seconds between frames as written; None if missing."""
-    has_frames: bool = True
-    """False for the rest pose of a file without frames."""
-    lost: Bools | None = None
-    """(N,) or None. Whether a number of a frame is not finite, so that the frame is a gap; None if
-    none is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,29 +59,57 @@ class Table:
         ]
 
 
-def read_motion(source: Source, start: int, n_channels: int) -> _Motion:
-    """Read the frames.
+@dataclass(frozen=True, slots=True)
+class Head:
+    """All that precedes the frames of a file."""
 
-    ``source``: the file; warned if the number of frames differs from the declared one. ``start``:
-    offset after the word MOTION; -1 for a file without one. Returns a motion with at least one
-    frame: zeros if the file has none. Raises ``FormatError`` if a word is not a number, a row is
-    too short or too long, or no frame is finite; the error has the line.
-    """
-    if start < 0:
+    table: Table
+    """Joints and channels."""
+    start: int
+    """Offset of the frames."""
+    has_motion: bool = False
+    """Whether the file has the word MOTION."""
+    declared: int | None = None
+    """Number of frames; None if missing."""
+    frame_time: bytes | None = None
+    """Seconds between frames as written; None if missing."""
+
+
+class Irregular(Exception):  # noqa: N818 - it is not an error
+    """Raised if frames have faults, which only the whole file explains."""
+
+
+def read_motion(source: Source, head: Head) -> tuple[Floats, Bools | None]:
+    """Return the frames (N, C), lengths and degrees, and which are gaps (N,), None if none is."""
+    width = head.table.n_channels
+    none = np.zeros((0, width)), None
+    if not head.has_motion:
         source.warn("F007.bvh-no-motion: no MOTION section: shown in the rest pose", source.end)
-        return _rest(n_channels, None)
-    declared, time, start = read_head(source, start)
-    if declared is None:
-        source.warn("F007.bvh-no-count: missing Frames: all rows are used", start)
-    if n_channels == 0:
-        source.warn("F007.bvh-no-channels: no joint has channels: shown in the rest pose", start)
-        return _rest(0, time)
-    rows, lost = _rows(source, start, n_channels, declared)
-    return _Motion(rows, time, lost=lost) if len(rows) else _rest(n_channels, time)
+        return none
+    if head.declared is None:
+        source.warn("F007.bvh-no-count: missing Frames: all rows are used", head.start)
+    if width == 0:
+        source.warn(
+            "F007.bvh-no-channels: no joint has channels: shown in the rest pose", head.start
+        )
+        return none
+    # An offset is only needed for an error.
+    source.remember(
+        "frames", lambda row: source.number_offset(head.start, len(source.data), row * width)
+    )
+    rows = _regular_rows(source, head)
+    return _faulty_rows(source, head.start, width, head.declared) if rows is None else (rows, None)
 
 
-def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int]:
-    """Return the declared number of frames and frame time, if any, and the offset after them."""
+def read_head(source: Source) -> Head:
+    """Read everything that precedes the frames."""
+    hierarchy = read_hierarchy(source)
+    table = table_of(source, hierarchy.joints)
+    starts = [joint.start for joint in hierarchy.joints if not joint.is_end]
+    source.remember("joints", starts.__getitem__)
+    start = hierarchy.motion
+    if start < 0:
+        return Head(table, start)
     declared: int | None = None
     time: bytes | None = None
     is_header = True
@@ -102,7 +119,7 @@ def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int
             declared, start, is_header = _count(source, match), match.end(), True
         if time is None and (match := _TIME.match(source.data, start)):
             time, start, is_header = _seconds(source, match), match.end(), True
-    return declared, time, start
+    return Head(table, start, True, declared, time)
 
 
 def _count(source: Source, match: re.Match[bytes]) -> int:
@@ -125,26 +142,49 @@ def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
     return match[1]
 
 
-def _rest(n_channels: int, time: bytes | None) -> _Motion:
-    return _Motion(np.zeros((1, n_channels)), time, has_frames=False)
+def frame_parts(texts: Iterable[bytes], width: int) -> Iterator[Floats]:
+    """Yield the frames (N, width) of each text, whose last words need not fill a frame.
+
+    Raises Irregular if a word is not a number, or numbers are left at the end.
+    """
+    rest = np.zeros(0)
+    for text in texts:
+        # Motions are usually read once, and exported ones are read back: caching would only waste
+        # space.
+        values, bad = parse_numbers(text, 0, len(text), is_kept=False)
+        if bad >= 0:
+            raise Irregular
+        if len(rest):
+            values = np.concatenate([rest, values])
+        end = len(values) - len(values) % width
+        yield values[:end].reshape(-1, width)
+        rest = values[end:]
+    if len(rest):
+        raise Irregular
 
 
-def _rows(
+def _regular_rows(source: Source, head: Head) -> Floats | None:
+    """Return all frames, (N, C); None if their number is wrong, or any has a fault."""
+    width = head.table.n_channels
+    rows = GrowingTable((width,), np.float64)
+    try:
+        for part in frame_parts(source.line_parts(PART, head.start), width):
+            rows.add(part)
+    except Irregular:
+        return None
+    found = rows.rows()
+    return found if len(found) and head.declared in (None, len(found)) else None
+
+
+def _faulty_rows(
     source: Source, start: int, width: int, declared: int | None
 ) -> tuple[Floats, Bools | None]:
-    """Return all complete frames, (N, C), and which of them are gaps, if any."""
-    data = source.data
-    source.remember("frames", lambda row: source.number_offset(start, len(data), row * width))
-    # Motions are usually read once, and exported ones are read back: caching would only waste
-    # space.
-    values, bad = parse_numbers(data, start, len(data), is_kept=False)
-    whole, rest = divmod(len(values), width)
-    is_whole = bad < 0 and rest == 0 and whole > 0
-    if is_whole and (declared is None or whole == declared):
-        return values.reshape(whole, width), None
+    """Return all complete frames, (N, C), and which of them are gaps, if any; record faults."""
     held = _held_frames(source, start, width, declared)
     if held is not None:
         return held
+    values, bad = parse_numbers(source.data, start, len(source.data), is_kept=False)
+    whole, rest = divmod(len(values), width)
     if bad >= 0:
         offset = source.word_offset(start, bad)
         match = source.next_word(offset)
@@ -203,7 +243,21 @@ def _held_frames(
         frames[~is_number],
     )
     lost = _gaps(source, words, bad[is_number], frames[is_number], len(begins))
-    _refuse_sizes(source, words.offsets[begins], sizes, width)
+    # Refuse rows that are too short or too long.
+    offsets = words.offsets[begins]
+    wrong = np.flatnonzero(sizes != width)
+    if len(wrong):
+        first = int(wrong[0])
+        source.refuse(
+            wording.BVH_ROW,
+            int(offsets[first]),
+            len(wrong),
+            "frames",
+            wrong,
+            frame=first,
+            expected=counted(width, "number"),
+            found=int(sizes[first]),
+        )
     rows = np.full((len(begins), width), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(width)]
     if rest or (declared is not None and len(rows) != declared):
@@ -229,23 +283,6 @@ def _gaps(source: Source, words: Words, bad: _Places, frames: _Places, count: in
     for note in gap_notes(source, {None: np.flatnonzero(lost)}):
         source.diagnostics.add(note)
     return lost
-
-
-def _refuse_sizes(source: Source, offsets: _Places, sizes: _Places, width: int) -> None:
-    """Refuse rows that are too short or too long."""
-    wrong = np.flatnonzero(sizes != width)
-    if len(wrong):
-        first = int(wrong[0])
-        source.refuse(
-            wording.BVH_ROW,
-            int(offsets[first]),
-            len(wrong),
-            "frames",
-            wrong,
-            frame=first,
-            expected=counted(width, "number"),
-            found=int(sizes[first]),
-        )
 
 
 def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
@@ -373,17 +410,20 @@ def translations_of(source: Source, table: Table, values: Floats) -> Floats | No
     """Return the position channels minus the OFFSET that they replace: (N, J, 3)."""
     if not table.moves:
         return None
-    base = offsets_replaced(table)
-    inner = inner_moves(table)
-    if base[inner].any() and not moves_inner(table, values):
+    base = replaced_offsets(source, table, moves_inner(table, values))
+    return placed(table, _within_reach(source, table, shifts_of(table, values, base)))
+
+
+def replaced_offsets(source: Source, table: Table, moves: bool) -> Floats:
+    """Return the offsets (M,) that position channels replace, given whether inner joints move."""
+    base, inner = offsets_of(table), inner_moves(table)
+    if base[inner].any() and not moves:
         source.warn(
             "F007.bvh-positions: position channels below the root are 0: added to OFFSET "
             "instead of replacing it"
         )
         base[inner] = 0.0
-    shifts = shifts_of(table, values, base)
-    names = [("XYZ"[axis], table.names[joint]) for joint, axis, _ in table.moves]
-    return placed(table, _within_reach(source, shifts, names))
+    return base
 
 
 def inner_moves(table: Table) -> list[int]:
@@ -395,12 +435,12 @@ def moves_inner(table: Table, values: Floats) -> bool:
     """Return whether frames (N, C) translate joints with a parent, beyond rounding."""
     inner = inner_moves(table)
     positions = values[:, [table.moves[at][2] for at in inner]]
-    least = _ROUNDING * np.abs(offsets_replaced(table)[inner]).max(initial=0.0)
+    least = _ROUNDING * np.abs(offsets_of(table)[inner]).max(initial=0.0)
     return bool((np.abs(positions) > least).any())
 
 
-def offsets_replaced(table: Table) -> Floats:
-    """Return the part of the OFFSET that each position channel replaces: (M,)."""
+def offsets_of(table: Table) -> Floats:
+    """Return the component of the OFFSET along each position channel: (M,)."""
     return np.array([table.offsets[joint, axis] for joint, axis, _ in table.moves])
 
 
@@ -418,13 +458,19 @@ def placed(table: Table, shifts: Floats) -> Floats:
     return translations
 
 
-def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
+def check_reach(table: Table, values: Floats) -> None:
+    """Raise Irregular if a frame translates a joint beyond the limit."""
+    if is_beyond(shifts_of(table, values, offsets_of(table))).any():
+        raise Irregular
+
+
+def _within_reach(source: Source, table: Table, shifts: Floats) -> Floats:
     """Refuse frames that translate a joint beyond the limit, and repeat the previous frame."""
     is_far = is_beyond(shifts)
     if is_far.any():
         frame = int(is_far.argmax())
         at = int(np.abs(shifts[frame]).argmax())
-        axis, joint = names[at]
+        joint, axis, _ = table.moves[at]
         source.refuse(
             wording.BEYOND,
             source.offset_of("frames", frame),
@@ -434,8 +480,8 @@ def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) 
             item=Phrase(
                 "frame {frame}: {axis}position of joint {joint}",
                 frame=frame,
-                axis=axis,
-                joint=brief(joint),
+                axis="XYZ"[axis],
+                joint=brief(table.names[joint]),
             ),
             most=rounded(FARTHEST, 2),
             found=float(shifts[frame, at]),
