@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from viewer.diagnostics import Diagnostic, Phrase, described
 from viewer.phrases import counted
@@ -41,7 +42,7 @@ def test_description_contains_all_data_of_a_diagnostic() -> None:
 
 
 def test_values_of_every_kind_can_be_written_as_json() -> None:
-    inner = Diagnostic("F001.no-file", values={"found": "a folder"})
+    inner = Diagnostic("F001.no-file: found {found}", values={"found": "a folder"})
     values = {
         "found": b"up\xff\n",
         "ratio": float("inf"),
@@ -50,7 +51,7 @@ def test_values_of_every_kind_can_be_written_as_json() -> None:
         "path": Path("a b"),
         "nothing": None,
     }
-    told = described(Diagnostic("C013.no-height", values=values))["values"]
+    told = described(Diagnostic("C013.no-height: no height", values=values))["values"]
     assert json.loads(json.dumps(told, allow_nan=False)) == told
     assert told["found"] == "up\ufffd\\n" and told["ratio"] == "inf" and told["path"] == "a b"
     assert len(told["levels"]) == 100 and told["nothing"] is None
@@ -62,12 +63,19 @@ def test_values_of_every_kind_can_be_written_as_json() -> None:
 
 
 def test_long_location_lists_are_truncated_but_counted() -> None:
-    found = Diagnostic("C013.no-height", part="joints", places=np.arange(300, dtype=np.int32))
+    found = Diagnostic(
+        "C013.no-height: no height", part="joints", places=np.arange(300, dtype=np.int32)
+    )
     told = described(found)
     assert told["places"] == list(range(100)) and told["n_places"] == 300
 
 
 def test_json_pointer_is_the_location_of_a_diagnostic() -> None:
-    found = Diagnostic("F002.unknown-folder", Path("a.glb"), pointer="/skins/0/joints/3")
+    found = Diagnostic("F002.unknown-folder: no files", Path("a.glb"), pointer="/skins/0/joints/3")
     assert found.place == "a.glb#/skins/0/joints/3"
     assert described(found)["pointer"] == "/skins/0/joints/3"
+
+
+def test_message_without_a_sentence_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"F002\.unknown-folder"):
+        Diagnostic("F002.unknown-folder")

@@ -69,11 +69,11 @@ def test_checks_do_not_change_the_scene() -> None:
 def test_locations_of_vertices_triangles_and_joints_are_their_points() -> None:
     scene = scene_of(column())
     scene.actors[0].placement[:3, 3] = 10.0, 0.0, 0.0
-    vertex = Finding(Diagnostic("W001."), actor=0, vertices=np.array([5]))
+    vertex = Finding(Diagnostic("W001.some: text"), actor=0, vertices=np.array([5]))
     assert points_of(vertex, scene).tolist() == [[9, 1, 1]]
-    triangle = Finding(Diagnostic("M001."), actor=0, triangles=np.array([0]))
+    triangle = Finding(Diagnostic("M001.some: text"), actor=0, triangles=np.array([0]))
     assert points_of(triangle, scene).tolist() == [[11, 0, 1], [11, 1, 1], [9, 0, 1]]
-    joint = Finding(Diagnostic("S006."), actor=0, joints=np.array([1]))
+    joint = Finding(Diagnostic("S006.some: text"), actor=0, joints=np.array([1]))
     assert points_of(joint, scene).tolist() == [[10, 2, 0]]
 
 
@@ -81,10 +81,10 @@ def test_locations_in_captures_are_points_and_may_be_empty() -> None:
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0]
-    ankle = Finding(Diagnostic("C011."), actor=0, joints=np.array([2]))
+    ankle = Finding(Diagnostic("C011.some: text"), actor=0, joints=np.array([2]))
     assert points_of(ankle, scene).tolist() == [[0, 0, 0]]
-    assert points_of(Finding(Diagnostic("F001.")), scene).shape == (0, 3)
-    assert len(points_of(Finding(Diagnostic("C010."), actor=0), scene)) == 3
+    assert points_of(Finding(Diagnostic("F001.some: text")), scene).shape == (0, 3)
+    assert len(points_of(Finding(Diagnostic("C010.some: text"), actor=0), scene)) == 3
 
 
 @pytest.mark.parametrize("name", FAULTS)

@@ -11,7 +11,9 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 
 def about(**places: list[int]) -> Finding:
     return Finding(
-        Diagnostic("W001."), actor=0, **{name: np.array(at) for name, at in places.items()}
+        Diagnostic("W001.some: text"),
+        actor=0,
+        **{name: np.array(at) for name, at in places.items()},
     )
 
 
@@ -65,6 +67,6 @@ def test_undetected_captured_points_have_no_location() -> None:
 
 
 def test_missing_actors_have_no_location() -> None:
-    nowhere = Finding(Diagnostic("W001."), actor=3, vertices=np.array([0]))
+    nowhere = Finding(Diagnostic("W001.some: text"), actor=3, vertices=np.array([0]))
     assert points_of(nowhere, scene_of(column())).shape == (0, 3)
     assert len(places_of(nowhere, scene_of(column())).vertices) == 0

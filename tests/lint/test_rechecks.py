@@ -163,7 +163,9 @@ def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
 )
 def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> None:
     key, data, places = found
-    remark = Diagnostic(key, Path("a.skin"), 8, data, None if places is None else np.array(places))
+    remark = Diagnostic(
+        f"{key}: text", Path("a.skin"), 8, data, None if places is None else np.array(places)
+    )
     aimed = located_in(of_diagnostic(remark), scene_of(column()).actors[0], part)
     if vertices is None:
         assert aimed is None
@@ -172,6 +174,6 @@ def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> 
 
 
 def test_vertex_stated_only_in_a_value_is_found() -> None:
-    remark = Diagnostic("W010.vertex", Path("a.npz"), values={"vertex": 3})
+    remark = Diagnostic("W010.vertex: vertex {vertex}", Path("a.npz"), values={"vertex": 3})
     aimed = located_in(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
     assert aimed.vertices.tolist() == [3]

@@ -72,7 +72,7 @@ def test_missing_animation_is_refused(figure, key):
 
 def test_invalid_keys_are_an_error_only_if_their_animation_is_requested(tmp_path):
     def refuse():
-        raise FormatError(Diagnostic("F002.misfit", tmp_path, values={"message": "bad"}))
+        raise FormatError(Diagnostic("F002.misfit: {message}", tmp_path, values={"message": "bad"}))
 
     broken = leg(animations=(Animation("bad", 0.0, 1.0, refuse), animation(bow())))
     scene = opened(broken)

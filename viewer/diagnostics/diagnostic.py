@@ -92,6 +92,8 @@ class Diagnostic:
     def __post_init__(self) -> None:
         """Separate key and sentence, and data and text of the values."""
         key, _, sentence = self.key.partition(": ")
+        if not (sentence or self.sentence):
+            raise ValueError(f"message {key} without a sentence")
         values, texts = _apart(self.values)
         put = object.__setattr__
         put(self, "key", key)

@@ -56,8 +56,8 @@ def test_message_line_shows_its_text_and_count(message, line):
 def test_scene_warnings_are_shown_and_logged_from_the_start(rig):
     scene = viewer.load(*rig)
     scene.diagnostics = (
-        Diagnostic("M007.computed", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
-        Diagnostic("F007.several-pictures", Path("tiny"), values={"n": 2}),
+        Diagnostic("M007.computed: {n} computed", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
+        Diagnostic("F007.several-pictures: {n} pictures", Path("tiny"), values={"n": 2}),
     )
     state = make_state(scene)
     assert [note.text for note in state.messages.notes] == list(scene.warnings)
@@ -232,7 +232,9 @@ def test_a_single_message_may_cover_more(drive, rig, texts):
 def test_interface_image_shows_warnings_even_if_rendering_is_slow(drive, rig, monkeypatch):
     scene = viewer.load(*rig)
     values = {"n": 3, "vertex": 0}
-    scene.diagnostics = (Diagnostic("M007.computed", Path("tiny.skin"), values=values),)
+    scene.diagnostics = (
+        Diagnostic("M007.computed: {n} computed", Path("tiny.skin"), values=values),
+    )
     hand = drive(scene=scene, samples=1)
     for note in hand.state.messages.notes:
         note.until = 1e11  # as if the message appeared just before the next line

@@ -81,7 +81,7 @@ def test_invalid_keys_leave_the_actor_unchanged(tmp_path):
     from viewer.diagnostics import Diagnostic
 
     def refuse():
-        raise FormatError(Diagnostic("F002.misfit", tmp_path, values={"message": "bad"}))
+        raise FormatError(Diagnostic("F002.misfit: {message}", tmp_path, values={"message": "bad"}))
 
     figure = replace(animated_leg(), animations=(animation(wave()), Animation("bad", 0, 1, refuse)))
     actor = Actor(figure)
