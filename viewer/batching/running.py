@@ -14,6 +14,7 @@ import os
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import field, replace
+from functools import cache
 from hashlib import blake2b
 from pathlib import Path
 from typing import Literal, cast
@@ -30,9 +31,6 @@ from viewer.phrases import printable
 _KILLED = ("crashed", "timeout", "memory")  # the worker could not remove its temporary files
 _CHUNK = 1 << 20  # bytes of a file that are read and hashed at a time
 _SIZE = 16  # bytes of a key
-
-# Hashes of files that all items read, by path, sizes and times.
-_remembered: dict[tuple[object, ...], bytes] = {}
 
 
 @dataclass(frozen=True)
@@ -197,10 +195,7 @@ def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
     for path in item.files:
         total.update(_digest(path))
     for path in shared:
-        known = _stamp(path)
-        if known not in _remembered:
-            _remembered[known] = _digest(path)
-        total.update(_remembered[known])
+        total.update(_unchanged_digest(path, _stamp(path)))
     return total.hexdigest()
 
 
@@ -210,6 +205,12 @@ def _stamp(path: str) -> tuple[object, ...]:
     files = [path, *sorted(filter(os.path.isfile, inner))]
     states = [(file, os.stat(file)) for file in files]
     return tuple((file, state.st_size, state.st_mtime_ns) for file, state in states)
+
+
+@cache
+def _unchanged_digest(path: str, stamp: tuple[object, ...]) -> bytes:
+    """Return the hash of files that all items read, again if their sizes or times change."""
+    return _digest(path)
 
 
 def _digest(path: str) -> bytes:

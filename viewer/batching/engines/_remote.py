@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any
 
 from viewer.batching.engines import Job
@@ -28,7 +29,6 @@ _FAILED = 70  # exit code of a worker that ends itself
 # A worker runs one item at a time even if it has several threads: output is captured, and
 # diagnostics are recorded, for the process as a whole.
 _lock = threading.Lock()
-_jobs: dict[bytes, Job] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,12 +118,11 @@ def _reply(asked: Call, items: Iterable[tuple[Item, float]], worker: Any, key: s
     return Reply(worker.address, results, time.monotonic() - start, missing)
 
 
+@lru_cache(1)
 def _job(pickled: bytes) -> Job:
     """Return the job; it is reused for the next items, along with everything that it has cached."""
-    if pickled not in _jobs:
-        _jobs.clear()
-        _jobs[pickled] = pickle.loads(pickled)
-    return _jobs[pickled]
+    job: Job = pickle.loads(pickled)
+    return job
 
 
 @contextmanager
