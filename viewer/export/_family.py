@@ -251,16 +251,11 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Export
     if up_axis(options) == options.world_up:
         return found
     angle = -np.pi / 2 if up_axis(options) == "z" else np.pi / 2
-    return _rotated(found, animation, np.array([angle, 0.0, 0.0]))
-
-
-def _rotated(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
-    """Return frames in a rotated world: R' = Q R, T' = Q (p + T) - p; p is the root at rest."""
-    rotations = frames.rotations.copy()
+    # Frames in a rotated world: R' = Q R, T' = Q (p + T) - p; p is the root at rest.
+    vector = np.array([angle, 0.0, 0.0])
+    rotations = found.rotations.copy()
     rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
-    root = rest_translations_of(animation.figure, frames.shape_weights)[:, 0]
-    rotation = np.round(
-        rotation_vector_to_matrix(vector)
-    )  # a rotation by 90 degrees has integer entries
-    places = (root + frames.figure_translations) @ rotation.T - root
-    return replace(frames, rotations=rotations, figure_translations=places)
+    root = rest_translations_of(animation.figure, found.shape_weights)[:, 0]
+    rotation = np.round(rotation_vector_to_matrix(vector))
+    places = (root + found.figure_translations) @ rotation.T - root
+    return replace(found, rotations=rotations, figure_translations=places)

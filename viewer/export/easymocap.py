@@ -219,7 +219,10 @@ class _Records:
         if not self._first <= frame < self._first + _BLOCK or not self._texts:
             self._first = frame - frame % _BLOCK
             block = slice(self._first, self._first + _BLOCK)
-            self._texts = [_row_texts(rows[block]) for _, rows in self.parts]
+            self._texts = [
+                b"".join(fixed_texts(rows[block], _DIGITS, b", ")).decode("ascii").splitlines()
+                for _, rows in self.parts
+            ]
         lines = [self.head]
         for (key, _), texts in zip(self.parts, self._texts, strict=True):
             row = texts[frame - self._first]
@@ -259,10 +262,6 @@ class _ReadRecords:
 
     def _array(self, key: str) -> Floats:
         return np.array([record[key] for record in self._rows], dtype=np.float64)
-
-
-def _row_texts(rows: Floats) -> list[str]:
-    return b"".join(fixed_texts(rows, _DIGITS, b", ")).decode("ascii").splitlines()
 
 
 def _used(rows: Floats, count: int) -> Floats:

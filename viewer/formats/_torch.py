@@ -158,7 +158,21 @@ def read_stream(machine: Machine) -> object:
     machine.persistent = None
     keys = machine.run()
     for key in keys if isinstance(keys, list) else []:
-        _take(machine, storages, key)
+        # Find the bytes of a storage, whose number must be the declared one.
+        name = key.text() if isinstance(key, Span) and key.coding is not None else ""
+        storage = storages.get(name)
+        if storage is None or storage.load is not None:
+            raise machine.fail(wording.TENSOR_KEY, item=quoted(name))
+        count = machine.number(8, is_signed=True)
+        if count != storage.count:
+            values = {
+                "item": quoted(name),
+                "expected": counted(storage.count, "element"),
+                "found": count,
+            }
+            raise machine.fail("expected {expected} in the storage {item}, found {found}", **values)
+        start = machine.skip(storage.size)
+        storage.load = Span(machine.data, start, machine.at).view
     if any(storage.load is None for storage in storages.values()):
         raise machine.fail(wording.TENSOR_NO_STORAGE)
     return found
@@ -175,21 +189,3 @@ def _declare(storages: dict[str, Storage], order: Literal["<", ">"], persistent:
     if (known.code, known.count) != (storage.code, storage.count):
         raise InvalidValueError(wording.TENSOR_STORAGES, item=quoted(key))
     return known
-
-
-def _take(machine: Machine, storages: dict[str, Storage], key: object) -> None:
-    """Find the bytes of a storage, whose number must be the declared one."""
-    name = key.text() if isinstance(key, Span) and key.coding is not None else ""
-    storage = storages.get(name)
-    if storage is None or storage.load is not None:
-        raise machine.fail(wording.TENSOR_KEY, item=quoted(name))
-    count = machine.number(8, is_signed=True)
-    if count != storage.count:
-        values = {
-            "item": quoted(name),
-            "expected": counted(storage.count, "element"),
-            "found": count,
-        }
-        raise machine.fail("expected {expected} in the storage {item}, found {found}", **values)
-    start = machine.skip(storage.size)
-    storage.load = Span(machine.data, start, machine.at).view

@@ -99,7 +99,15 @@ def read(source: Source) -> BodyMotion:
         names, vectors, hands = _split_poses(source, archive, found)
     count = len(vectors)
     is_aist = found == "smpl_poses"
-    _notice(source, archive)
+    if archive.has("dmpls"):
+        moved = int(np.nan_to_num(_rows(archive, "dmpls")).any(axis=1).sum())
+        if moved:
+            source.warn(
+                "F007.motion-tissue: dmpls (soft tissue) of {n} omitted", n=counted(moved, "frame")
+            )
+    odd = [key for key in archive.keys if key not in _KNOWN]
+    if odd:
+        source.warn("F007.motion-keys: ignored unknown keys: {keys}", keys=listed(odd, 12))
     rate, rows = _rate(source, archive, is_aist), _timed_rows(archive, count, found)
     translations = _translations(source, archive, count, found)
     shape = _coefficients(source, archive, _SHAPES, count, found)
@@ -368,18 +376,6 @@ def _up(archive: Archive, is_aist: bool) -> str:
     # EMAGE is y up, although its files do not state it.
     is_speech = any(archive.has(key) for key in _EXPRESSIONS)
     return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
-
-
-def _notice(source: Source, archive: Archive) -> None:
-    if archive.has("dmpls"):
-        moved = int(np.nan_to_num(_rows(archive, "dmpls")).any(axis=1).sum())
-        if moved:
-            source.warn(
-                "F007.motion-tissue: dmpls (soft tissue) of {n} omitted", n=counted(moved, "frame")
-            )
-    odd = [key for key in archive.keys if key not in _KNOWN]
-    if odd:
-        source.warn("F007.motion-keys: ignored unknown keys: {keys}", keys=listed(odd, 12))
 
 
 def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> ShapeSpace:

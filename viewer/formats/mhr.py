@@ -173,7 +173,10 @@ def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
         found = float(parents[joint])
         item = optional("{}: ", "joint_parents")
         raise archive.fault(key, item=item, joint=joint, found=found)
-    rotations = _quaternions(archive, "joint_prerotations", count)
+    values = finite_array(archive, "joint_prerotations", (count, 4))
+    if not values.any(axis=1).all():
+        raise archive.fault(wording.MHR_QUATERNION, item="joint_prerotations")
+    rotations = values / np.linalg.norm(values, axis=1, keepdims=True)
     joints, kinds = driven_dofs(parameters.transform)
     return Skeleton(
         names=tuple(map(str, archive.array("joint_names", (count,), "SU").values().tolist())),
@@ -187,13 +190,6 @@ def _skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
         # Momentum's limits are soft: fitted parameters may exceed them, and are shown unchanged.
         dof_limits=np.tile([-np.inf, np.inf], (len(joints), 1)),
     )
-
-
-def _quaternions(archive: Archive, key: str, count: int) -> Floats:
-    values = finite_array(archive, key, (count, 4))
-    if not values.any(axis=1).all():
-        raise archive.fault(wording.MHR_QUATERNION, item=key)
-    return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
 def _mesh(lod: Archive) -> Mesh:
@@ -262,7 +258,14 @@ def _correctives(
         source.warn("F007.mhr-correctives: no pose correctives: plain linear blend skinning")
         return None
     array = lod.array("corrective_blendshapes", (None, n_vertices, 3))
-    feature = _feature(rig, n_joints, array.shape[0])
+    n_weights = array.shape[0]
+    indices = rig.array("0.sparse_indices", (2, None)).values()
+    entries = finite_array(rig, "0.sparse_weight", (indices.shape[1],))
+    for row, end in enumerate((n_weights, 6 * (n_joints - 2))):
+        if not are_indices(indices[row], end):
+            raise rig.fault(wording.MHR_INDEX, item="0.sparse_indices", last=end - 1)
+    outputs, inputs = indices.astype(np.int32)
+    feature = NetworkFeature(n_joints, n_weights, outputs, inputs, entries)
 
     def load() -> Floats:
         values = array.values()
@@ -278,14 +281,3 @@ def _correctives(
             yield block
 
     return Correctives(SparseOffsets(array.shape, array.dtype, load, blocks), feature)
-
-
-def _feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFeature:
-    """Return the feature of the correctives."""
-    indices = archive.array("0.sparse_indices", (2, None)).values()
-    entries = finite_array(archive, "0.sparse_weight", (indices.shape[1],))
-    for row, end in enumerate((n_weights, 6 * (n_joints - 2))):
-        if not are_indices(indices[row], end):
-            raise archive.fault(wording.MHR_INDEX, item="0.sparse_indices", last=end - 1)
-    outputs, inputs = indices.astype(np.int32)
-    return NetworkFeature(n_joints, n_weights, outputs, inputs, entries)

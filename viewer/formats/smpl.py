@@ -91,7 +91,11 @@ def read(source: Source) -> Figure:
     shapes = _shapes(source, archive, mesh.n_vertices, member, used)
     correctives, title = _correctives(source, archive, mesh.n_vertices, len(parents), used)
     title = title or (member.title if member else animal.title if animal else "")
-    space = _shape_space(source, archive, title, used)
+    kind, _, variant = published_name(source.path).partition(":")
+    gender = gender_of(archive.plain_text("gender"))
+    if gender:
+        used.append("gender")
+    space = ShapeSpace("SMIL" if kind == "smil" else title, gender or gender_of(variant))
     return Figure(
         name=source.path.stem,
         mesh=mesh,
@@ -324,15 +328,6 @@ def _quaternion_correctives(
 
     feature, title = kinds[count]
     return Correctives(last_axis_first(archive, "posedirs", array), feature), title
-
-
-def _shape_space(source: Source, archive: Archive, title: str, used: list[str]) -> ShapeSpace:
-    """Return the model and the gender, which most files state only in their name."""
-    kind, _, variant = published_name(source.path).partition(":")
-    gender = gender_of(archive.plain_text("gender"))
-    if gender:
-        used.append("gender")
-    return ShapeSpace("SMIL" if kind == "smil" else title, gender or gender_of(variant))
 
 
 def _skin(archive: Archive, joints: Floats, n_vertices: int, used: list[str]) -> Skin:

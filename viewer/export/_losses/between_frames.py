@@ -96,7 +96,11 @@ def between_losses(
         if worst.is_estimate:
             estimate = Phrase("an estimate from {n}", n=counted(worst.looked, "time"))
     else:
-        times = _own_times(animation, animation.motion)
+        motion = animation.motion
+        own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
+        place = (own - animation.frames.times[0]) * animation.frame_rate
+        is_between = np.abs(place - np.round(place)) > _ON_FRAME
+        times = own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]
         times = times if also is None else np.union1d(times, also)
     if len(times) == 0:
         return []
@@ -106,14 +110,6 @@ def between_losses(
         return []
     notes = frames_losses(path, replace(animation, frames=wanted), read, how, is_between=True)
     return with_values(notes, estimate=optional(" ({})", estimate))
-
-
-def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
-    """Return the times of a capture's frames that are between frames of an animation, seconds."""
-    own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
-    place = (own - animation.frames.times[0]) * animation.frame_rate
-    is_between = np.abs(place - np.round(place)) > _ON_FRAME
-    return own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,7 +154,8 @@ def _worst_times(
     figure: Figure, one: _Sampler, other: _Sampler, edges: Floats, rate: float, how: Skinning
 ) -> _WorstTimes:
     """Return times of the largest distance of motions that are smooth between ``edges`` (E,), s."""
-    spans = _spans(edges, _SHORT / rate)
+    spans = np.column_stack([edges[:-1], edges[1:]])
+    spans = spans[spans[:, 1] - spans[:, 0] > _SHORT / rate]
     if len(spans) == 0:
         return _WorstTimes(np.zeros(0), 0, False)
     pair, looked = _Pair(figure, one, other, linear_as_opened(how)), 0
@@ -177,12 +174,6 @@ def _worst_times(
         found.append(_refined(pair, kind, times, peaks))
         looked += _ROUNDS * (_PARTS + 1) * len(peaks)
     return _WorstTimes(np.unique(np.concatenate(found)), looked, is_estimate)
-
-
-def _spans(edges: Floats, short: float) -> Floats:
-    """Return the start and end of each span between edges: (N, 2)."""
-    spans = np.column_stack([edges[:-1], edges[1:]])
-    return spans[spans[:, 1] - spans[:, 0] > short]
 
 
 def _within(spans: Floats, places: Floats) -> Floats:

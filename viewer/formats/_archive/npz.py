@@ -157,12 +157,7 @@ def _read_header(storage: StoredFile, key: str, stream: IO[bytes], size: int) ->
         )
     if _RECORD.search(text):
         return Opaque(Phrase("structured array"))
-    return _parse_header(storage, key, text, 8 + width + length, size)
-
-
-def _parse_header(
-    storage: StoredFile, key: str, text: bytes, offset: int, size: int
-) -> _Header | Opaque:
+    offset = 8 + width + length
     found = {match["key"]: match[_FIELDS[match["key"]]] for match in _ITEM.finditer(text)}
     rest = re.sub(rb"[\s,]+", b"", _ITEM.sub(b"", text))
     shape = _parse_shape(found.get(b"shape"))

@@ -303,7 +303,13 @@ class Archive:
 def describe(value: Value) -> Phrase:
     """Return a description of a value for messages, such as ``800 x 3 float32``."""
     if isinstance(value, Deferred):
-        return _described_array(value)
+        if value.dtype.kind not in "SU":
+            return Phrase("{shape} {dtype}", shape=axes(value.shape), dtype=value.dtype.name)
+        return (
+            Phrase("{shape} strings", shape=axes(value.shape))
+            if value.shape
+            else Phrase("a string")
+        )
     if isinstance(value, Sparse):
         return Phrase("a sparse {shape} matrix", shape=axes(value.shape))
     if isinstance(value, Opaque):
@@ -321,12 +327,6 @@ def describe(value: Value) -> Phrase:
     if value is None:
         return Phrase("None")
     return Phrase("{value}", value=printable(repr(value), 40))
-
-
-def _described_array(array: Deferred) -> Phrase:
-    if array.dtype.kind not in "SU":
-        return Phrase("{shape} {dtype}", shape=axes(array.shape), dtype=array.dtype.name)
-    return Phrase("{shape} strings", shape=axes(array.shape)) if array.shape else Phrase("a string")
 
 
 def texts_in(value: Value) -> list[str]:

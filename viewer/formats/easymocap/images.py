@@ -89,7 +89,9 @@ def find_images(
 ) -> ImageFolders | None:
     """Return calibrated cameras' images, in the given folder or an ``images`` nearby; or None."""
     for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
-        folders = {view.name: parent / view.name for view in views if _is_name(view.name)}
+        folders = {
+            view.name: parent / view.name for view in views if Path(view.name).name == view.name
+        }
         there = {name: folder for name, folder in folders.items() if folder.is_dir()}
         if not there and given is not None and len(views) == 1 and _numbered(given):
             there = {views[0].name: given}
@@ -105,11 +107,6 @@ def find_images(
         )
         raise FormatError(Diagnostic(key, given, values=values))
     return None
-
-
-def _is_name(name: str) -> bool:
-    """Return whether a camera's name is a plain folder name rather than a path."""
-    return Path(name).name == name
 
 
 def _numbered(folder: Path) -> dict[int, Path]:

@@ -159,10 +159,6 @@ def shape_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
             n_joints = math.prod(count)
             if len(frames) <= 1 and n_joints in joints:
                 return Form(math.prod(frames), n_joints, size)
-    return _flat_form(shape, joints)
-
-
-def _flat_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
     for size in _TITLES if 1 <= len(shape) <= 2 else ():
         if shape[-1] % size == 0 and shape[-1] // size in joints:
             return Form(math.prod(shape[:-1]), shape[-1] // size, size)

@@ -62,23 +62,19 @@ def read(source: Source, archive: Archive) -> Results:
                 found.append((number, space, person, body))
     people: dict[str, dict[int, Track]] = {}
     for number, space, person, body in found:
-        people.setdefault(space, {})[number] = _track(person, body)
+        count = (person.array("frames").shape or (0,))[0]
+        if body.has("rotmat"):
+            vectors = matrices(body, "rotmat", (count, 55, 3, 3))
+        else:
+            vectors = rows(body, "pose", (count, 165)).reshape(count, 55, 3)
+        frames, first = first_rows(person.source, frames_of(person, "frames", count))
+        shape = rows(body, "shape", (count, None))[first] if body.has("shape") else None
+        people.setdefault(space, {})[number] = Track(
+            frames, FAMILY[55].names, vectors[first], places(body, "trans", count)[first], shape
+        )
     ordered = {space: people[space] for space in _SPACES if space in people}
     return Results(
         "PromptHMR", "SMPL-X", ordered, {"world": "y", "camera": "-y"}, _cameras(archive)
-    )
-
-
-def _track(person: Archive, body: Archive) -> Track:
-    count = (person.array("frames").shape or (0,))[0]
-    if body.has("rotmat"):
-        vectors = matrices(body, "rotmat", (count, 55, 3, 3))
-    else:
-        vectors = rows(body, "pose", (count, 165)).reshape(count, 55, 3)
-    frames, first = first_rows(person.source, frames_of(person, "frames", count))
-    shape = rows(body, "shape", (count, None))[first] if body.has("shape") else None
-    return Track(
-        frames, FAMILY[55].names, vectors[first], places(body, "trans", count)[first], shape
     )
 
 

@@ -25,7 +25,7 @@ from viewer.formats._source import Source
 from viewer.formats.video_mocap.numbers import RowBudget, has, intrinsics_of, rotations_of, rows
 from viewer.formats.video_mocap.results import Cameras, Results, Track, moved
 from viewer.phrases import counted
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Bools
 from viewer.rig.bodies.smpl_family import members_by_numbers
 
 _RESULT = re.compile(r".*?_?(\d{1,9})_(?:\w+_)?world_results\.npz")
@@ -76,7 +76,16 @@ def read(source: Source, archive: Archive) -> Results:
             for person, track in world.items()
         }
         if archive.has("intrins"):
-            values = _intrinsics(archive)
+            # fx, fy, cx and cy; if there are several frames, of the first.
+            values = finite(archive, "intrins", archive.array("intrins").values()).reshape(-1)
+            if len(values) == 0 or len(values) % 4:
+                raise archive.fault(
+                    wording.VIDEO_COUNT,
+                    item="intrins",
+                    expected=counted(4, "number"),
+                    found=len(values),
+                )
+            values = values[:4]
             matrix = intrinsics_of(values[None, :2], values[2:])
             size = round(2 * float(values[2])), round(2 * float(values[3]))
             cameras = {
@@ -85,16 +94,6 @@ def read(source: Source, archive: Archive) -> Results:
             }
     ups = {"world": "-y", "camera": "-y"}
     return Results("SLAHMR", "SMPL+H", spaces, ups, cameras, notes=notes)
-
-
-def _intrinsics(archive: Archive) -> Floats:
-    """Return fx, fy, cx and cy; if there are several frames, of the first."""
-    values = finite(archive, "intrins", archive.array("intrins").values()).reshape(-1)
-    if len(values) == 0 or len(values) % 4:
-        raise archive.fault(
-            wording.VIDEO_COUNT, item="intrins", expected=counted(4, "number"), found=len(values)
-        )
-    return values[:4]
 
 
 def _bodies(archive: Archive, n_people: int, n_frames: int) -> list[Track]:
