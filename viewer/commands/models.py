@@ -9,10 +9,8 @@ from pathlib import Path
 
 from viewer.commands._printing import print_line
 from viewer.errors import ViewerError
-from viewer.models import data_folder, found_models, load_model_folder, save_model_folder
-from viewer.models.bundled import BUNDLED
-from viewer.models.catalog import CATALOG
-from viewer.models.download import ADDABLE, add_model, pip_command
+from viewer.models import BUNDLED, data_folder, found_models, load_model_folder, save_model_folder
+from viewer.models.download import ADDABLE, CATALOG, add_model, pip_command
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 

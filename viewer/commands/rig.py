@@ -51,8 +51,7 @@ from viewer.export import (
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.formats._text.numbers import to_number
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
-from viewer.models import named_files, resolve
-from viewer.models.bundled import BUNDLED
+from viewer.models import BUNDLED, named_files, resolve
 from viewer.near_names import did_you_mean, name_hint
 from viewer.phrases import printable, rounded
 from viewer.progress import part_of_work

@@ -30,8 +30,7 @@ from viewer.export._family import (
     up_axis,
 )
 from viewer.export._gaps import filled, gaps_note
-from viewer.export._losses.between_frames import resampling_losses
-from viewer.export._losses.motion_errors import frames_losses
+from viewer.export._losses.motion_errors import frames_losses, resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays

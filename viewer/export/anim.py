@@ -12,8 +12,7 @@ from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._gaps import filled, gaps_note
 from viewer.export._left_out import joint_scales_note
-from viewer.export._losses.between_frames import between_losses
-from viewer.export._losses.motion_errors import frames_losses
+from viewer.export._losses.motion_errors import between_losses, frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ExportOptions
 from viewer.export.bvh.angles import euler_angles, unrolled

@@ -39,8 +39,7 @@ from viewer.export._family import (
 )
 from viewer.export._gaps import kept_gaps, kept_note
 from viewer.export._left_out import rate_note
-from viewer.export._losses.between_frames import resampling_losses
-from viewer.export._losses.motion_errors import frames_losses
+from viewer.export._losses.motion_errors import frames_losses, resampling_losses
 from viewer.export._options import ExportOptions
 from viewer.formats._text.number_text import fixed_texts
 from viewer.interrupts import hold, poll

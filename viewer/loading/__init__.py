@@ -8,7 +8,7 @@ from viewer.formats import MAX_SIZE
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.contents import Contents, read_files, read_source
 from viewer.loading.settings import MotionSettings
-from viewer.models.bundled import bundled_body, bundled_files
+from viewer.models import bundled_body, bundled_files
 from viewer.rig.scene import Scene
 
 __all__ = [

@@ -16,8 +16,7 @@ from viewer.loading.contents import read_files
 from viewer.loading.pairing import joined_figures
 from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import MotionSettings
-from viewer.models import family_model, models_of_kind, named_files
-from viewer.models.bundled import bundled_body
+from viewer.models import bundled_body, family_model, models_of_kind, named_files
 from viewer.phrases import Remedy, listed
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.figure import Figure

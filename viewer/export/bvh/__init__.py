@@ -14,8 +14,7 @@ from viewer.errors import RigError
 from viewer.export._exporter import SampledParts, Selection
 from viewer.export._gaps import filled, frames_phrase, gaps_note
 from viewer.export._left_out import joint_scales_note
-from viewer.export._losses.between_frames import resampling_losses
-from viewer.export._losses.motion_errors import shape_changes
+from viewer.export._losses.motion_errors import resampling_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, ExportOptions
 from viewer.export.bvh.angles import Unroller

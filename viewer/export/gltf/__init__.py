@@ -19,7 +19,7 @@ from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.export._exporter import Part, Selection
 from viewer.export._gaps import frames_phrase
 from viewer.export._left_out import motion_notes, other_animations_note, rate_note
-from viewer.export._losses.between_frames import resampling_losses
+from viewer.export._losses.motion_errors import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import ExportOptions
 from viewer.export.gltf.body import Body, Built

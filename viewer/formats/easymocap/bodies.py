@@ -20,8 +20,8 @@ from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import within_text
-from viewer.formats.easymocap.files import FrameFiles
-from viewer.formats.easymocap.json_frames import (
+from viewer.formats.easymocap.files import (
+    FrameFiles,
     RecordError,
     has_numbers,
     limit_of,
