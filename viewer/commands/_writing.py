@@ -365,11 +365,10 @@ def bake_springs(bakes: bool, fps: float | None, scene: Scene, output: Path) -> 
     return notes
 
 
-def add_vrm_arguments(parser: argparse.ArgumentParser, upgrades: bool = False) -> None:
+def add_vrm_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that name a character, its authors and its licence."""
     group = parser.add_argument_group("writing VRM characters")
-    names = "name", "authors", "licence", "upgrades"
-    add_settings(group, VrmMeta, *(names if upgrades else names[:-1]))
+    add_settings(group, VrmMeta, "name", "authors", "licence")
 
 
 def check_meta(meta: VrmMeta, output: Path | None) -> None:
@@ -378,7 +377,6 @@ def check_meta(meta: VrmMeta, output: Path | None) -> None:
         "--vrm-name": meta.name,
         "--vrm-author": meta.authors,
         "--vrm-licence": meta.licence,
-        "--vrm-version": meta.upgrades,
     }
     named = next((option for option, value in given.items() if value), "")
     kinds = [] if output is None else exporters_at(output)

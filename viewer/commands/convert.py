@@ -104,7 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "for --joint-map (in a batch, a template such as maps/{stem}.txt)",
     )
     add_motion_arguments(parser)
-    add_vrm_arguments(parser, upgrades=True)
+    add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)

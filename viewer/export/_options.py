@@ -51,14 +51,6 @@ class VrmMeta:
         flag="--vrm-licence",
         metavar="URL",
     )
-    upgrades: bool = setting(
-        False,
-        "write characters from VRM 0.x files as VRM 1.0 (default: the file's version)",
-        flag="--vrm-version",
-        choices=("1.0", "1"),
-        given=None,
-        read=bool,
-    )
 
 
 @dataclass(slots=True)

@@ -33,17 +33,13 @@ class StoredTextures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VrmRecord:
-    """Extensions of a VRM file as parsed from JSON, and what their indices refer to."""
+    """Extensions of a VRM 1.0 file as parsed from JSON, and what their indices refer to."""
 
-    version: int
-    """0 for the extension ``VRM``, 1 for ``VRMC_vrm``."""
     extensions: Mapping[str, Any]
-    """Extensions of the root."""
+    """Extensions of the root; those of a VRM 0.x file are upgraded."""
     joints: Mapping[int, int]
     parts: Mapping[int, int]
     """Joint, and part of the mesh, of each node that has one."""
-    meshes: Mapping[int, int]
-    """Mesh of each node that ``parts`` lists."""
     materials: tuple[int, ...]
     """Index in the file of each material of the figure's mesh."""
     toon: Mapping[int, Any]
@@ -51,6 +47,9 @@ class VrmRecord:
     index."""
     textures: StoredTextures | None = None
     """Textures of the file."""
+    old_members: tuple[str, ...] | None = None
+    """Members of a VRM 0.x file, whose character faces -z, that VRM 1.0 cannot hold; None for a
+    VRM 1.0 file."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

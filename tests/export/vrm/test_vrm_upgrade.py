@@ -25,7 +25,7 @@ def upgrade(file: File, folder: Path, **meta: Any) -> tuple[Written, dict[str, A
     """Write a character as VRM 1.0; return the file, and the notes by key."""
     path, out = folder / "ada.vrm", folder / "out.vrm"
     path.write_bytes(file.glb())
-    notes = export(load(path).actors[0], out, meta=VrmMeta(**meta, upgrades=True))
+    notes = export(load(path).actors[0], out, meta=VrmMeta(**meta))
     return Written(out), {note.key: note for note in notes}
 
 
@@ -165,6 +165,19 @@ def test_branches_become_chains(tmp_path: Path) -> None:
     assert chains == [[*HAIR, "hairEnd_end"], ["twig", "twig_end"]]
 
 
+def test_node_that_is_no_joint_ends_a_chain(tmp_path: Path) -> None:
+    file = swinging(0)
+    index = next(n for n, node in enumerate(file.root["nodes"]) if node["name"] == "hairEnd")
+    tip = file.add("nodes", {"name": "tip", "translation": [0, -0.05, 0.01]})
+    file.root["nodes"][index]["children"] = [tip]
+    written, _ = upgrade(file, tmp_path)
+    (chain,) = written.root["extensions"]["VRMC_springBone"]["springs"]
+    nodes = [written.root["nodes"][each["node"]] for each in chain["joints"]]
+    assert [node["name"] for node in nodes] == [*HAIR, "hairEnd_end"]
+    # The figure is turned as a whole, so a place below its root stays the same.
+    assert_allclose(nodes[-1]["translation"], [0, -0.05, 0.01], rtol=0, atol=1e-9)
+
+
 def test_toon_shading_is_converted(tmp_path: Path) -> None:
     file = swinging(0)
     skin = old_vrm(file)["materialProperties"][0]
@@ -263,16 +276,11 @@ def test_data_of_another_structure_does_not_prevent_writing(
     assert written.root["extensions"]["VRMC_vrm"]["specVersion"] == "1.0"
 
 
-def test_convert_writes_version_1_if_requested(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_convert_writes_version_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = tmp_path / "ada.vrm", tmp_path / "out.vrm"
     path.write_bytes(swinging(0).glb())
-    command = ["convert", str(path), "--vrm-version", "1.0"]
-    assert run([*command, "-o", str(out)]) == 0
+    assert run(["convert", str(path), "-o", str(out)]) == 0
     assert "VRM 1.0: 17 human bones, 2 expressions, 1 spring chain" in capsys.readouterr().out
-    assert run([*command, "-o", str(tmp_path / "out.glb")]) == 2
-    assert "--vrm-version: expected an output with .vrm" in capsys.readouterr().err
 
 
 def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path: Path) -> None:
@@ -282,6 +290,7 @@ def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path: Path) 
     springs["boneGroups"][1] = springs["boneGroups"][0] | {"gravityDir": {"x": [1], "y": 0, "z": 0}}
     (sphere,) = springs["colliderGroups"][0]["colliders"]
     springs["colliderGroups"][0]["colliders"] = [sphere, {"offset": {"z": "far"}, "radius": 0.1}]
+    springs["colliderGroups"].append({"node": 99, "colliders": [sphere]})
     old_vrm(file)["firstPerson"]["firstPersonBoneOffset"] = {"x": 0.0, "y": {}, "z": [0.1]}
     written, notes = upgrade(file, tmp_path)
     told = written.root["extensions"]
@@ -292,18 +301,19 @@ def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path: Path) 
         "firstPerson.firstPersonBoneOffset",
         "secondaryAnimation.boneGroups[1]",
         "secondaryAnimation.colliderGroups[0].colliders[1]",
+        "secondaryAnimation.colliderGroups[1].colliders[0]",
     } <= {*notes["X003.vrm-upgrade"].values["names"]}
 
 
 def test_numbers_that_json_cannot_store_are_omitted(tmp_path: Path) -> None:
-    file = swinging(0)
-    group = old_vrm(file)["secondaryAnimation"]["boneGroups"][0]
-    group |= {"note": float("nan"), "table": [1.0, float("inf")]}
+    file = swinging(1)
+    (chain,) = file.root["extensions"]["VRMC_springBone"]["springs"]
+    chain |= {"note": float("nan"), "table": [1.0, float("inf")]}
     path, out = tmp_path / "ada.vrm", tmp_path / "out.vrm"
     path.write_bytes(file.glb())
     notes = {note.key: note for note in export(load(path).actors[0], out)}
     assert notes["X003.json-numbers"].values["n"] == 2
-    kept = Written(out).root["extensions"]["VRM"]["secondaryAnimation"]["boneGroups"][0]
+    (kept,) = Written(out).root["extensions"]["VRMC_springBone"]["springs"]
     assert "note" not in kept and kept["table"] == [1.0, 0.0]
 
 

@@ -23,27 +23,30 @@ from viewer.export._exporter import Part, Selection
 from viewer.export._options import ExportOptions, VrmMeta
 from viewer.export.gltf.body import Body, Built
 from viewer.export.gltf.document import Document, text_of
-from viewer.export.vrm.canonical_pose import in_t_pose, standing
+from viewer.export.vrm.canonical_pose import facing_front, in_t_pose, standing
 from viewer.export.vrm.humanoid import human_bones
-from viewer.export.vrm.kept_extensions import Maps, kept_modern, kept_old, kept_toon
-from viewer.export.vrm.meta import LICENCE, changed_meta, checked_meta
+from viewer.export.vrm.kept_extensions import Maps, kept_extensions, kept_toon
+from viewer.export.vrm.meta import changed_meta, checked_meta
 from viewer.export.vrm.new_extension import made_character
-from viewer.export.vrm.upgrade import upgraded
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
 from viewer.formats._vrm.parts import list_in, part, value_of
 from viewer.formats._vrm.springs import EXTENDED
+from viewer.formats._vrm.upgrade import LICENCE
 from viewer.phrases import agree, all_of, counted, listed, rounded
+from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 from viewer.rig.humanoid import REQUIRED_BONES
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.springs.springs import Springs
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _STRAIGHT = 1e-4  # radians
 _CONSTRAINT = "VRMC_node_constraint"
+_SPRINGS = "VRMC_springBone"
 _TOON = "VRMC_materials_mtoon"
 _UNLIT = "KHR_materials_unlit"
 _TRANSFORM = "KHR_texture_transform"
@@ -74,19 +77,17 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
                     values={"names": listed(names), "n": len(names)},
                 )
             )
-        if record.version == 1 or not given.upgrades:
-            _require_meta(record, given, figure.name)
-    if record is not None and record.version == 0 and given.upgrades:
-        figure, record, lost = upgraded(figure, record, bones)
+        _require_meta(record, given, figure.name)
+    if record is not None and record.old_members is not None:
+        figure, record = _facing_front(figure, record, bones)
         still = replace(still, figure=figure, pose=figure_pose(figure))
-        _require_author(record, given, figure.name)
-        if lost:
+        if lost := record.old_members:
             notes.append(
                 Diagnostic(
                     "X003.vrm-upgrade: {n} of the VRM 0.x file {have} no counterpart in VRM 1.0: "
                     "{names}",
                     values={
-                        "names": listed(lost, 8),
+                        "names": listed([*lost], 8),
                         "n": counted(len(lost), "member"),
                         "have": agree(len(lost), "has", "have"),
                     },
@@ -120,73 +121,119 @@ def require(figure: Figure) -> None:
 
 def _repaired(record: VrmRecord, bones: Mapping[str, int]) -> tuple[VrmRecord, list[str]]:
     """Return a record without invalid values, and the names of what was corrected."""
-    key = "VRM" if record.version == 0 else "VRMC_vrm"
-    told, names = copy.deepcopy(record.extensions[key]), list[str]()
-    if record.version == 1 and told.get("specVersion") != "1.0":
+    told, names = copy.deepcopy(record.extensions["VRMC_vrm"]), list[str]()
+    if told.get("specVersion") != "1.0":
         told["specVersion"] = "1.0"
         names.append("specVersion")
-    if record.version == 1 and "VRM" in record.extensions:
+    if "VRM" in record.extensions:
         names.append("VRM 0.x besides 1.0")
-    names += [f"human bone {bone}" for bone in _remove_bones(told, record.version, bones)]
-    limited = dict.fromkeys(_limit_weights(told, record.version))
-    names += [f"weights of {name}" for name in limited]
-    return replace(record, extensions={**record.extensions, key: told}), names
+    names += [f"human bone {bone}" for bone in _remove_bones(told, bones)]
+    names += [f"weights of {name}" for name in dict.fromkeys(_limit_weights(told))]
+    return replace(record, extensions={**record.extensions, "VRMC_vrm": told}), names
 
 
-def _remove_bones(told: Any, version: int, bones: Mapping[str, int]) -> list[str]:
-    """Remove the bones that are unknown, misplaced, or have the name or node of an earlier one."""
-    removed: dict[str, str] = {}
-    seen: set[str] = set()
+def _remove_bones(told: Any, bones: Mapping[str, int]) -> list[str]:
+    """Remove the bones that are unknown, misplaced, or have the node of an earlier one."""
+    removed: list[str] = []
     nodes: list[Any] = []
     # Required bones come first, so that they keep a node that an optional bone also uses.
-    rows = sorted(given_bones(told, version), key=lambda row: row[1] not in REQUIRED_BONES)
-    for place, bone, node in rows:
-        if bone not in bones or bone in seen or node in nodes:
-            removed[place] = bone
+    rows = sorted(given_bones(told, 1), key=lambda row: row[1] not in REQUIRED_BONES)
+    for _, bone, node in rows:
+        if bone not in bones or node in nodes:
+            removed.append(bone)
+            del told["humanoid"]["humanBones"][bone]
         else:
-            seen.add(bone)
             nodes.append(node)
-    if removed and version == 0:
-        stated = enumerate(told["humanoid"]["humanBones"])
-        left = [each for place, each in stated if str(place) not in removed]
-        told["humanoid"]["humanBones"] = left
-    for place in removed if version == 1 else ():
-        del told["humanoid"]["humanBones"][place]
-    return [*removed.values()]
+    return removed
 
 
-def _limit_weights(told: Any, version: int) -> list[str]:
+def _limit_weights(told: Any) -> list[str]:
     """Limit the weights of expressions; return the names of those that were changed."""
     changed = []
-    for bind, _, name in weighted_binds(told, version):
-        if not is_weight(bind["weight"], version):
+    for bind, _, name in weighted_binds(told, 1):
+        if not is_weight(bind["weight"], 1):
             weight = value_of(bind["weight"], 0.0)
             if weight is None:
                 bind.clear()  # a bind without indices is not written, and counted as lost
                 continue
-            bind["weight"] = min(max(weight, 0.0), MOST_WEIGHT[version])
+            bind["weight"] = min(max(weight, 0.0), MOST_WEIGHT[1])
             changed.append(name)
     return changed
 
 
+def _facing_front(
+    figure: Figure, record: VrmRecord, bones: Mapping[str, int]
+) -> tuple[Figure, VrmRecord]:
+    """Return a VRM 0.x character that faces +z instead of -z, with the ends of its chains."""
+    springs = figure.require_skeleton().springs
+    figure, record = _with_ends(facing_front(figure, bones), record, springs)
+    chains = copy.deepcopy(list_in(record.extensions.get(_SPRINGS), "springs"))
+    for each in (each for chain in chains for each in chain["joints"] if "gravityDir" in each):
+        # Gravity is the only vector in the space of the scene; others turn with their nodes.
+        x, y, z = each["gravityDir"]
+        each["gravityDir"] = [0.0 - x, y, 0.0 - z]
+    if chains:
+        told = {**record.extensions[_SPRINGS], "springs": chains}
+        record = replace(record, extensions={**record.extensions, _SPRINGS: told})
+    return figure, record
+
+
+def _with_ends(
+    figure: Figure, record: VrmRecord, springs: Springs | None
+) -> tuple[Figure, VrmRecord]:
+    """Return a figure with a joint for the end of each chain that ends in no joint."""
+    rows = {} if springs is None else {joint: row for row, joint in enumerate(springs.joints)}
+    chains = []
+    tails: dict[int, Floats] = {}
+    ends: dict[int, int] = {}
+    for chain in list_in(record.extensions.get(_SPRINGS), "springs"):
+        told = chain["joints"]
+        own = [each for each in told if each["node"] in record.joints]
+        last = record.joints[own[-1]["node"]] if own else -1
+        if springs is not None and len(own) < len(told) and last in rows:
+            end = told[len(own)]["node"]
+            tails[last], ends[last] = springs.tails[rows[last]], end
+            own.append({"node": end})
+        chains.append({**chain, "joints": own or told})
+    if not tails:
+        return figure, record
+    tails = dict(sorted(tails.items()))
+    first = figure.require_skeleton().n_joints
+    joints = {**record.joints} | {ends[last]: first + row for row, last in enumerate(tails)}
+    told = {**record.extensions[_SPRINGS], "springs": chains}
+    extensions = {**record.extensions, _SPRINGS: told}
+    return _extended(figure, tails), replace(record, joints=joints, extensions=extensions)
+
+
+def _extended(figure: Figure, tails: Mapping[int, Floats]) -> Figure:
+    """Return a figure with an additional joint below each of these, at these positions (3,)."""
+    skeleton, count, skin = figure.require_skeleton(), len(tails), figure.skin
+    more = replace(
+        skeleton,
+        names=(*skeleton.names, *(f"{skeleton.names[joint]}_end" for joint in tails)),
+        parents=np.append(skeleton.parents, [*tails]).astype(np.int32),
+        rest_translations=np.vstack([skeleton.rest_translations, *tails.values()]),
+        rest_rotations=np.vstack([skeleton.rest_rotations, *[[0.0, 0.0, 0.0, 1.0]] * count]),
+        rest_scales=np.vstack([skeleton.rest_scales, np.ones((count, 3))]),
+        auxiliary=None
+        if skeleton.auxiliary is None
+        else np.append(skeleton.auxiliary, np.zeros(count, dtype=np.bool_)),
+    )
+    if skin is not None:
+        bound = np.vstack([skin.inverse_bind, np.tile(np.eye(4), (count, 1, 1))])
+        skin = replace(skin, inverse_bind=bound)
+    return replace(figure, skeleton=more, skin=skin)
+
+
 def _require_meta(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
     """Raise RigError if neither the file nor the options have the meta data that VRM needs."""
-    told = record.extensions["VRM" if record.version == 0 else "VRMC_vrm"].get("meta")
-    is_known = isinstance(told, dict)
-    if record.version == 1:
-        is_known = bool(part(told, "authors") and part(told, "licenseUrl"))
-    if not is_known:
+    told = record.extensions["VRMC_vrm"].get("meta")
+    if not (part(told, "authors") and part(told, "licenseUrl")):
         authors = meta.authors or tuple(part(told, "authors") or ())
         checked_meta(
             replace(meta, authors=authors, licence=meta.licence or part(told, "licenseUrl") or ""),
             figure,
         )
-
-
-def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
-    """Raise RigError if neither the file nor the options name an author."""
-    if not any(record.extensions["VRMC_vrm"]["meta"]["authors"]):
-        checked_meta(replace(meta, licence=meta.licence or LICENCE), figure)
 
 
 def _unit_notes(figure: Figure) -> list[Diagnostic]:
@@ -226,21 +273,17 @@ def _add_kept(
 ) -> list[Diagnostic]:
     """Add the extensions of the figure's own file; return notes about lost references."""
     maps = Maps(record, document, built)
-    if record.version == 0:
-        names = [str(item.get("name", "")) for item in document.root.get("materials", ())]
-        extensions = kept_old(maps, names)
-    else:
-        extensions = kept_modern(maps)
+    extensions = kept_extensions(maps)
     _keep_shading(record, document, maps)
-    data = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
-    data["meta"] = changed_meta(data["meta"], meta, record.version)
-    if record.version == 1 and not data["meta"].get("name"):
+    data = extensions["VRMC_vrm"]
+    data["meta"] = changed_meta(data["meta"], meta)
+    if not data["meta"].get("name"):
         data["meta"]["name"] = text_of(body.figure.name)
     _add(document, body, built, extensions)
-    colliders = list_in(extensions.get("VRMC_springBone"), "colliders")
+    colliders = list_in(extensions.get(_SPRINGS), "colliders")
     if any(part(each, "extensions", EXTENDED) is not None for each in colliders):
         _declare(document, EXTENDED)
-    return [_written(data, extensions, record.version), *_lost(maps.lost)]
+    return [_written(data, extensions), *_lost(maps.lost)]
 
 
 def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
@@ -274,7 +317,7 @@ def _add_made(
     """Add the extension of a figure from another format."""
     extensions = {"VRMC_vrm": made_character(body, built, bones, meta)}
     _add(document, body, built, extensions)
-    notes = [_written(extensions["VRMC_vrm"], extensions, 1)]
+    notes = [_written(extensions["VRMC_vrm"], extensions)]
     if meta["licenseUrl"] != LICENCE:
         notes.append(
             Diagnostic(
@@ -301,25 +344,17 @@ def _declare(document: Document, *names: str) -> None:
     used += [name for name in names if name not in used]
 
 
-def _written(data: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
+def _written(data: Mapping[str, Any], extensions: Mapping[str, Any]) -> Diagnostic:
     """Return a note that counts the contents of the extensions."""
     bones = data["humanoid"]["humanBones"]
-    if version == 0:
-        n_expressions = _size(part(data, "blendShapeMaster", "blendShapeGroups"))
-        groups = part(data, "secondaryAnimation", "boneGroups")
-        chains = groups if isinstance(groups, list) else []
-        n_chains = sum(_size(part(each, "bones")) for each in chains)
-    else:
-        kinds = ("preset", "custom")
-        n_expressions = sum(_size(part(data, "expressions", kind)) for kind in kinds)
-        n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
+    n_expressions = sum(_size(part(data, "expressions", kind)) for kind in ("preset", "custom"))
+    n_chains = _size(part(extensions.get(_SPRINGS), "springs"))
     parts = [
         Phrase("{n}", n=counted(len(bones), "human bone")),
         Phrase("{n}", n=counted(n_expressions, "expression")),
     ]
     parts.append(Phrase("{n}", n=counted(n_chains, "spring chain")))
-    values = {"version": "0.x" if version == 0 else "1.0", "parts": all_of(parts)}
-    return Diagnostic("X001.vrm: VRM {version}: {parts}", values=values)
+    return Diagnostic("X001.vrm: VRM 1.0: {parts}", values={"parts": all_of(parts)})
 
 
 def _size(data: Any) -> int:

@@ -21,20 +21,10 @@ _BINDS = {
     "textureTransformBinds": ("material", "material-binds"),
 }
 
-# Material of version 0.x that is drawn as glTF describes it
-_PLAIN = {
-    "shader": "VRM_USE_GLTFSHADER",
-    "renderQueue": -1,
-    "floatProperties": {},
-    "vectorProperties": {},
-    "textureProperties": {},
-    "keywordMap": {},
-    "tagMap": {},
-}
 _KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # image formats that VRM allows
 
 
-def kept_modern(maps: Maps) -> dict[str, Any]:
+def kept_extensions(maps: Maps) -> dict[str, Any]:
     """Return the root extensions ``VRMC_vrm`` and ``VRMC_springBone`` of a character."""
     data = maps.record.extensions
     found = {"VRMC_vrm": _character(data["VRMC_vrm"], maps)}
@@ -157,112 +147,6 @@ def kept_toon(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
     return result
 
 
-def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
-    """Return the root extension ``VRM`` of a character, with the indices of the written file.
-
-    Version 0.x binds expressions to meshes, which become one mesh per node here: such binds are
-    repeated. Its materials are parallel to those of the file.
-
-    ``names``: names of the written materials.
-    """
-    data = maps.record.extensions["VRM"]
-    result = dict(data)
-    bones = list_in(data, "humanoid", "humanBones")
-    result["humanoid"] = {
-        **(data["humanoid"] if isinstance(data.get("humanoid"), dict) else {}),
-        "humanBones": _nodes(bones, maps, "bones"),
-    }
-    meta = dict(data["meta"]) if isinstance(data.get("meta"), dict) else {}
-    if meta.get("texture", -1) != -1:
-        texture = maps.texture(meta.pop("texture"), "textures")
-        meta |= {} if texture is None else {"texture": texture}
-    result["meta"] = meta
-    if isinstance(data.get("firstPerson"), dict):
-        result["firstPerson"] = _first_person(data["firstPerson"], maps)
-    groups = list_in(data, "blendShapeMaster", "blendShapeGroups")
-    if groups:
-        result["blendShapeMaster"] = {
-            **data["blendShapeMaster"],
-            "blendShapeGroups": [
-                {**each, "binds": _of_meshes(each.get("binds"), maps, "morph-binds")}
-                for each in groups
-                if isinstance(each, dict)
-            ],
-        }
-    if isinstance(data.get("secondaryAnimation"), dict):
-        result["secondaryAnimation"] = _old_springs(data["secondaryAnimation"], maps)
-    result["materialProperties"] = _materials(list_in(data, "materialProperties"), maps, names)
-    return {"VRM": result}
-
-
-def _nodes(rows: list[Any], maps: Maps, kind: str) -> list[Any]:
-    return [
-        {**each, "node": node}
-        for each in rows
-        if isinstance(each, dict) and (node := maps.joint(each.get("node"), kind)) is not None
-    ]
-
-
-def _of_meshes(rows: Any, maps: Maps, kind: str) -> list[Any]:
-    """Return objects with translated meshes, one for each mesh that is written."""
-    given = rows if isinstance(rows, list) else []
-    return [
-        {**each, "mesh": mesh}
-        for each in given
-        if isinstance(each, dict)
-        for mesh in maps.meshes(each.get("mesh"), kind)
-    ]
-
-
-def _first_person(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    result = dict(data)
-    if data.get("firstPersonBone", -1) != -1:
-        bone = maps.joint(data["firstPersonBone"], "bones")
-        result["firstPersonBone"] = -1 if bone is None else bone
-    notes = _of_meshes(data.get("meshAnnotations"), maps, "annotations")
-    return {**result, "meshAnnotations": notes}
-
-
-def _old_springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the springs; groups of colliders keep their indices, because springs refer to them."""
-    groups = []
-    for each in list_in(data, "boneGroups"):
-        if not isinstance(each, dict):
-            continue
-        bones = [maps.joint(bone, "spring-joints") for bone in list_in(each, "bones")]
-        group = {**each, "bones": [bone for bone in bones if bone is not None]}
-        if part(each, "center") not in (None, -1):
-            center = maps.joint(each["center"], "centers")
-            group["center"] = -1 if center is None else center
-        groups.append(group)
-    colliders = []
-    for each in list_in(data, "colliderGroups"):
-        node = maps.joint(part(each, "node"), "colliders")
-        # A group without a joint would be invalid: it moves to the first joint, without colliders.
-        empty = {"node": maps.first_joint, "colliders": []}
-        is_kept = node is not None and isinstance(each, dict)
-        colliders.append({**each, "node": node} if is_kept else empty)
-    return {**data, "boneGroups": groups, "colliderGroups": colliders}
-
-
-def _materials(data: list[Any], maps: Maps, names: list[str]) -> list[Any]:
-    """Return the properties of each written material, in their order."""
-    result: list[Any] = [{"name": name, **_PLAIN} for name in names]
-    for own, written in maps.materials.items():
-        if own >= len(data) or not isinstance(data[own], dict):
-            continue
-        each = dict(data[own])
-        textures = part(each, "textureProperties")
-        given = textures.items() if isinstance(textures, dict) else ()
-        each["textureProperties"] = {
-            name: texture
-            for name, index in given
-            if (texture := maps.texture(index, "textures")) is not None
-        }
-        result[written] = each
-    return result
-
-
 class Maps:
     """Indices of a VRM file in the written one, to which it adds textures, and what is lost."""
 
@@ -282,11 +166,6 @@ class Maps:
         """Return the written node of a joint; None, counted as lost, if there is none."""
         return self._found(self._joints, node, kind)
 
-    @property
-    def first_joint(self) -> int:
-        """The written node of the file's first joint."""
-        return next(iter(self._joints.values()), 0)
-
     def drawn(self, node: Any, kind: str) -> int | None:
         """Return the written node of a mesh; None, counted as lost, if there is none."""
         return self._found(self._drawn, node, kind)
@@ -299,15 +178,6 @@ class Maps:
     def materials(self) -> dict[int, int]:
         """Written materials, by material of the original file; only those in use."""
         return self._materials
-
-    def meshes(self, mesh: Any, kind: str) -> list[int]:
-        """Return the written meshes of a mesh, which several nodes may share."""
-        nodes = [node for node, own in self.record.meshes.items() if own == mesh]
-        items = self._document.root["nodes"]
-        found = [items[self._drawn[node]]["mesh"] for node in nodes if node in self._drawn]
-        if not found:
-            self.lost[kind] += 1
-        return found
 
     def image(self, index: Any, kind: str) -> int | None:
         """Return a written image; None, counted as lost, if it cannot be read."""

@@ -8,10 +8,8 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._options import VrmMeta
 from viewer.export.gltf.document import text_of
+from viewer.formats._vrm.upgrade import LICENCE
 from viewer.phrases import Remedy
-
-LICENCE = "https://vrm.dev/licenses/1.0/"
-"""The VRM Public Licence, the only one that VRM 1.0 accepts."""
 
 
 def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
@@ -39,15 +37,14 @@ def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
     }
 
 
-def changed_meta(data: dict[str, Any], meta: VrmMeta, version: int) -> dict[str, Any]:
+def changed_meta(data: dict[str, Any], meta: VrmMeta) -> dict[str, Any]:
     """Return a file's meta data with the requested changes; empty ones keep those of the file."""
-    names = ("title", "author") if version == 0 else ("name", "authors")
     changed = dict(data)
     if meta.name:
-        changed[names[0]] = text_of(meta.name)
+        changed["name"] = text_of(meta.name)
     listed = [text_of(author) for author in meta.authors if author]
     if listed:
-        changed[names[1]] = ", ".join(listed) if version == 0 else listed
+        changed["authors"] = listed
     if meta.licence:
-        changed["otherLicenseUrl" if version == 0 else "licenseUrl"] = text_of(meta.licence)
+        changed["licenseUrl"] = text_of(meta.licence)
     return changed

@@ -75,6 +75,8 @@ class NodeFile:
     """Further nodes that must become joints, because extensions refer to them."""
     toon: Mapping[int, Any] = field(default_factory=dict)
     """Toon and unlit extensions of materials by index, as parsed from JSON."""
+    old_members: tuple[str, ...] | None = None
+    """Members of a VRM 0.x file that VRM 1.0 cannot hold; None for other files."""
     textures: StoredTextures | None = None
     """Textures as the file lists them."""
     facts: tuple[tuple[str, str], ...] = ()

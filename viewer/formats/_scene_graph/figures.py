@@ -246,18 +246,17 @@ def _vrm_record(
     file: NodeFile, joints: Joints, nodes: list[int], pieces: list[Piece]
 ) -> VrmRecord | None:
     """Return the VRM properties of the figure that has the humanoid; None for others."""
-    versions = [n for n, name in ((1, "VRMC_vrm"), (0, "VRM")) if name in file.extensions]
-    if not versions or not any(node in joints.own for node in file.humanoid.values()):
+    is_vrm = "VRMC_vrm" in file.extensions
+    if not is_vrm or not any(node in joints.own for node in file.humanoid.values()):
         return None
     return VrmRecord(
-        version=versions[0],
         extensions=file.extensions,
         joints=joints.own,
         parts={node: part for part, node in enumerate(nodes)},
-        meshes={node: int(file.tree.meshes[node]) for node in nodes},
         materials=tuple(used_materials(pieces)),
         toon=file.toon,
         textures=file.textures,
+        old_members=file.old_members,
     )
 
 

@@ -88,13 +88,9 @@ _OUTLINE_WIDTHS = (0.0, 0.01, 0.005)
 _WRITES_DEPTH = 3  # value of _BlendMode
 
 
-def old_binds(told: Any, materials: list[Any]) -> tuple[list[_Bind], list[str]]:
-    """Return the changes by an expression of version 0.x, and labels of changes without effect.
-
-    ``told``: a member of ``blendShapeGroups``, as parsed from JSON. ``materials``:
-    ``materialProperties``, whose names the expression uses.
-    """
-    found: list[_Bind] = []
+def upgraded_binds(told: Any, materials: list[Any]) -> tuple[dict[str, list[Any]], list[str]]:
+    """Return an expression's changes in the terms of 1.0, and labels of those without effect."""
+    colors: list[dict[str, Any]] = []
     moves: dict[int, Floats] = {}
     lost: list[str] = []
     for each in list_in(told, "materialValues"):
@@ -107,13 +103,19 @@ def old_binds(told: Any, materials: list[Any]) -> tuple[list[_Bind], list[str]]:
             continue
         for owner in owners:
             if name in _COLORS:
-                found.append((owner, _COLORS[name], _linear(name, value)))
+                target = _linear(name, value).tolist()
+                colors.append({"material": owner, "type": _COLORS[name], "targetValue": target})
                 continue
             move = moves.setdefault(owner, _main_transform(materials[owner]))
             for axis in _AXES[name]:
                 scale, offset = float(value[axis]), float(value[2 + axis])
                 move[[axis, 2 + axis]] = scale, 1.0 - offset - scale if axis else offset
-    return found + [(owner, TRANSFORM, move) for owner, move in moves.items()], lost
+    moved = [
+        {"material": owner, "scale": move[:2].tolist(), "offset": move[2:].tolist()}
+        for owner, move in moves.items()
+    ]
+    named_rows = {"materialColorBinds": colors, "textureTransformBinds": moved}
+    return {name: rows for name, rows in named_rows.items() if rows}, lost
 
 
 def _linear(name: str, value: Floats) -> Floats:
@@ -266,14 +268,10 @@ def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
 
 
 def _modern_ramp(toony: float, shift: float) -> tuple[float, float]:
-    """Return ``shadingToonyFactor`` and ``shadingShiftFactor`` with the same ramp.
-
-    Version 0.x rises from ``shift`` to the interpolation from 1 to ``shift`` by ``toony``; version
-    1.0 from toony' - 1 - shift' to 1 - toony' - shift'.
-
-    >>> _modern_ramp(0.5, 0.0)
-    (0.75, -0.25)
-    """
+    """Return ``shadingToonyFactor`` and ``shadingShiftFactor`` with the same ramp."""
+    # Version 0.x rises from s = shift to e = t s + (1 - t) 1 with t = toony; version 1.0 from
+    # t' - 1 - s' to 1 - t' - s'. The sum of both ends gives s' = -(s + e) / 2, the difference
+    # t' = 1 - (e - s) / 2 = t + (1 - t) (1 + s) / 2, so s' = -s - (1 - t').
     toony += (1.0 - toony) * (0.5 + 0.5 * shift)
     return toony, -shift - (1.0 - toony)
 

@@ -1,8 +1,7 @@
 """VRM properties of a glTF file: bones, expressions, springs, constraints, views and permissions.
 
 Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0. Version 0
-names the joints of a thumb differently, states the weights of expressions in percent, and binds
-them to meshes instead of nodes.
+is upgraded; what it says in its own words, such as its permissions, is shown as it is.
 """
 
 from __future__ import annotations
@@ -17,17 +16,19 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.checks import check_character
 from viewer.formats._vrm.constraints import read_constraints
-from viewer.formats._vrm.materials import modern_binds, old_binds
+from viewer.formats._vrm.materials import modern_binds
 from viewer.formats._vrm.parts import is_index, list_in, part, value_of
 from viewer.formats._vrm.springs import read_springs
+from viewer.formats._vrm.upgrade import NamedExpression, upgrade
 from viewer.phrases import listed, quoted
-from viewer.rig.expressions import OLD_PRESETS, OVERRIDES, PROCEDURAL
+from viewer.rig.arrays import Floats
+from viewer.rig.expressions import OVERRIDES, PROCEDURAL
 from viewer.rig.mesh import PartView
 from viewer.rig.springs.springs import Springs
 
-_PERCENT = 100.0
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
 
+_KEYS = ("VRM", "VRMC_vrm")  # by version
 _SINGLE = {"node", "center", "firstPersonBone"}
 _LISTS = {"bones"}
 
@@ -65,37 +66,45 @@ _LONGEST = 200  # maximum number of characters of a property
 
 def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     """Return a file with the humanoid, expressions, constraints and springs of its extensions."""
+    given, old = file.extensions, None
+    ends: Mapping[int, Floats] = {}
     file = replace(
         file,
         constraints=read_constraints(file.tree, source),
-        springs=read_springs(file, source),
-        named_nodes=_named_nodes(file.extensions, file.tree.n_nodes),
+        named_nodes=_named_nodes(given, file.tree.n_nodes),
     )
-    for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
-        told = file.extensions.get(key)
-        if isinstance(told, dict):
-            pointer = f"/extensions/{key}"
-            check_character(source, file.extensions, version)
-            file = replace(
-                file,
-                humanoid=read_humanoid(source, file, told, version, pointer),
-                expressions=_expressions(source, file, told, version, pointer),
-                part_views={
-                    **_read_part_views(file, told, version, pointer, source),
-                    **file.part_views,
-                },
-            )
-            return replace(file, facts=(*_facts(told), *_contents(file)))
-    return replace(file, facts=_contents(file))
+    version = next((n for n in (1, 0) if isinstance(given.get(_KEYS[n]), dict)), None)
+    if version == 0:
+        old = upgrade(file, source)
+        extensions = {name: told for name, told in given.items() if name != "VRM"}
+        file = replace(
+            file,
+            extensions={**extensions, **old.extensions},
+            toon=old.toon,
+            old_members=tuple(old.lost),
+        )
+        ends = old.ends
+    file = replace(file, springs=read_springs(file, source, ends))
+    if version is None:
+        return replace(file, facts=_contents(file))
+    told, pointer = given[_KEYS[version]], f"/extensions/{_KEYS[version]}"
+    check_character(source, given, version)
+    humanoid = read_humanoid(source, file, told, version, pointer)
+    if old is None:
+        kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
+        items = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
+        named = [NamedExpression(str(n), "", one, []) for n, one in items if isinstance(one, dict)]
+        at = f"{pointer}/expressions"
+    else:
+        named, at = old.expressions, f"{pointer}/blendShapeMaster/blendShapeGroups"
+    expressions = _expressions(source, file, named, at)
+    views = {**_read_part_views(file, told, version, pointer, source), **file.part_views}
+    file = replace(file, humanoid=humanoid, expressions=expressions, part_views=views)
+    return replace(file, facts=(*_facts(told), *_contents(file)))
 
 
 def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
-    """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` of the root name.
-
-    >>> told = {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1, 9], "center": 2}]}}}
-    >>> sorted(_named_nodes(told, 3))
-    [1, 2]
-    """
+    """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` of the root name."""
     found: set[int] = set()
     stack: list[Any] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
     while stack:
@@ -113,68 +122,42 @@ def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
 
 
 def _expressions(
-    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+    source: Source, file: NodeFile, named: list[NamedExpression], pointer: str
 ) -> tuple[NodeExpression, ...]:
     """Return the expressions that change shapes or materials; report changes without effect."""
-    if version == 0:
-        groups = list_in(told, "blendShapeMaster", "blendShapeGroups")
-        named = [(_old_name(each), each) for each in groups if isinstance(each, dict)]
-        at = f"{pointer}/blendShapeMaster/blendShapeGroups"
-    else:
-        kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
-        named = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
-        at = f"{pointer}/expressions"
     found, undrawn = [], list[str]()
-    materials = list_in(told, "materialProperties")
-    for name, each in named:
-        if not isinstance(each, dict):
-            continue
-        binds = _binds(source, file, each, version, at)
-        if version == 0:
-            changes, lost = old_binds(each, materials[: len(file.materials)])
-        else:
-            changes, lost = modern_binds(each, len(file.materials))
-        undrawn += [f"{name}: {one}" for one in lost]
+    for each in named:
+        binds = _binds(source, file, each.told, pointer)
+        changes, lost = modern_binds(each.told, len(file.materials))
+        undrawn += [f"{each.name}: {one}" for one in (*each.undrawn, *lost)]
         if binds or changes:
-            found.append(replace(_expression(str(name), each, binds), materials=tuple(changes)))
+            found.append(replace(_expression(each, binds), materials=tuple(changes)))
     if undrawn:
         source.warn(
             "F007.vrm-materials: material changes by expressions have no effect: {names}",
-            at,
+            pointer,
             names=listed(undrawn, 12),
         )
     return tuple(found)
 
 
-def _old_name(told: Mapping[str, Any]) -> str:
-    """Return the name of an expression of VRM 0.x, or that of its preset if it has none."""
-    return str(told.get("name") or told.get("presetName") or "unnamed")
-
-
 def _binds(
-    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+    source: Source, file: NodeFile, told: Mapping[str, Any], pointer: str
 ) -> tuple[tuple[int, int, float], ...]:
     """Return node, morph target and weight of each bind of an expression."""
     binds: list[tuple[int, int, float]] = []
-    for each in list_in(told, "binds" if version == 0 else "morphTargetBinds"):
-        index, told_weight = part(each, "index"), part(each, "weight")
+    for each in list_in(told, "morphTargetBinds"):
+        node, index, told_weight = (part(each, name) for name in ("node", "index", "weight"))
         weight = None if told_weight is None else value_of(told_weight, 0.0)
-        if version == 0:
-            mesh, scale = part(each, "mesh"), 1.0 / _PERCENT
-            is_mesh = is_index(mesh, len(file.meshes))
-            nodes = file.tree.with_mesh(mesh) if is_mesh else []
-        else:
-            node, scale = part(each, "node"), 1.0
-            nodes = [node] if is_index(node, file.tree.n_nodes) else []
-        valid = [node for node in nodes if _has_target(file, node, index)]
-        if not valid or weight is None:
+        is_node = is_index(node, file.tree.n_nodes)
+        if not is_node or not _has_target(file, node, index) or weight is None:
             source.warn(
                 "G006.bind: expected a morph target and its weight, found target {found}: ignored",
                 pointer,
                 found=index,
             )
             continue
-        binds += [(node, index, weight * scale) for node in valid]
+        binds.append((node, index, weight))
     return tuple(binds)
 
 
@@ -184,32 +167,28 @@ def _has_target(file: NodeFile, node: int, index: Any) -> bool:
 
 
 def _expression(
-    name: str, told: Mapping[str, Any], binds: tuple[tuple[int, int, float], ...]
+    given: NamedExpression, binds: tuple[tuple[int, int, float], ...]
 ) -> NodeExpression:
     overrides = {}
     for kind, key in _OVERRIDES.items():
-        effect = told.get(key, "none")
+        effect = given.told.get(key, "none")
         overrides[kind] = effect if effect in OVERRIDES else "none"
-    kinds = [kind for kind, names in PROCEDURAL.items() if name in names]
-    preset = str(told.get("presetName") or "").lower()
+    kinds = [kind for kind, names in PROCEDURAL.items() if given.name in names]
     return NodeExpression(
-        name,
+        given.name,
         binds,
-        is_binary=told.get("isBinary") is True,
+        is_binary=given.told.get("isBinary") is True,
         kind=kinds[0] if kinds else "",
         overrides=overrides,
-        preset=OLD_PRESETS.get(preset, ""),
+        preset=given.preset,
     )
 
 
 def _read_part_views(
     file: NodeFile, told: Mapping[str, Any], version: int, pointer: str, source: Source
 ) -> dict[int, PartView]:
-    """Return the view in which each annotated node's mesh is drawn.
-
-    Version 0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), version 1 nodes
-    (``type: "firstPersonOnly"``). Invalid annotations are ignored with a message.
-    """
+    """Return the view in which each annotated mesh is drawn; invalid ones are reported."""
+    # Version 0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), version 1 nodes.
     annotations = list_in(told, "firstPerson", "meshAnnotations")
     found: dict[int, PartView] = {}
     for index, each in enumerate(annotations):

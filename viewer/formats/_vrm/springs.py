@@ -1,4 +1,4 @@
-"""Chains of spring joints: ``VRMC_springBone`` 1.0 and ``secondaryAnimation``.
+"""Chains of spring joints: ``VRMC_springBone`` 1.0, to which ``secondaryAnimation`` is upgraded.
 
 ::
 
@@ -14,13 +14,11 @@
                         center (node), colliderGroups; all nodes below a bone belong to the chain,
                         each points at its first child, and the last one 7 cm further
         colliderGroups  node, colliders (offset, radius)
-
-Vectors of version 0.x are in Unity's axes, whose z axis is reversed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -39,7 +37,6 @@ EXTENDED = "VRMC_springBone_extended_collider"
 _DOWN = (0.0, -1.0, 0.0)
 
 _END = 0.07  # distance from the last joint to the swinging point, metres
-_TO_OURS = np.array([1.0, 1.0, -1.0])  # from the axes of Unity
 _Groups: TypeAlias = list[tuple[int, ...]]
 """Colliders of each group."""
 
@@ -69,18 +66,13 @@ class _Shape:
     kind: int = OUTSIDE
 
 
-def read_springs(file: NodeFile, source: Source) -> Springs | None:
-    """Return the spring joints as node indices, or None; invalid ones are reported."""
+def read_springs(file: NodeFile, source: Source, ends: Mapping[int, Floats]) -> Springs | None:
+    """Return the spring joints as node indices, or None; ``ends`` are those of an upgrade (3,)."""
     told = file.extensions.get(_EXTENSION)
-    old = part(file.extensions, "VRM", "secondaryAnimation")
-    if isinstance(told, dict):
-        shapes, groups = _shapes(file, told, source)
-        chains = [*_chains(file, told, groups, source)]
-    elif isinstance(old, dict):
-        shapes, groups = _old_shapes(file, old)
-        chains = [*_old_chains(file, old, groups, source)]
-    else:
+    if not isinstance(told, dict):
         return None
+    shapes, groups = _shapes(file, told, source)
+    chains = [*_chains(file, told, groups, source, ends)]
     found: dict[int, _SpringJoint] = {}
     for chain in chains:
         for joint in chain:
@@ -109,7 +101,7 @@ def read_springs(file: NodeFile, source: Source) -> Springs | None:
 
 
 def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _Groups]:
-    """Return the colliders of version 1.0, and the colliders of each group."""
+    """Return the colliders, and the colliders of each group."""
     places: dict[int, int] = {}
     shapes: list[_Shape] = []
     for index, each in enumerate(list_in(told, "colliders")):
@@ -134,7 +126,7 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _G
 
 
 def _shape(node: Any, told: Any, n_nodes: int) -> _Shape | None:
-    """Return a collider of version 1.0, possibly an extended one; None if it is invalid."""
+    """Return a collider, possibly an extended one; None if it is invalid."""
     kinds = [kind for kind in ("sphere", "capsule", "plane") if isinstance(part(told, kind), dict)]
     if not is_index(node, n_nodes) or len(kinds) != 1:
         return None
@@ -153,11 +145,10 @@ def _shape(node: Any, told: Any, n_nodes: int) -> _Shape | None:
 
 
 def _chains(
-    file: NodeFile, told: Any, groups: _Groups, source: Source
+    file: NodeFile, told: Any, groups: _Groups, source: Source, ends: Mapping[int, Floats]
 ) -> Iterator[list[_SpringJoint]]:
-    """Yield the chains of version 1.0."""
     for index, spring in enumerate(list_in(told, "springs")):
-        chain = _chain(file.tree, spring, list_in(spring, "joints"), groups)
+        chain = _chain(file.tree, spring, groups, ends)
         if chain is None:
             source.warn(wording.SPRING, f"/extensions/{_EXTENSION}/springs/{index}")
         elif chain:
@@ -165,17 +156,18 @@ def _chains(
 
 
 def _chain(
-    tree: NodeTree, spring: Any, joints: list[Any], groups: _Groups
+    tree: NodeTree, spring: Any, groups: _Groups, ends: Mapping[int, Floats]
 ) -> list[_SpringJoint] | None:
     """Return the joints of a chain that point at the next one; None if it is invalid."""
+    joints = list_in(spring, "joints")
     nodes = [part(each, "node") for each in joints]
-    if not all(is_index(node, tree.n_nodes) for node in nodes):
+    if not all(is_index(node, tree.n_nodes + len(ends)) for node in nodes):
         return None
     obstacles = _obstacles_of(spring, groups)
     center = part(spring, "center")
     chain = []
     for told, node, following in zip(joints, nodes, nodes[1:], strict=False):
-        tail = _tail_between(tree, node, following)
+        tail = ends[following] if following in ends else _tail_between(tree, node, following)
         down = rows_of(part(told, "gravityDir"), _DOWN)
         values = [
             value_of(part(told, name), default)
@@ -196,11 +188,9 @@ def _chain(
 
 
 def _obstacles_of(spring: Any, groups: _Groups) -> tuple[int, ...]:
-    """Return the colliders of a chain's groups in order, and twice if two groups have one.
-
-    Each push is followed by restoring the length, which may move the point back into the collider,
-    so a second push by the same collider moves it further.
-    """
+    """Return the colliders of a chain's groups in order, and twice if two groups have one."""
+    # Each push is followed by restoring the length, which may move the point back into the
+    # collider, so a second push by the same collider moves it further.
     chosen = [g for g in list_in(spring, "colliderGroups") if is_index(g, len(groups))]
     return tuple(index for group in chosen for index in groups[group])
 
@@ -217,76 +207,17 @@ def _tail_between(tree: NodeTree, head: int, tail: int) -> Floats | None:
     return place
 
 
-def _old_shapes(file: NodeFile, told: Any) -> tuple[list[_Shape], _Groups]:
-    """Return the colliders of version 0.x, and the colliders of each group."""
-    shapes: list[_Shape] = []
-    groups: _Groups = []
-    for each in list_in(told, "colliderGroups"):
-        first, node = len(shapes), part(each, "node")
-        for given in list_in(each, "colliders") if is_index(node, file.tree.n_nodes) else ():
-            offset = _vector(part(given, "offset"), (0.0, 0.0, 0.0))
-            radius = value_of(part(given, "radius"), 0.0)
-            if offset is not None and radius is not None:
-                shapes.append(_Shape(node, offset, offset, radius))
-        groups.append(tuple(range(first, len(shapes))))
-    return shapes, groups
+def end_below(tree: NodeTree, node: int) -> Floats | None:
+    """Return the swinging point of the last node of a chain of version 0.x: (3,), in its space.
 
-
-def _old_chains(
-    file: NodeFile, told: Any, groups: _Groups, source: Source
-) -> Iterator[list[_SpringJoint]]:
-    """Yield the chains of version 0.x, one for each root bone."""
-    tree = file.tree
-    children: dict[int, list[int]] = {}
-    for node, parent in enumerate(tree.parents.tolist()):
-        children.setdefault(parent, []).append(node)
-    for index, group in enumerate(list_in(told, "boneGroups")):
-        down = _vector(part(group, "gravityDir"), _DOWN)
-        names = ("stiffiness", "dragForce", "gravityPower", "hitRadius")
-        values = [value_of(part(group, name), 0.0) for name in names]
-        bones = list_in(group, "bones")
-        is_valid = all(is_index(bone, tree.n_nodes) for bone in bones)
-        if down is None or None in values or not is_valid:
-            at = f"/extensions/VRM/secondaryAnimation/boneGroups/{index}"
-            source.warn(wording.SPRING, at)
-            continue
-        stiffness, drag, power, radius = (float(value or 0.0) for value in values)
-        center = part(group, "center")
-        at_node = center if is_index(center, tree.n_nodes) else -1
-        rest = (stiffness, drag, power * down, radius, at_node, _obstacles_of(group, groups))
-        for bone in bones:
-            tails = [*_tails(tree, children, bone)]
-            chain = [_SpringJoint(node, tail, *rest) for node, tail in tails if tail.any()]
-            if chain:
-                yield chain
-
-
-def _tails(
-    tree: NodeTree, children: dict[int, list[int]], bone: int
-) -> Iterator[tuple[int, Floats]]:
-    """Yield a bone and all nodes below it, parents first, with the swinging point of each."""
-    stack = [bone]
-    while stack:
-        node = stack.pop()
-        below = children.get(node, [])
-        stack += below[::-1]
-        if below:
-            yield node, _node_matrix(tree, below[0])[:3, 3]
-            continue
-        world, parent = _node_world(tree, node), int(tree.parents[node])
-        away = world[:3, 3] - (_node_world(tree, parent)[:3, 3] if parent >= 0 else 0.0)
-        length = float(np.linalg.norm(away))
-        if length > 0.0 and abs(np.linalg.det(world[:3, :3])) > 0.0:
-            tail = np.linalg.solve(world[:3, :3], away * (_END / length))
-            yield node, np.asarray(tail, dtype=np.float64)
-
-
-def _vector(told: Any, default: tuple[float, ...]) -> Floats | None:
-    """Return a vector of version 0.x in our axes; None if it is invalid."""
-    if told is None:
-        return np.array(default) * _TO_OURS
-    found = rows_of([part(told, axis) or 0.0 for axis in "xyz"], default)
-    return None if found is None else found * _TO_OURS
+    It continues the line from the parent. None if that has no length, or the node is flat.
+    """
+    world, parent = _node_world(tree, node), int(tree.parents[node])
+    away = world[:3, 3] - (_node_world(tree, parent)[:3, 3] if parent >= 0 else 0.0)
+    length = float(np.linalg.norm(away))
+    if length == 0.0 or np.linalg.det(world[:3, :3]) == 0.0:
+        return None
+    return np.asarray(np.linalg.solve(world[:3, :3], away * (_END / length)), dtype=np.float64)
 
 
 def _node_world(tree: NodeTree, node: int) -> Floats:
