@@ -1,7 +1,9 @@
 """Feet that were planted or held do not slide: detector and limits are those of the planner."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from exporting import export_frames
 from rig.retargeting.rest_twins import t_pose, written
@@ -14,7 +16,10 @@ from viewer.lint import lint_scene
 from viewer.loading import MotionSettings, bundled_body, load
 from viewer.loading.cleaning import clean_up
 from viewer.loading.settings import CleanUp
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.motion.sampled_animation import sample_animation
+from viewer.rig.retargeting.feet import plant_feet
+from viewer.rig.retargeting.retarget import retargeted
 from viewer.rig.scene import Actor, Scene
 
 MOTIONS = {
@@ -52,6 +57,33 @@ def test_locked_feet_of_a_capture_do_not_slide(name: str, tmp_path: Path) -> Non
     scene = load(path_of(name, tmp_path), bundled_body(), motion=MotionSettings(feet=False))
     assert "X006.locked" in {note.key for note in clean_up(scene, CleanUp(locks_feet=True))}
     assert slides(scene) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_feet_on_a_treadmill_are_held_under_noise(seed: int, tmp_path: Path) -> None:
+    scene = load(path_of("treadmill", tmp_path), bundled_body(), motion=MotionSettings(feet=False))
+    (actor,), rng = scene.actors, np.random.default_rng(seed)
+    clip = actor.clip
+    turns = np.radians(0.5) * rng.normal(size=(*clip.rotations.shape[:2], 3))
+    shakes = 0.004 * rng.normal(size=(clip.n_rows, 3))  # metres
+    actor.clip = replace(
+        clip,
+        rotations=multiply(clip.rotations, rotation_vector_to_quaternion(turns)),
+        figure_translations=clip.figure_translations + shakes,
+    )
+    clean_up(scene, CleanUp(locks_feet=True))
+    assert slides(scene) == []
+
+
+def test_feet_that_do_not_follow_their_legs_are_not_planted(tmp_path: Path) -> None:
+    """Of a rig for animators, whose feet are controls below the root."""
+    figure = load(bundled_body()).actors[0].figure
+    parents = figure.skeleton.parents.copy()
+    parents[[figure.skeleton.names.index(f"{side}_ankle") for side in ("left", "right")]] = 0
+    figure = replace(figure, skeleton=replace(figure.skeleton, parents=parents))
+    motion = written(t_pose(), *walk(), rate=RATE)
+    found = retargeted(motion, figure)
+    assert plant_feet(found, figure) == (found.clip, None)
 
 
 def test_planted_feet_of_shared_motions_do_not_slide(shared_data: Path) -> None:

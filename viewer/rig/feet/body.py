@@ -106,6 +106,8 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
 def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) -> BodyLegs | None:
     """Return the legs of a figure; None if they cannot be solved."""
     skeleton = figure.require_skeleton()
+    if not all(_is_chain(skeleton.parents, leg) for leg in legs):
+        return None
     weights = figure_pose(figure).shape_weights
     if clip.shape_weights is not None:
         weights = clip.shape_weights[0]
@@ -141,6 +143,15 @@ def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) ->
     clearance = float(toes.mean() - floor)
     levels = level, toe_level
     return BodyLegs(chains, own, moved, *levels, rests, extensions, size, clearance)
+
+
+def _is_chain(parents: Ints, leg: Leg) -> bool:
+    """Return whether a foot moves with its leg; animators' controls may be joints of the root."""
+    above, joint = set[int](), leg.toe
+    while joint >= 0:
+        above.add(joint)
+        joint = int(parents[joint])
+    return {leg.hip, leg.knee, leg.ankle} <= above
 
 
 def is_solvable(linear: Floats) -> bool:

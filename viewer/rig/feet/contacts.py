@@ -192,9 +192,9 @@ def step_height(contact: Contact, level: float, size: float) -> float:
     return 0.0 if is_tiptoe or abs(height) < limits.LEVEL * size else height
 
 
-def half_window(rate: float) -> int:
+def half_window(rate: float, seconds: float = limits.WINDOW) -> int:
     """Return the number of rows before and after a row over which its speed is averaged."""
-    return max(1, round(0.5 * limits.WINDOW * rate))
+    return max(1, round(0.5 * seconds * rate))
 
 
 def mean_speeds(places: Floats, rate: float) -> Floats:
@@ -239,28 +239,30 @@ def ground_velocity(
     # 500 rows is a candidate, the one with most neighbours wins, and the median of its neighbours
     # is the estimate. A mean over all rows would be biased by the swings, in which the lowest foot
     # moves the other way.
-    speeds, body = _speeds(feet, spans, rate, up)
-    if not len(speeds):
-        return None
-    near = limits.GROUND_SAME * size
-    candidates = speeds[:: -(-len(speeds) // _MOST)]
-    counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
-    best = candidates[int(np.argmax(counts))]
-    is_alike = np.linalg.norm(speeds - best, axis=1) < near
-    velocity: Floats = np.median(speeds[is_alike], axis=0)
-    n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
-    speed, drift = np.linalg.norm(velocity), np.linalg.norm(body.mean(axis=0))
-    is_moving = speed > limits.GROUND_MOVES * size and drift < limits.BODY_DRIFTS * speed
-    is_usual = is_alike.mean() > limits.GROUND_USUAL
-    is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
-    return velocity if is_moving and is_usual else None
+    for seconds in limits.GROUND_WINDOWS:
+        speeds, body = _speeds(feet, spans, rate, half_window(rate, seconds), up)
+        if not len(speeds):
+            return None
+        near = limits.GROUND_SAME * size
+        candidates = speeds[:: -(-len(speeds) // _MOST)]
+        counts = [int((np.linalg.norm(speeds - each, axis=1) < near).sum()) for each in candidates]
+        best = candidates[int(np.argmax(counts))]
+        is_alike = np.linalg.norm(speeds - best, axis=1) < near
+        velocity: Floats = np.median(speeds[is_alike], axis=0)
+        n_resting = int((np.linalg.norm(speeds, axis=1) < near).sum())
+        speed, drift = np.linalg.norm(velocity), np.linalg.norm(body.mean(axis=0))
+        is_moving = speed > limits.GROUND_MOVES * size and drift < limits.BODY_DRIFTS * speed
+        is_usual = is_alike.mean() > limits.GROUND_USUAL
+        is_usual &= is_alike.sum() > limits.GROUND_OFTENER * n_resting
+        if is_moving and is_usual:
+            return velocity
+    return None
 
 
 def _speeds(
-    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, up: Floats
+    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, half: int, up: Floats
 ) -> tuple[Floats, Floats]:
     """Return the horizontal velocities of the lowest foot and of the hips, (M, 3) per second."""
-    half = half_window(rate)
     lowest = np.array([foot.lowest(up) for foot in feet]).argmin(axis=0)
     found, body = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for first, last in spans:

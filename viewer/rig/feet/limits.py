@@ -50,6 +50,9 @@ SUNK = 0.015
 
 # Moving ground, as on a treadmill or where the travel was removed from a motion.
 
+GROUND_WINDOWS = (WINDOW, 0.3)
+"""Seconds over which velocities are averaged, the second if the first shows no common velocity:
+steps of a run last 0.2 s, but noise of 4 mm and 0.5 degrees needs the longer one."""
 GROUND_MOVES = 0.2
 """Minimum speed of the ground: ``FAST``, beyond which feet do not stand on ground at rest."""
 GROUND_SAME = 0.08
