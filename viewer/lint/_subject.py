@@ -27,7 +27,7 @@ from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.transform import apply_transform, mean_scale
 from viewer.rig.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
@@ -247,19 +247,18 @@ def _track(subject: Subject) -> Track | None:
         count = len(times)
         numbers = frame_numbers(subject, times)
     frames = frames_of(figure, clip, times, actor.pose)
-    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
+    scale = mean_scale(actor.placement)
     is_bound = figure.is_attached and not len(subject.invalid.get("bindings", ()))
     soles = soles_of(shaped(figure, frames.shape_weights[0]), is_bound) if count else None
     feet = np.zeros(0, dtype=np.int32) if soles is None else soles.joints
     joints, lowest = np.empty((count, skeleton.n_joints, 3)), np.empty((count, len(feet)))
     heels = np.empty((count, len(feet), 3))
-    axis = actor.placement[2 if subject.up == "z" else 1]
     for start in range(0, count, _TOGETHER):
         part = slice(start, start + _TOGETHER)
         world = world_frames(figure, frames_between(frames, part))
         joints[part] = world[..., :3, 3]
         if soles is not None:
-            lowest[part] = soles.heights(world, axis, scale)
+            lowest[part] = soles.scene_heights(world, actor.placement, subject.up)
             heels[part] = np.einsum("fnab,nb->fna", world[:, soles.ankles, :3], soles.heels)
     placed = apply_transform(actor.placement, joints)
     hips = {leg.ankle: leg.hip for leg in legs_of(skeleton)}

@@ -18,7 +18,7 @@ from viewer.rig.feet.contacts import (
     on_moving_ground,
     slowest_points,
 )
-from viewer.rig.feet.ground import Ground, ground_of, resting_frames
+from viewer.rig.feet.ground import Ground, ground_under, resting_frames
 from viewer.rig.feet.soles import extent
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import joint_labels
@@ -34,18 +34,14 @@ def check(subject: Subject) -> list[Finding]:
     if len(feet) < 2:
         return []
     up = 2 if subject.up == "z" else 1
-    sole, height = extent(figure)
-    heights = track.soles
+    height, heights = extent(figure)[1], track.soles
     given = subject.options.ground
     ground, sinks = 0.0, limits.SINKS
     if isinstance(given, float | int):
         ground = float(given)
     else:
         step = float(track.times[1] - track.times[0])
-        # The height of the figure at rest, or else the origin.
-        axis, placement = 2 if figure.up == "z" else 1, subject.actor.placement
-        likely = (float(placement[up, axis] * sole + placement[up, 3]), 0.0)
-        found = ground_of(heights.min(axis=1), track.present, step, track.scale * height, likely)
+        found = ground_under(subject.actor, subject.up, heights, track.present, step)
         if found.height is None:
             return [_unsure(subject, found, step)]
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS

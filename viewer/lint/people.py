@@ -10,6 +10,7 @@ from viewer.lint._subject import Indices, Subject
 from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import frames_of, rest_translations_of
 from viewer.rig.motion.timing import Timing
@@ -146,7 +147,7 @@ def _path(actor: Actor) -> _Path | None:
     """Return the path of a captured person; None without a captured motion."""
     clip, figure = actor.captured, actor.figure
     turn, place = actor.placement[:3, :3], actor.placement[:3, 3]
-    scale = float(np.cbrt(abs(np.linalg.det(turn))))
+    scale = mean_scale(turn)
     if clip is not None and clip.points is not None:
         points = clip.points[np.maximum(clip.timing.rows, 0)]
         seen = points[..., 3:] > 0.0
@@ -174,8 +175,7 @@ def _distance(one: Floats, other: Floats) -> Floats:
 
 
 def _length(subject: Subject, length: float) -> str:
-    scale = float(np.cbrt(abs(np.linalg.det(subject.actor.placement[:3, :3])))) or 1.0
-    return subject.length(length / scale)
+    return subject.length(length / (mean_scale(subject.actor.placement) or 1.0))
 
 
 def _times(subject: Subject, path: _Path, frames: Indices) -> Floats:

@@ -182,7 +182,8 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
             "a mesh nor joints of known names",
             values={"figure": actor.name},
         )
-    height = 0.0 if abs(found.height) < _ROUNDING else found.height
+    height, is_clear = found
+    height = 0.0 if abs(height) < _ROUNDING else height
     lift = np.zeros(3)
     lift[2 if scene.up == "z" else 1] = -height
     moved = np.linalg.solve(actor.placement[:3, :3], lift)
@@ -196,7 +197,7 @@ def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Dia
     }
     key = (
         "X006.grounded: {figure}: {way} by {height}, so that its feet rest at height 0"
-        if found.is_clear
+        if is_clear
         else "X006.grounded-lowest: {figure}: {way} by {height}, so that the lowest position of "
         "its feet is at height 0 (they never clearly rest)"
     )

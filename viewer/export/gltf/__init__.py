@@ -48,6 +48,7 @@ from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_wi
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene, scene_unit
@@ -495,7 +496,7 @@ def _placed(matrix: Floats) -> dict[str, list[float]]:
 
 def _planes(view: CameraView, to_file: Floats) -> dict[str, float]:
     """Return the distances of the clipping planes."""
-    scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
+    scale = mean_scale(to_file)
     near = _NEAR if view.near is None else scale * view.near
     return {"znear": near} | ({} if view.far is None else {"zfar": scale * view.far})
 

@@ -22,6 +22,7 @@ from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.material_runs import Prepare, SortedTriangles, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.material import TEXTURES, Outline
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.units import METRES
@@ -126,8 +127,7 @@ class MeshPass:
         set_uniforms(program, look)
         array, context = self.array(mesh, program, indices), self.context
         # Camera units per metre.
-        scale = float(np.cbrt(abs(np.linalg.det(placement[:3, :3]))))
-        scale /= METRES.get(mesh.mesh.figure.unit, 1.0)
+        scale = mean_scale(placement) / METRES.get(mesh.mesh.figure.unit, 1.0)
         context.enable(moderngl.CULL_FACE)
         context.cull_face = "front"
         context.front_face = "cw" if mesh.is_mirrored_by(placement) else "ccw"

@@ -9,6 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.feet.soles import extent, soles_of
+from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.timing import frame_times
 from viewer.rig.scene import Actor
@@ -52,14 +53,14 @@ class Ground:
         return not self.levels
 
 
-@dataclass(frozen=True, slots=True)
-class RestingHeight:
-    """Height of the ground under an actor."""
-
-    height: float
-    """Along the scene's up axis, scene units."""
-    is_clear: bool
-    """Whether feet rest at this height; otherwise it is the height of the lowest positions."""
+def ground_under(actor: Actor, up: str, heights: Floats, present: Bools, step: float) -> Ground:
+    """Return the ground under an actor whose soles have heights (F, N) in the scene."""
+    # Likely are the height of its soles at rest, and the origin.
+    figure, row = actor.figure, actor.placement["xyz".index(up)]
+    sole, height = extent(figure)
+    likely = float(row["xyz".index(figure.up)] * sole + row[3]), 0.0
+    size = mean_scale(actor.placement) * height
+    return ground_of(heights.min(axis=1), present, step, size, likely)
 
 
 def ground_of(
@@ -82,8 +83,11 @@ def ground_of(
     return Ground(ground, levels)
 
 
-def resting_height(actor: Actor, up: str) -> RestingHeight | None:
-    """Return the height at which an actor's feet rest; None unless two feet are found by name."""
+def resting_height(actor: Actor, up: str) -> tuple[float, bool] | None:
+    """Return the scene height at which feet rest, and whether they clearly do; None without feet.
+
+    If they never clearly rest, it is the height of their lowest positions.
+    """
     figure, motion = actor.figure, actor.joint_motion
     if figure.skeleton is None or motion is None:
         return None
@@ -93,13 +97,11 @@ def resting_height(actor: Actor, up: str) -> RestingHeight | None:
     soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)
     if soles is None or not frames.present.any():
         return None
-    scale = float(np.cbrt(abs(np.linalg.det(actor.placement[:3, :3]))))
-    axis = actor.placement[2 if up == "z" else 1]
-    heights = soles.heights(world_frames(figure, frames), axis, scale).min(axis=1)
-    found = ground_of(heights, frames.present, 1.0 / rate, scale * extent(figure)[1])
+    heights = soles.scene_heights(world_frames(figure, frames), actor.placement, up)
+    found = ground_under(actor, up, heights, frames.present, 1.0 / rate)
     if found.height is not None and not found.is_guess:
-        return RestingHeight(found.height, True)
-    return RestingHeight(float(np.quantile(heights[frames.present], _LOW)), False)
+        return found.height, True
+    return float(np.quantile(heights.min(axis=1)[frames.present], _LOW)), False
 
 
 def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None:

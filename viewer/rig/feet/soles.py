@@ -9,6 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
@@ -55,6 +56,10 @@ class Soles:
                     heights = row @ points[own].T + (axis[3] - scale * self.above[own])
                     result[:, foot] = np.minimum(result[:, foot], heights.min(axis=1))
         return result
+
+    def scene_heights(self, world: Floats, placement: Floats, up: str) -> Floats:
+        """Return the heights (F, N) along the scene's up axis of an actor's feet."""
+        return self.heights(world, placement["xyz".index(up)], mean_scale(placement))
 
 
 def extent(figure: Figure) -> tuple[float, float]:

@@ -17,6 +17,11 @@ def translation_matrix(offset: Floats) -> Floats:
     return matrices
 
 
+def mean_scale(matrix: Floats) -> float:
+    """Return the mean scale factor of a transform, the cube root of its change of volume."""
+    return float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
+
+
 def rotation_transform(axis: int, angle: float) -> Floats:
     """Return the (4, 4) matrix that rotates about a coordinate axis by ``angle`` radians."""
     matrix = np.eye(4)
