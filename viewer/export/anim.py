@@ -88,7 +88,21 @@ def _export_frames(
     """Write a key per frame, in one file or one for each run of frames."""
     frames = animation.frames
     whole = filled(frames, options.closing == "interpolate")
-    dofs = _dofs(animation, skeleton, whole)
+    base = quaternion_to_matrix(skeleton.rest_rotations)
+    within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(whole.rotations)
+    angles = euler_angles(within, "zyx")
+    # Unwrapped angles could exceed the limits.
+    is_free = np.isinf(skeleton.dof_limits[3:]).all(axis=1).reshape(-1, 3).all(axis=1)
+    angles[:, is_free] = unrolled(angles, "zyx")[:, is_free]
+    dofs = np.zeros((whole.n_frames, skeleton.n_dofs))
+    dofs[:, 3:] = angles[..., ::-1].reshape(whole.n_frames, -1)
+    dofs[:, :3] = whole.translations[:, 0]
+    if animation.motion.kind == "curves":
+        # Use the clip's own angles instead of equivalent ones.
+        targets, values = evaluate_all(animation.motion, whole.times)
+        dofs[:, targets] = values
+    dofs = np.clip(dofs, *skeleton.dof_limits.T)
+    dofs[:, :3] += whole.figure_translations / whole.figure_scales[:, None]
     is_split = options.closing == "split" and not frames.present.all()
     spans = runs_of(frames.present) if is_split else [(0, frames.n_frames)]
     clips, rules = [], []
@@ -151,26 +165,6 @@ def _is_whole(animation: SampledAnimation, clip: Clip) -> bool:
     # The last frame may precede the end by up to a frame.
     ends = clip.end - float(times[-1]) < step * (1.0 - _SAME)
     return targets == list(range(skeleton.n_dofs)) and starts and ends
-
-
-def _dofs(animation: SampledAnimation, skeleton: Skeleton, frames: Frames) -> Floats:
-    """Return every frame's DOFs: (F, D)."""
-    base = quaternion_to_matrix(skeleton.rest_rotations)
-    within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(frames.rotations)
-    angles = euler_angles(within, "zyx")
-    # Unwrapped angles could exceed the limits.
-    is_free = np.isinf(skeleton.dof_limits[3:]).all(axis=1).reshape(-1, 3).all(axis=1)
-    angles[:, is_free] = unrolled(angles, "zyx")[:, is_free]
-    dofs = np.zeros((frames.n_frames, skeleton.n_dofs))
-    dofs[:, 3:] = angles[..., ::-1].reshape(frames.n_frames, -1)
-    dofs[:, :3] = frames.translations[:, 0]
-    if animation.motion.kind == "curves":
-        # Use the clip's own angles instead of equivalent ones.
-        targets, values = evaluate_all(animation.motion, frames.times)
-        dofs[:, targets] = values
-    dofs = np.clip(dofs, *skeleton.dof_limits.T)
-    dofs[:, :3] += frames.figure_translations / frames.figure_scales[:, None]
-    return dofs
 
 
 def _distance(animation: SampledAnimation, clip: Clip, times: Floats) -> float:

@@ -25,7 +25,6 @@ from viewer.formats._file_bytes import (
 )
 from viewer.formats._text.numbers import word_begins
 from viewer.progress import report_bytes
-from viewer.rig.arrays import Ints
 
 Content = TypeVar("Content")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
@@ -249,7 +248,7 @@ class Source:
         places: ArrayLike | None = None,
     ) -> Diagnostic:
         line = None if offset is None or isinstance(offset, str) else self.line(offset)
-        indices = None if places is None else _indices(places)
+        indices = None if places is None else np.unique(np.asarray(places, dtype=np.int32))
         pointer = offset if isinstance(offset, str) else ""
         return Diagnostic(key, self.path, line, part, indices, values, count, pointer=pointer)
 
@@ -310,11 +309,6 @@ class Source:
         if not self.data[1:_LOOK:2].strip(b"\0") or not self.data[:_LOOK:2].strip(b"\0"):
             return "UTF-16 text"
         return "binary data" if head.count(0) * 3 > len(head) else None
-
-
-def _indices(places: ArrayLike) -> Ints:
-    """Return unique indices in ascending order: (N,) int32."""
-    return np.unique(np.asarray(places, dtype=np.int32))
 
 
 class InvalidValueError(Exception):

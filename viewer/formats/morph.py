@@ -60,7 +60,26 @@ def read(source: Source) -> MorphTarget:
         source.warn("F007.morph-normals: no normals section: normals unchanged")
         return MorphTarget(source.path.stem, positions.vertices, positions.values)
     normals = sections[b"normals"]
-    _check_same(source, positions, normals)
+    if len(positions.vertices) != len(normals.vertices):
+        raise source.fault(
+            "F002.morph-counts: expected as many normals as positions, found {second} normals "
+            "(line {other}) and {first} positions (line {line})",
+            normals.header,
+            line=source.line(positions.header),
+            first=len(positions.vertices),
+            other=source.line(normals.header),
+            second=len(normals.vertices),
+        )
+    differs = np.flatnonzero(positions.vertices != normals.vertices)
+    if len(differs):
+        row = int(differs[0])
+        raise source.fault(
+            "F002.morph-vertices: normals: expected vertex {expected} as in positions, found "
+            "vertex {found}",
+            normals.header,
+            found=int(normals.vertices[row]),
+            expected=int(positions.vertices[row]),
+        )
     return MorphTarget(source.path.stem, positions.vertices, positions.values, normals.values)
 
 
@@ -117,27 +136,3 @@ def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[_Secti
     known = known[first]
     section = _Section(rows[known, 0].astype(np.int32), rows[known, 1:], block.header)
     return section, block.end + block.closed
-
-
-def _check_same(source: Source, positions: _Section, normals: _Section) -> None:
-    """Refuse positions and normals of different vertices."""
-    if len(positions.vertices) != len(normals.vertices):
-        raise source.fault(
-            "F002.morph-counts: expected as many normals as positions, found {second} normals "
-            "(line {other}) and {first} positions (line {line})",
-            normals.header,
-            line=source.line(positions.header),
-            first=len(positions.vertices),
-            other=source.line(normals.header),
-            second=len(normals.vertices),
-        )
-    differs = np.flatnonzero(positions.vertices != normals.vertices)
-    if len(differs):
-        row = int(differs[0])
-        raise source.fault(
-            "F002.morph-vertices: normals: expected vertex {expected} as in positions, found "
-            "vertex {found}",
-            normals.header,
-            found=int(normals.vertices[row]),
-            expected=int(positions.vertices[row]),
-        )

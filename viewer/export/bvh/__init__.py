@@ -64,7 +64,18 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     Unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest frame, digits are
     options. Raises ``RigError`` if numbers are not finite, or an option is unknown.
     """
-    _check_options(options)
+    for what, value, known in (
+        ("unit", options.unit, ("", *METRES)),
+        ("up axis", options.up, ("", "y", "z")),
+        ("up axis of the scene", options.world_up, ("y", "z")),
+        ("rotation order", options.rotation_order, ROTATION_ORDERS),
+        ("handling of gaps", options.closing, tuple(GAPS)),
+    ):
+        if value not in known:
+            choices = ", ".join(filter(None, known))
+            raise RigError(f'{what}: expected one of {choices}, found "{value}"')
+    if not 1 <= options.digits <= _MOST_DIGITS:
+        raise RigError(f"digits: expected 1 to {_MOST_DIGITS}, found {options.digits}")
     given = selection.part.frames
     motion = given if isinstance(given, SampledParts) else _parts_of(selection.part.animation)
     writer = _Writer(motion, options)
@@ -83,22 +94,6 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     if not isinstance(given, SampledParts):
         notes += resampling_losses(path, selection.part.animation, options.skinning)
     return notes + _remarks(writer)
-
-
-def _check_options(options: ExportOptions) -> None:
-    """Raise RigError for an option that the format does not have."""
-    for what, value, known in (
-        ("unit", options.unit, ("", *METRES)),
-        ("up axis", options.up, ("", "y", "z")),
-        ("up axis of the scene", options.world_up, ("y", "z")),
-        ("rotation order", options.rotation_order, ROTATION_ORDERS),
-        ("handling of gaps", options.closing, tuple(GAPS)),
-    ):
-        if value not in known:
-            listed = ", ".join(filter(None, known))
-            raise RigError(f'{what}: expected one of {listed}, found "{value}"')
-    if not 1 <= options.digits <= _MOST_DIGITS:
-        raise RigError(f"digits: expected 1 to {_MOST_DIGITS}, found {options.digits}")
 
 
 def _space_of(figure: Figure, options: ExportOptions) -> Space:

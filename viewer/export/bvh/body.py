@@ -18,7 +18,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.export.bvh.angles import euler_angles
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import joint_worlds, world_matrices
@@ -132,7 +132,10 @@ def _positions(
     fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
     places = world_frames(figure, fixed)[..., :3, 3]
     if len(frames.shape_weights) > 1 or (frames.figure_scales != scale).any():
-        roots = _roots(parents)
+        roots = np.arange(len(parents), dtype=np.int32)
+        for joint, parent in enumerate(parents):
+            if parent >= 0:
+                roots[joint] = roots[parent]
         rest = rest_translations_of(figure, frames.shape_weights)
         own = rest[:, roots] + frames.translations[:, roots]
         own = own * frames.figure_scales[:, None, None] + frames.figure_translations[:, None]
@@ -157,15 +160,6 @@ def shape_at(frames: Frames, frame: int) -> Floats:
     """Return the shape weights of one frame: (1, S)."""
     weights = frames.shape_weights
     return weights if len(weights) == 1 else weights[frame : frame + 1]
-
-
-def _roots(parents: Ints) -> Ints:
-    """Return the root above each joint: (J,)."""
-    roots = np.arange(len(parents), dtype=np.int32)
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            roots[joint] = roots[parent]
-    return roots
 
 
 def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:

@@ -24,7 +24,44 @@ def read_table(
     rows = _regular_rows(source, columns)
     if rows is not None:
         return rows, lambda row: source.word_offset(0, row * columns)
-    rows, offsets = _read_rows(source, columns, part)
+    # An invalid table is read word by word.
+    words = read_words(source.data, 0, len(source.data))
+    if len(words.offsets) == 0:
+        raise source.fault(
+            "F002.table-empty: expected rows of {columns} numbers, found {found}",
+            columns=columns,
+            found=source.looks_like(),
+        )
+    begins, sizes = words.rows()
+    fits = sizes == columns
+    owners = np.repeat(np.arange(len(begins)), sizes)
+    if not fits.any() and len(words.bad):
+        first = int(words.bad[0])
+        raise source.fault(
+            number_key(words.word(first)),
+            int(words.offsets[first]),
+            item=Phrase("row {index}", index=int(owners[first])),
+            found=quoted(words.word(first)),
+        )
+    bad = words.bad
+    refuse_words(
+        source,
+        words,
+        bad,
+        lambda word: Phrase("row {index}", index=int(owners[word])),
+        part,
+        owners[bad],
+    )
+    wrong = np.flatnonzero(~fits)
+    if len(wrong):
+        offset, found = int(words.offsets[begins[wrong[0]]]), int(sizes[wrong[0]])
+        values = {"expected": columns, "found": found}
+        if not fits.any():
+            raise source.fault(wording.TABLE_WIDTH, offset, **values)
+        source.refuse(wording.TABLE_WIDTH, offset, len(wrong), part, wrong, **values)
+    rows = np.full((len(begins), columns), np.nan)
+    rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
+    offsets = words.offsets[begins]
     return rows, lambda row: int(offsets[row])
 
 
@@ -71,44 +108,3 @@ def _is_regular(source: Source, columns: int, count: int) -> bool:
     ends = np.flatnonzero((letters == 10) | (letters == 13))
     rows = np.searchsorted(ends, begins).reshape(-1, columns)
     return bool((rows[:, 0] == rows[:, -1]).all() and (rows[1:, 0] > rows[:-1, -1]).all())
-
-
-def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places]:
-    """Read an invalid table word by word, and record the errors."""
-    words = read_words(source.data, 0, len(source.data))
-    if len(words.offsets) == 0:
-        raise source.fault(
-            "F002.table-empty: expected rows of {columns} numbers, found {found}",
-            columns=columns,
-            found=source.looks_like(),
-        )
-    begins, sizes = words.rows()
-    fits = sizes == columns
-    owners = np.repeat(np.arange(len(begins)), sizes)
-    if not fits.any() and len(words.bad):
-        first = int(words.bad[0])
-        raise source.fault(
-            number_key(words.word(first)),
-            int(words.offsets[first]),
-            item=Phrase("row {index}", index=int(owners[first])),
-            found=quoted(words.word(first)),
-        )
-    bad = words.bad
-    refuse_words(
-        source,
-        words,
-        bad,
-        lambda word: Phrase("row {index}", index=int(owners[word])),
-        part,
-        owners[bad],
-    )
-    wrong = np.flatnonzero(~fits)
-    if len(wrong):
-        offset, found = int(words.offsets[begins[wrong[0]]]), int(sizes[wrong[0]])
-        values = {"expected": columns, "found": found}
-        if not fits.any():
-            raise source.fault(wording.TABLE_WIDTH, offset, **values)
-        source.refuse(wording.TABLE_WIDTH, offset, len(wrong), part, wrong, **values)
-    rows = np.full((len(begins), columns), np.nan)
-    rows[fits] = words.values[begins[fits, None] + np.arange(columns)]
-    return rows, words.offsets[begins]

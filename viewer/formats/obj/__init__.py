@@ -223,7 +223,21 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
             lines = _without_edges(lines, gathered)
             faces = read_faces(lines, gathered.before) if len(lines.of["f"]) else _NO_FACES
         _add_faces(gathered, faces or faulty_faces(source, lines, gathered.before))
-    _read_others(source, lines, gathered)
+    # Names of materials, groups and objects
+    for line in lines.others.tolist():
+        words = lines.text(line).split(None, 1)
+        rest = words[1] if len(words) > 1 else b""
+        offset = lines.base + int(lines.starts[line])
+        if words[0] in gathered.runs:
+            face = gathered.before["f"] + int(np.searchsorted(lines.of["f"], line))
+            name = rest.decode("utf-8", "surrogateescape")
+            gathered.runs[words[0]].append((face, name))
+        elif words[0] == b"mtllib":
+            gathered.libraries.append((rest, offset))
+        elif words[0] not in _QUIET:
+            if words[0] not in _SHAPES and not gathered.odd[words[0]]:
+                source.warn(wording.UNKNOWN, offset, found=quoted(words[0]))
+            gathered.odd[words[0]] += 1
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
 
@@ -299,24 +313,6 @@ def _read_uvs(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
 
 def _read_normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
     return _rows(source, lines, gathered, "vn", 3)[0]
-
-
-def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
-    """Record names of materials, groups and objects; warn about unknown keywords."""
-    for line in lines.others.tolist():
-        words = lines.text(line).split(None, 1)
-        rest = words[1] if len(words) > 1 else b""
-        offset = lines.base + int(lines.starts[line])
-        if words[0] in gathered.runs:
-            face = gathered.before["f"] + int(np.searchsorted(lines.of["f"], line))
-            name = rest.decode("utf-8", "surrogateescape")
-            gathered.runs[words[0]].append((face, name))
-        elif words[0] == b"mtllib":
-            gathered.libraries.append((rest, offset))
-        elif words[0] not in _QUIET:
-            if words[0] not in _SHAPES and not gathered.odd[words[0]]:
-                source.warn(wording.UNKNOWN, offset, found=quoted(words[0]))
-            gathered.odd[words[0]] += 1
 
 
 def _colors(gathered: _Gathered) -> Floats | None:

@@ -79,13 +79,27 @@ def _corner_numbers(rows: Rows, begins: Places) -> _Corners | None:
     values, bad = parse_numbers(text, 0, len(text), is_kept=False)
     if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
         return None
+    whole = _whole(values)
+    if whole is None:
+        return None
+    table = np.zeros((len(begins), 3), dtype=np.int32)
     columns = _common_columns(rows, begins)
     if columns is not None:
-        return _in_columns(values, columns, len(begins))
+        if len(whole) != len(columns) * len(begins):
+            return None
+        table[:, columns] = whole.reshape(len(begins), -1)
+        return table
     fits, n_numbers, has_gap = _fits_corner(rows, begins)
     if not fits.all():
         return None
-    return _spread(values, n_numbers, has_gap)
+    # A gap moves the second number to the third column.
+    firsts = np.cumsum(n_numbers) - n_numbers
+    table[:, 0] = whole[firsts]
+    middle, third = (n_numbers > 1) & ~has_gap, n_numbers > 2
+    table[middle, 1] = whole[firsts[middle] + 1]
+    table[has_gap, 2] = whole[firsts[has_gap] + 1]
+    table[third, 2] = whole[firsts[third] + 2]
+    return table
 
 
 def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
@@ -109,19 +123,9 @@ def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
     return [0, 1, 2] if (gaps > 1).all() else None
 
 
-def _in_columns(values: Floats, columns: list[int], count: int) -> _Corners | None:
-    """Arrange the numbers of corners in some of three columns; the others are 0."""
-    whole = _whole(values)
-    if whole is None or len(whole) != len(columns) * count:
-        return None
-    table = np.zeros((count, 3), dtype=np.int32)
-    table[:, columns] = whole.reshape(count, -1)
-    return table
-
-
 def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
     """Classify corners (C,): is it v, v/vt, v//vn or v/vt/vn, its count of numbers, is it v//vn."""
-    number_begins = _number_begins(rows)
+    number_begins = word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
     slashes = np.flatnonzero(rows.letters == _SLASH)
     after = np.append(begins[1:], len(rows.letters))
     n_slashes = np.searchsorted(slashes, after) - np.searchsorted(slashes, begins)
@@ -134,25 +138,6 @@ def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
         (n_slashes <= 2) & (rows.letters[begins] != _SLASH) & (rows.letters[after - 1] != _SLASH)
     )
     return fits, n_numbers, has_gap
-
-
-def _number_begins(rows: Rows) -> Places:
-    return word_begins(np.where(rows.letters == _SLASH, np.uint8(32), rows.letters))
-
-
-def _spread(values: Floats, counts: Places, gaps: Bools) -> _Corners | None:
-    """Arrange the numbers of corners in rows of three; a gap moves the second to the third."""
-    whole = _whole(values)
-    if whole is None:
-        return None
-    table = np.zeros((len(counts), 3), dtype=np.int32)
-    firsts = np.cumsum(counts) - counts
-    table[:, 0] = whole[firsts]
-    middle, third = (counts > 1) & ~gaps, counts > 2
-    table[middle, 1] = whole[firsts[middle] + 1]
-    table[gaps, 2] = whole[firsts[gaps] + 1]
-    table[third, 2] = whole[firsts[third] + 2]
-    return table
 
 
 def _whole(values: Floats) -> _Corners | None:

@@ -49,12 +49,34 @@ def read(source: Source) -> Figure:
     """Read a mesh with its weights and bindings; it has no skin if the file has neither."""
     sections = read_sections(source)
     mesh = _mesh(source, sections)
-    _check_mesh(source, sections, mesh)
+    has_texture = any(material.texture for material in mesh.materials)
+    if mesh.uvs is not None and not has_texture:
+        source.warn(
+            "F007.skin-texcoords: texcoords without a texture: drawn untextured",
+            sections.offsets["texcoords"],
+        )
+    if mesh.uvs is None and has_texture:
+        source.warn(
+            "F005.skin-texture: texture without texcoords: drawn untextured",
+            sections.offsets["material"],
+        )
     return Figure(name=source.path.stem, mesh=mesh, skin=_skin(source, sections))
 
 
 def _mesh(source: Source, sections: Sections) -> Mesh:
-    _require_positions(source, sections)
+    table = sections.tables.get("positions")
+    if table is None:
+        looks = source.looks_like()
+        raise source.fault(
+            "F002.skin-positions: expected a skin, found no `positions` section{looks}",
+            None if looks else source.end,
+            looks=optional(" ({})", looks),
+        )
+    if len(table) == 0:
+        raise source.fault(
+            "F002.skin-no-vertex: expected at least one vertex, found positions 0",
+            sections.offsets["positions"],
+        )
     _even_counts(source, sections)
     if not sections.triangles:
         raise source.fault(
@@ -84,22 +106,6 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
         materials=tuple(sections.materials),
         triangle_materials=materials.astype(np.int32),
     )
-
-
-def _require_positions(source: Source, sections: Sections) -> None:
-    table = sections.tables.get("positions")
-    if table is None:
-        looks = source.looks_like()
-        raise source.fault(
-            "F002.skin-positions: expected a skin, found no `positions` section{looks}",
-            None if looks else source.end,
-            looks=optional(" ({})", looks),
-        )
-    if len(table) == 0:
-        raise source.fault(
-            "F002.skin-no-vertex: expected at least one vertex, found positions 0",
-            sections.offsets["positions"],
-        )
 
 
 def _skin(source: Source, sections: Sections) -> Skin | None:
@@ -178,18 +184,13 @@ def _even_counts(source: Source, sections: Sections) -> None:
             found=count,
         )
         if is_weights:
-            _fit_weights(sections, n_positions)
+            assert sections.starts is not None  # checked by the caller
+            starts = sections.starts[: n_positions + 1]
+            sections.starts = np.pad(starts, (0, n_positions + 1 - len(starts)), mode="edge")
+            sections.joints = sections.joints[: starts[-1]]
+            sections.weights = sections.weights[: starts[-1]]
         else:
             del tables[name]
-
-
-def _fit_weights(sections: Sections, count: int) -> None:
-    """Drop the influences of surplus vertices, and add missing vertices without influences."""
-    assert sections.starts is not None  # checked by the caller
-    starts = sections.starts[: count + 1]
-    sections.starts = np.pad(starts, (0, count + 1 - len(starts)), mode="edge")
-    sections.joints = sections.joints[: starts[-1]]
-    sections.weights = sections.weights[: starts[-1]]
 
 
 def _checked_triangles(source: Source, sections: Sections, n_vertices: int) -> Ints:
@@ -217,21 +218,6 @@ def _checked_triangles(source: Source, sections: Sections, n_vertices: int) -> I
         tables.append(rows)
         first += len(rows)
     return tables[0] if len(tables) == 1 else np.concatenate(tables)
-
-
-def _check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
-    """Warn about textures that cannot be drawn."""
-    has_texture = any(material.texture for material in mesh.materials)
-    if mesh.uvs is not None and not has_texture:
-        source.warn(
-            "F007.skin-texcoords: texcoords without a texture: drawn untextured",
-            sections.offsets["texcoords"],
-        )
-    if mesh.uvs is None and has_texture:
-        source.warn(
-            "F005.skin-texture: texture without texcoords: drawn untextured",
-            sections.offsets["material"],
-        )
 
 
 def _invert_bindings(source: Source, sections: Sections) -> Floats:
