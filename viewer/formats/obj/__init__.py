@@ -39,22 +39,17 @@ from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats.obj.faces import (
-    FEWEST,
     CornerFault,
     FaceRows,
     checked_corners,
-    faulty_faces,
     read_faces,
 )
 from viewer.formats.obj.lines import (
     KEYWORDS,
     Lines,
-    NumberRows,
     Places,
-    faulty_rows,
     number_rows,
     pieces,
-    without_comments,
 )
 from viewer.formats.obj.mtl import read_libraries
 from viewer.phrases import counted, listed, optional, quoted
@@ -71,7 +66,6 @@ _RUNS = (b"usemtl", b"g", b"o")
 _SHAPES = {b"l": "line", b"p": "point"}
 # Smoothing groups, and keywords that a viewer does not need.
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
-_NO_FACES = FaceRows(np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64))
 
 
 @dataclass(slots=True)
@@ -214,15 +208,21 @@ def _read_parts(source: Source) -> _ObjParts:
 
 
 def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
-    for keyword, read in (("v", _positions), ("vt", _read_uvs), ("vn", _read_normals)):
-        if len(lines.of[keyword]):
-            gathered.tables[keyword].add(read(source, lines, gathered))
+    if len(lines.of["v"]):
+        gathered.tables["v"].add(_positions(source, lines, gathered))
+    if len(lines.of["vt"]):
+        gathered.tables["vt"].add(_texture_coordinates(source, lines, gathered.before["vt"]))
+    if len(lines.of["vn"]):
+        normals = number_rows(source, lines, "vn", 3, gathered.before["vn"])[0]
+        gathered.tables["vn"].add(normals)
     if len(lines.of["f"]):
-        faces = read_faces(lines, gathered.before)
-        if faces is None:
-            lines = _without_edges(lines, gathered)
-            faces = read_faces(lines, gathered.before) if len(lines.of["f"]) else _NO_FACES
-        _add_faces(gathered, faces or faulty_faces(source, lines, gathered.before))
+        faces = read_faces(source, lines, gathered.before)
+        _add_faces(gathered, faces)
+        if len(faces.edges):
+            first = int(lines.starts[lines.of["f"][faces.edges[0]]])
+            gathered.leave_out("edges", len(faces.edges), lines.base + first)
+            kept = np.delete(lines.of["f"], faces.edges)
+            lines = replace(lines, of={**lines.of, "f": kept})
     # Names of materials, groups and objects
     for line in lines.others.tolist():
         words = lines.text(line).split(None, 1)
@@ -242,19 +242,6 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
         gathered.before[keyword] += len(found)
 
 
-def _without_edges(lines: Lines, gathered: _Gathered) -> Lines:
-    """Return lines without faces of one or two corners, once Blender's form of loose edges."""
-    counts = np.array(
-        [len(without_comments(lines.text(line)).split()) - 1 for line in lines.of["f"].tolist()]
-    )
-    is_edge = (counts > 0) & (counts < FEWEST)
-    if not is_edge.any():
-        return lines
-    first = lines.base + int(lines.starts[lines.of["f"][is_edge.argmax()]])
-    gathered.leave_out("edges", int(is_edge.sum()), first)
-    return replace(lines, of={**lines.of, "f": lines.of["f"][~is_edge]})
-
-
 def _add_faces(gathered: _Gathered, faces: FaceRows) -> None:
     first = gathered.n_faces
     gathered.n_faces += len(faces.counts)
@@ -264,15 +251,8 @@ def _add_faces(gathered: _Gathered, faces: FaceRows) -> None:
     gathered.offsets.add(faces.offsets)
 
 
-def _rows(
-    source: Source, lines: Lines, gathered: _Gathered, keyword: str, width: int
-) -> NumberRows:
-    found = number_rows(lines, keyword, width)
-    return found or faulty_rows(source, lines, keyword, width, gathered.before[keyword])
-
-
 def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
-    table, counts, values, rows = _rows(source, lines, gathered, "v", 3)
+    table, counts, values, rows = number_rows(source, lines, "v", 3, gathered.before["v"])
     gathered.vertices.add(rows.origins - 1)
     if len(values) == table.size:
         return table
@@ -301,18 +281,14 @@ def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
     return table
 
 
-def _read_uvs(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
-    table, counts, values, _ = _rows(source, lines, gathered, "vt", 1)
+def _texture_coordinates(source: Source, lines: Lines, first: int) -> Floats:
+    table, counts, values, _ = number_rows(source, lines, "vt", 1, first)
     uvs = np.zeros((len(counts), 2))
     uvs[:, :1] = table
     firsts = np.cumsum(counts) - counts
     has_v = counts > 1
     uvs[has_v, 1] = values[firsts[has_v] + 1]
     return uvs
-
-
-def _read_normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
-    return _rows(source, lines, gathered, "vn", 3)[0]
 
 
 def _colors(gathered: _Gathered) -> Floats | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,10 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.formats._mesh.polygons import first_known, triangles_of
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_numbers, parse_words, to_number, word_begins
+from viewer.formats._text.numbers import parse_words, to_number, word_begins
 from viewer.formats.obj.lines import Lines, Places, Rows, rows_of
 from viewer.phrases import quoted
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Bools
 
 _CORNER_KINDS = ("v", "vt", "vn")
 _CORNER_NAMES = {"v": "vertex", "vt": "texture coordinate", "vn": "normal"}
@@ -51,55 +52,93 @@ class FaceRows:
     """(F,). Offset of each face in the file."""
     faults: tuple[CornerFault, ...] = ()
     """Errors to record when the triangles of the faces are known."""
+    edges: Places = field(default_factory=lambda: np.zeros(0, np.int64))
+    """(E,). Which of the lines have one or two corners: Blender once wrote loose edges so."""
 
 
-def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
-    """Read faces, None if any is invalid; -1 is the last ``v``, ``vt`` or ``vn`` before it."""
+def read_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
+    """Read the faces of some lines, without invalid ones; ``before``: elements before them."""
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
     counts = np.diff(np.searchsorted(begins, rows.starts))
-    written = None if (counts < FEWEST).any() else _corner_numbers(rows, begins)
-    if written is None:
-        return None
+    empty = np.flatnonzero(counts == 0)
+    if len(empty):
+        source.refuse(
+            "F002.obj-face: f: expected at least {least} corners, found {found}",
+            int(rows.origins[empty[0]]) - 1,
+            len(empty),
+            least=FEWEST,
+            found=0,
+        )
+    kept = counts >= FEWEST
+    owners = np.repeat(np.arange(len(counts)), counts)
+    written, lost = _corners(rows, begins)
+    is_kept = kept[owners]
+    lost &= is_kept
+    places = (np.cumsum(kept) - 1)[owners]
+    faults = []
+    broken = np.flatnonzero(lost)
+    if len(broken):
+        offset = rows.offset(int(begins[broken[0]]))
+        faults.append(_corner_fault(source, offset, places[broken]))
     for column, keyword in enumerate(_CORNER_KINDS):
         numbers = written[:, column]
-        back = np.flatnonzero(numbers < 0)
-        if len(back):
-            owners = np.repeat(np.arange(len(counts)), counts)[back]
-            known = before[keyword] + np.searchsorted(lines.of[keyword], lines.of["f"])[owners]
-            if (-numbers[back] > known).any():
-                return None
-            numbers[back] += known + 1
-    return FaceRows(counts, written - 1, rows.origins - 1)
+        back = np.flatnonzero((numbers < 0) & is_kept)
+        if len(back) == 0:
+            continue
+        # Negative indices count back from the last element before the face.
+        known = before[keyword] + np.searchsorted(lines.of[keyword], lines.of["f"])[owners[back]]
+        far = np.flatnonzero((-numbers[back] > known) & ~lost[back])
+        if len(far):
+            kind, first = _CORNER_NAMES[keyword], int(back[far[0]])
+            values = {"least": -int(known[far[0]]), "found": int(numbers[first])}
+            key = (
+                f"F002.obj-{keyword}-back: f: expected a {kind} index from -1 to {{least}}, found "
+                "{found}"
+                if known[far[0]]
+                else f"F002.obj-{keyword}-early: f: expected a {kind} defined before this line, "
+                "found {found}"
+            )
+            offset = rows.offset(int(begins[first]))
+            faults.append(CornerFault(key, offset, values, places[back[far]]))
+            lost[back[far]] = True
+        numbers[back] += (known + 1).astype(numbers.dtype)
+    if lost.any():
+        written = written.astype(np.int64)
+        written[lost] = _LOST, 0, 0
+    if not kept.all():
+        written = written[is_kept]
+    edges = np.flatnonzero((counts > 0) & ~kept)
+    return FaceRows(counts[kept], written - 1, rows.origins[kept] - 1, tuple(faults), edges)
 
 
-def _corner_numbers(rows: Rows, begins: Places) -> _Corners | None:
-    """Return each corner's three numbers (C, 3), 0 for missing ones; None if one is invalid."""
+def _corners(rows: Rows, begins: Places) -> tuple[_Corners, Bools]:
+    """Return the numbers of every corner, 0 if missing, (C, 3), and a mask of invalid corners."""
     text = rows.body.replace(b"/", b" ")
-    values, bad = parse_numbers(text, 0, len(text), is_kept=False)
-    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
-        return None
-    whole = _whole(values)
-    if whole is None:
-        return None
-    table = np.zeros((len(begins), 3), dtype=np.int32)
+    values = parse_words(text, 0, len(text))
     columns = _common_columns(rows, begins)
-    if columns is not None:
-        if len(whole) != len(columns) * len(begins):
-            return None
-        table[:, columns] = whole.reshape(len(begins), -1)
-        return table
+    # Indices count from 1, so an explicit 0 is invalid and differs from a missing index.
+    if columns is not None and values.all() and not np.isnan(values.sum()):
+        whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
+        if len(whole) == len(columns) * len(begins) and (whole == values).all():
+            table = np.zeros((len(begins), 3), dtype=np.int32)
+            table[:, columns] = whole.reshape(-1, len(columns))
+            return table, np.zeros(len(begins), np.bool_)
     fits, n_numbers, has_gap = _fits_corner(rows, begins)
-    if not fits.all():
-        return None
-    # A gap moves the second number to the third column.
     firsts = np.cumsum(n_numbers) - n_numbers
-    table[:, 0] = whole[firsts]
-    middle, third = (n_numbers > 1) & ~has_gap, n_numbers > 2
-    table[middle, 1] = whole[firsts[middle] + 1]
-    table[has_gap, 2] = whole[firsts[has_gap] + 1]
-    table[third, 2] = whole[firsts[third] + 2]
-    return table
+    numbers = np.zeros((len(begins), 3))
+    numbers[fits, 0] = values[firsts[fits]]
+    for chosen, column, place in (
+        (fits & (n_numbers > 1) & ~has_gap, 1, 1),
+        (fits & has_gap, 2, 1),  # a gap moves the second number to the third column
+        (fits & (n_numbers > 2), 2, 2),
+    ):
+        given = values[firsts[chosen] + place]
+        numbers[chosen, column] = np.where(given == 0.0, np.nan, given)
+    whole = np.clip(np.nan_to_num(numbers), -(2.0**40), 2.0**40).astype(np.int64)
+    lost = ~fits | (whole != numbers).any(axis=1) | (whole[:, 0] == 0)
+    is_small = np.abs(whole).max(initial=0) <= 2**30
+    return whole.astype(np.int32) if is_small else whole, lost
 
 
 def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
@@ -138,80 +177,6 @@ def _fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
         (n_slashes <= 2) & (rows.letters[begins] != _SLASH) & (rows.letters[after - 1] != _SLASH)
     )
     return fits, n_numbers, has_gap
-
-
-def _whole(values: Floats) -> _Corners | None:
-    """Return numbers as integers; None if one has a fraction, or is too large for an index."""
-    # The function for invalid faces reads large numbers again.
-    whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
-    return whole if (whole == values).all() else None
-
-
-def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRows:
-    """Read faces as ``read_faces`` does, and record the errors of those that are omitted."""
-    rows = rows_of(lines, "f")
-    begins = word_begins(rows.letters)
-    counts = np.diff(np.searchsorted(begins, rows.starts))
-    owners = np.repeat(np.arange(len(counts)), counts)
-    small = np.flatnonzero(counts < FEWEST)
-    if len(small):
-        offset = int(rows.origins[small[0]]) - 1
-        found = int(counts[small[0]])
-        source.refuse(
-            "F002.obj-face: f: expected at least {least} corners, found {found}",
-            offset,
-            len(small),
-            least=FEWEST,
-            found=found,
-        )
-    written, lost = _corners(rows, begins)
-    kept = counts >= FEWEST
-    places = (np.cumsum(kept) - 1)[owners]
-    faults = []
-    broken = np.flatnonzero(lost & kept[owners])
-    if len(broken):
-        offset = rows.offset(int(begins[broken[0]]))
-        faults.append(_corner_fault(source, offset, places[broken]))
-    for column, keyword in enumerate(_CORNER_KINDS):
-        numbers = written[:, column]
-        known = before[keyword] + np.searchsorted(lines.of[keyword], lines.of["f"])[owners]
-        far = np.flatnonzero((-numbers > known) & ~lost & kept[owners])
-        if len(far):
-            values = {"least": -int(known[far[0]]), "found": int(numbers[far[0]])}
-            kind = _CORNER_NAMES[keyword]
-            key = (
-                f"F002.obj-{keyword}-back: f: expected a {kind} index from -1 to {{least}}, found "
-                "{found}"
-                if known[far[0]]
-                else f"F002.obj-{keyword}-early: f: expected a {kind} defined before this line, "
-                "found {found}"
-            )
-            offset = rows.offset(int(begins[far[0]]))
-            faults.append(CornerFault(key, offset, values, places[far]))
-            lost[far] = True
-        numbers[numbers < 0] += known[numbers < 0] + 1
-    written[lost] = _LOST, 0, 0
-    return FaceRows(counts[kept], written[kept[owners]] - 1, rows.origins[kept] - 1, tuple(faults))
-
-
-def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
-    """Return the numbers of every corner, 0 if missing, (C, 3), and a mask of invalid corners."""
-    values = parse_words(rows.body.replace(b"/", b" "), 0, len(rows.body))
-    fits, n_numbers, has_gap = _fits_corner(rows, begins)
-    firsts = np.cumsum(n_numbers) - n_numbers
-    numbers = np.zeros((len(begins), 3))
-    numbers[fits, 0] = values[firsts[fits]]
-    for chosen, column, place in (
-        (fits & (n_numbers > 1) & ~has_gap, 1, 1),
-        (fits & has_gap, 2, 1),
-        (fits & (n_numbers > 2), 2, 2),
-    ):
-        given = values[firsts[chosen] + place]
-        # Indices count from 1, so an explicit 0 is invalid and differs from a missing index.
-        numbers[chosen, column] = np.where(given == 0.0, np.nan, given)
-    whole = np.clip(np.nan_to_num(numbers), -(2.0**40), 2.0**40).astype(np.int64)
-    lost = ~fits | (whole != numbers).any(axis=1) | (whole[:, 0] == 0)
-    return whole, lost
 
 
 def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:

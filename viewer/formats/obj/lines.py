@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase, wording
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
+from viewer.formats._text.numbers import parse_words, word_begins
 from viewer.formats._text.words import Words, refuse_words
 from viewer.phrases import counted
 from viewer.rig.arrays import Bools, Floats
@@ -77,7 +77,7 @@ class Rows:
 
 
 NumberRows = tuple[Floats, Places, Floats, Rows]
-"""Results of ``number_rows``."""
+"""The first numbers of each line, (n, width), how many it has, (n,), all numbers, and the text."""
 
 
 def pieces(source: Source) -> Iterator[Lines]:
@@ -133,58 +133,45 @@ def _is_blank(letters: Letters) -> Bools:
     return (letters == 32) | (letters - np.uint8(9) < 5)
 
 
-def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
-    """Parse the numbers after a keyword, ``width`` or more a line; None if they are not that."""
-    rows = rows_of(lines, keyword)
-    begins = word_begins(rows.letters)
-    values, bad = parse_numbers(rows.body, 0, len(rows.body), is_kept=False)
-    if bad >= 0:
-        return None
-    firsts = np.searchsorted(begins, rows.starts)
-    counts = np.diff(firsts)
-    if (counts < width).any():
-        return None
-    if (counts == width).all():
-        return values.reshape(-1, width), counts, values, rows
-    return values[firsts[:-1, None] + np.arange(width)], counts, values, rows
-
-
-def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
-    """Parse as ``number_rows``, with errors; NaN in rows too short and for invalid words."""
+def number_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
+    """Parse the numbers after a keyword; NaN in rows too short and for invalid words."""
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
     values = parse_words(rows.body, 0, len(rows.body))
     firsts = np.searchsorted(begins, rows.starts)
     counts = np.diff(firsts)
-    owners = np.repeat(np.arange(len(counts)), counts)
-    words = Words(source.data, values, rows.origins[owners] + begins - rows.starts[owners], owners)
-    part: Part = "positions" if keyword == "v" else ""
-    bad = words.bad
-    is_used = bad - firsts[owners[bad]] < width
-    parts: tuple[Part, Part] = (part, "")  # only these numbers are checked
-    for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
-        owned = owners[bad[chosen]] + first
-        refuse_words(
-            source,
-            words,
-            bad[chosen],
-            lambda word: Phrase(_ITEMS[keyword], index=int(owners[word]) + first),
-            whose,
-            owned,
-        )
-    short = np.flatnonzero(counts < width)
-    if len(short):
-        row = int(short[0])
-        source.refuse(
-            wording.WIDTH,
-            int(rows.origins[row]) - 1,
-            len(short),
-            part,
-            short + first,
-            item=Phrase(_ITEMS[keyword], index=row + first),
-            expected=counted(width, "number"),
-            found=int(counts[row]),
-        )
+    if np.isnan(values.sum()) or (counts < width).any():
+        owners = np.repeat(np.arange(len(counts)), counts)
+        offsets = rows.origins[owners] + begins - rows.starts[owners]
+        words = Words(source.data, values, offsets, owners)
+        part: Part = "positions" if keyword == "v" else ""
+        bad = words.bad
+        is_used = bad - firsts[owners[bad]] < width
+        parts: tuple[Part, Part] = (part, "")  # only these numbers are checked
+        for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
+            refuse_words(
+                source,
+                words,
+                bad[chosen],
+                lambda word: Phrase(_ITEMS[keyword], index=int(owners[word]) + first),
+                whose,
+                owners[bad[chosen]] + first,
+            )
+        short = np.flatnonzero(counts < width)
+        if len(short):
+            row = int(short[0])
+            source.refuse(
+                wording.WIDTH,
+                int(rows.origins[row]) - 1,
+                len(short),
+                part,
+                short + first,
+                item=Phrase(_ITEMS[keyword], index=row + first),
+                expected=counted(width, "number"),
+                found=int(counts[row]),
+            )
+    if (counts == width).all():
+        return values.reshape(-1, width), counts, values, rows
     table = np.full((len(counts), width), np.nan)
     long = counts >= width
     table[long] = values[firsts[:-1][long, None] + np.arange(width)]
