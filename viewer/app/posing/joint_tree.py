@@ -6,6 +6,7 @@ from dataclasses import field
 
 from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 
@@ -54,6 +55,4 @@ def select_joint(state: AppState, joint: int) -> None:
         return
     if tree.filter.lower() not in joint_label(skeleton, joint).lower():
         tree.filter = ""
-    while joint >= 0:
-        tree.opened.add(joint)  # shows the rows of its DOFs
-        joint = int(skeleton.parents[joint])
+    tree.opened.update(path_to_root(skeleton.parents, joint))  # shows the rows of their DOFs

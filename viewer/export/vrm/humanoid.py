@@ -8,6 +8,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
 from viewer.rig.figure import Figure
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton
@@ -81,12 +82,5 @@ def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool
     """Return whether a bone is below its required ancestor."""
     above = bone_above(bone)
     is_known = above in bones or above in REQUIRED_BONES
-    return not above or (is_known and _is_below(skeleton, bones[bone], bones.get(above, -1)))
-
-
-def _is_below(skeleton: Skeleton, joint: int, above: int) -> bool:
-    while joint >= 0:
-        joint = int(skeleton.parents[joint])
-        if joint == above:
-            return True
-    return False
+    ancestors = path_to_root(skeleton.parents, bones[bone])[1:]
+    return not above or (is_known and bones.get(above, -1) in (*ancestors, -1))

@@ -6,7 +6,7 @@ Readers guarantee that indices are valid, numbers are finite, and the parents fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from typing import Any, Literal, TypeAlias
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.file_record import StoredTextures
 from viewer.rig.material import Material
@@ -316,43 +316,3 @@ class NodeExpression:
     """Material, kind and target of each change of a material; see ``MaterialBinds``."""
     preset: str = ""
     """Name in VRM 1.0; empty if there is none."""
-
-
-def path_to_root(parents: Sequence[int] | Ints, node: int) -> list[int]:
-    """Return a node and its ancestors, ending with its root."""
-    path = [node]
-    while (above := int(parents[path[-1]])) >= 0:
-        path.append(above)
-    return path
-
-
-def roots_of(parents: Ints) -> Ints:
-    """Return the root of each node (N,), by pointer doubling, in O(N log N) for any depth."""
-    above: Ints = np.where(parents < 0, np.arange(len(parents), dtype=np.int32), parents)
-    while True:
-        next_above = above[above]
-        if np.array_equal(next_above, above):
-            return above
-        above = next_above
-
-
-def descendants(parents: Ints, node: int) -> Bools:
-    """Return whether each node is a given one or below it (N,), by pointer doubling."""
-    above: Ints = np.where(parents < 0, np.arange(len(parents), dtype=np.int32), parents)
-    found: Bools = np.arange(len(parents)) == node
-    while True:
-        next_above = above[above]
-        found = found | found[above]
-        if np.array_equal(next_above, above):
-            return found
-        above = next_above
-
-
-def with_ancestors(parents: Sequence[int], nodes: Iterable[int]) -> set[int]:
-    """Return nodes and their ancestors; each node is visited once."""
-    found: set[int] = set()
-    for node in nodes:
-        while node >= 0 and node not in found:
-            found.add(node)
-            node = parents[node]
-    return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.bindings import bind_rigid, bind_skins, inverse_binds
-from viewer.formats._scene_graph.content import REACH, NodeFile, with_ancestors
+from viewer.formats._scene_graph.content import REACH, NodeFile
 from viewer.formats._scene_graph.grouping import Members, group_nodes, is_skinned, scene_order
 from viewer.formats._scene_graph.joints import Joints, make_joints, rest_worlds, skeleton_of
 from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
@@ -29,6 +29,7 @@ from viewer.phrases import Remedy, agree, counted, listed, quoted, rounded
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure, FigureGroup, read_from
 from viewer.rig.file_record import FileRecord, VrmRecord
+from viewer.rig.hierarchy import with_ancestors
 from viewer.rig.motion.transform_clip import Animation
 
 if TYPE_CHECKING:

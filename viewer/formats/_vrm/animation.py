@@ -17,7 +17,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from viewer.diagnostics import wording
-from viewer.formats._scene_graph.content import NodeFile, path_to_root
+from viewer.formats._scene_graph.content import NodeFile
 from viewer.formats._scene_graph.joints import make_joints, skeleton_of
 from viewer.formats._scene_graph.motions import Reader, animations_of, read_once
 from viewer.formats._source import Source
@@ -26,6 +26,7 @@ from viewer.formats._vrm.parts import is_index, part
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion

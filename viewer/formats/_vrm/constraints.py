@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from viewer.formats._scene_graph.content import NodeTree, path_to_root
+from viewer.formats._scene_graph.content import NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, part, value_of
 from viewer.phrases import listed
 from viewer.rig.constraints.constraint import Constraint, ConstraintKind
+from viewer.rig.hierarchy import path_to_root
 
 _EXTENSION = "VRMC_node_constraint"
 _KINDS: tuple[ConstraintKind, ...] = ("roll", "aim", "rotation")

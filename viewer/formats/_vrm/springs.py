@@ -30,6 +30,7 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.springs.springs import INSIDE, OUTSIDE, PLANE, Colliders, Springs
 
 _EXTENSION = "VRMC_springBone"
@@ -223,9 +224,8 @@ def end_below(tree: NodeTree, node: int) -> Floats | None:
 def _node_world(tree: NodeTree, node: int) -> Floats:
     """Return the matrix from a node to the scene: (4, 4)."""
     matrix = np.eye(4)
-    while node >= 0:
-        matrix = _node_matrix(tree, node) @ matrix
-        node = int(tree.parents[node])
+    for each in path_to_root(tree.parents, node):
+        matrix = _node_matrix(tree, each) @ matrix
     return matrix
 
 

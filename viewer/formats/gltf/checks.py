@@ -14,12 +14,13 @@ import numpy as np
 
 from viewer.diagnostics import wording
 from viewer.errors import FormatError
-from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree, descendants, roots_of
+from viewer.formats._scene_graph.content import NodeMesh, NodeSkin, NodeTree
 from viewer.formats._vrm.parts import list_in, part
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.phrases import agree, counted, listed, rounded
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.hierarchy import descendants, roots_of
 from viewer.rig.inspection.faults import UNIT_ROTATION
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._scene_graph.content import NodeTree, descendants
+from viewer.formats._scene_graph.content import NodeTree
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
 from viewer.phrases import agree, counted, listed
+from viewer.rig.hierarchy import descendants
 
 # Extensions of geometry and animation, and of characters; materials and textures list their own.
 _GEOMETRY = (

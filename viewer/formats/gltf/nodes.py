@@ -21,7 +21,6 @@ from viewer.formats._scene_graph.content import (
     NodeMesh,
     NodeSkin,
     NodeTree,
-    roots_of,
 )
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element, Table, member_indices, member_rows
@@ -32,7 +31,7 @@ from viewer.rig.geometry.rotation import (
     nearest_rotations,
     quaternion_to_matrix,
 )
-from viewer.rig.hierarchy import cycle_members
+from viewer.rig.hierarchy import cycle_members, roots_of
 from viewer.rig.inspection.faults import UNIT_ROTATION
 
 _TINY = 1e-12  # minimum length of a quaternion with a direction

@@ -22,6 +22,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.quaternion import between, conjugate, multiply, slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -93,14 +94,10 @@ def _world(
 ) -> tuple[Floats, Floats, Floats]:
     """Return a joint's rotation (..., 4), linear part (..., 3, 3) and position (..., 3)."""
     rotations, translations, scales = local
-    path = []
-    while joint >= 0:
-        path.append(joint)
-        joint = int(skeleton.parents[joint])
     shape = rotations.shape[1:-1]
     rotation = np.broadcast_to(_NONE, (*shape, 4))
     linear, place = np.broadcast_to(np.eye(3), (*shape, 3, 3)), np.zeros((*shape, 3))
-    for each in path[::-1]:
+    for each in path_to_root(skeleton.parents, joint)[::-1]:
         place = place + np.einsum("...ab,...b->...a", linear, translations[each])
         linear = linear @ (quaternion_to_matrix(rotations[each]) * scales[each][..., None, :])
         rotation = multiply(rotation, rotations[each])

@@ -15,6 +15,7 @@ from viewer.rig.feet.legs import Leg, legs_of, reach
 from viewer.rig.feet.soles import Soles, extent, soles_of_feet
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.hierarchy import path_to_root, with_ancestors
 from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -106,8 +107,10 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
 def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) -> BodyLegs | None:
     """Return the legs of a figure; None if they cannot be solved."""
     skeleton = figure.require_skeleton()
-    if not all(_is_chain(skeleton.parents, leg) for leg in legs):
-        return None
+    for leg in legs:
+        # Feet must move with their legs: animators' controls may be joints of the root.
+        if not {leg.hip, leg.knee, leg.ankle} <= set(path_to_root(skeleton.parents, leg.toe)):
+            return None
     weights = figure_pose(figure).shape_weights
     if clip.shape_weights is not None:
         weights = clip.shape_weights[0]
@@ -143,15 +146,6 @@ def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) ->
     clearance = float(toes.mean() - floor)
     levels = level, toe_level
     return BodyLegs(chains, own, moved, *levels, rests, extensions, size, clearance)
-
-
-def _is_chain(parents: Ints, leg: Leg) -> bool:
-    """Return whether a foot moves with its leg; animators' controls may be joints of the root."""
-    above, joint = set[int](), leg.toe
-    while joint >= 0:
-        above.add(joint)
-        joint = int(parents[joint])
-    return {leg.hip, leg.knee, leg.ankle} <= above
 
 
 def is_solvable(linear: Floats) -> bool:
@@ -202,13 +196,7 @@ class Chains:
 def chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
     """Return the given joints of a skeleton and all their ancestors."""
     parents = skeleton.parents
-    chosen = np.zeros(skeleton.n_joints, dtype=np.bool_)
-    for end in ends:
-        joint = int(end)
-        while joint >= 0 and not chosen[joint]:
-            chosen[joint] = True
-            joint = int(parents[joint])
-    joints = np.flatnonzero(chosen).astype(np.int32)
+    joints = np.array(sorted(with_ancestors(parents.tolist(), map(int, ends))), dtype=np.int32)
     place = np.full(skeleton.n_joints, -1, dtype=np.int32)
     place[joints] = np.arange(len(joints))
     above = np.where(parents[joints] >= 0, place[parents[joints]], -1).astype(np.int32)

@@ -10,12 +10,12 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import mean_scale
+from viewer.rig.hierarchy import descendants
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import rest_joints
-from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, owners
 
 _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
@@ -98,7 +98,7 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
         mover, place = np.array([found[0]]), np.zeros((1, 3))
         above = rest_joints(figure)[mover, _axis(figure)] - sole
         if is_bound and figure.mesh is not None and figure.skin is not None:
-            whole = _whole_foot(skeleton, found)
+            whole = np.any([descendants(skeleton.parents, joint) for joint in found], axis=0)
             points = _points(figure.mesh, figure.skin, whole, _axis(figure))
             if points is not None:
                 (mover, place), above = points, np.zeros(len(points[0]))
@@ -115,15 +115,6 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
     heels = np.einsum("nab,nb->na", np.linalg.pinv(rest), below)
     every, movers = every.astype(np.int32), movers.astype(np.int32)
     return Soles(nearest, every, movers, places, above, ankles, heels)
-
-
-def _whole_foot(skeleton: Skeleton, found: Sequence[int]) -> Bools:
-    """Return the joints of a foot: the ankle, or the ball, and all joints below it: (J,)."""
-    result = np.zeros(skeleton.n_joints, dtype=np.bool_)
-    result[list(found)] = True
-    for joint, parent in enumerate(skeleton.parents.tolist()):
-        result[joint] |= parent >= 0 and bool(result[parent])
-    return result
 
 
 def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Floats] | None:

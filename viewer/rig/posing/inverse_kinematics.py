@@ -17,6 +17,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
@@ -44,13 +45,8 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
     """Return the nearest ancestors (N,) with free rotations, at most ``length``, nearest first."""
     rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
     able = set(skeleton.dof_joints[rotates].tolist())
-    chain: list[int] = []
-    above = int(skeleton.parents[joint])
-    while above >= 0 and len(chain) < length:
-        if above in able:
-            chain.append(above)
-        above = int(skeleton.parents[above])
-    return np.array(chain, dtype=np.int32)
+    chain = [above for above in path_to_root(skeleton.parents, joint)[1:] if above in able]
+    return np.array(chain[:length], dtype=np.int32)
 
 
 def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, rows: Ints) -> Floats:

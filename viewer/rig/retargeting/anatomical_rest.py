@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import permutations, product
+from itertools import pairwise, permutations, product
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from viewer.rig.geometry.rotation import (
     rotation_vector_to_matrix,
 )
 from viewer.rig.geometry.vectors import unit
+from viewer.rig.hierarchy import path_to_root, with_ancestors
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.retargeting.rest_alignment import shortest_arc
@@ -238,8 +239,7 @@ def _trunk(
     }
     top = postures.joints["neck" if "neck" in postures.joints else "head"]
     hips = [postures.joints[f"{side}_hip"] for side in SIDES]
-    above = {joint for end in (top, *hips) for joint in _ancestors(skeleton.parents, end)}
-    joints |= above - set(hips)
+    joints |= with_ancestors(skeleton.parents.tolist(), (top, *hips)) - {top, *hips}
     found = {joint: stands @ _mean(body, postures.rotations[:, joint]) for joint in joints}
     # The mean trunk may lean. As a whole, it is rotated until the line from the hips to the neck is
     # vertical and the line between the hips sideways.
@@ -250,21 +250,11 @@ def _trunk(
     return {joint: tilt @ rotation for joint, rotation in found.items()}
 
 
-def _ancestors(parents: Ints, joint: int) -> list[int]:
-    found = []
-    while parents[joint] >= 0:
-        joint = int(parents[joint])
-        found.append(joint)
-    return found
-
-
 def _place(skeleton: Skeleton, rotations: dict[int, Floats], joint: int) -> Floats:
     """Return a joint's position relative to the root."""
     place = np.zeros(3)
-    while skeleton.parents[joint] >= 0:
-        parent = int(skeleton.parents[joint])
-        place = place + rotations[parent] @ skeleton.rest_translations[joint]
-        joint = parent
+    for each, parent in pairwise(path_to_root(skeleton.parents, joint)):
+        place = place + rotations[parent] @ skeleton.rest_translations[each]
     return place
 
 

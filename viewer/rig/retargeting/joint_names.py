@@ -19,6 +19,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from viewer.rig.arrays import Ints
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
 from viewer.rig.skeleton import Skeleton
 
@@ -190,7 +191,7 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
         _put_pelvis(result, parents, spine)
     if "pelvis" in result:
         # A waist above both halves of the body, as in MMD, is no part of the spine.
-        above = {result.index("pelvis"), *_ancestors(result.index("pelvis"), parents)}
+        above = path_to_root(parents, result.index("pelvis"))
         spine = [joint for joint in spine if joint not in above]
     spine = _without_neck(spine, chains["neck"], result, parents)
     for joint, name in zip(*_numbered(spine), strict=True):
@@ -212,10 +213,10 @@ def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
 def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
     """Name the pelvis: the joint above both legs; otherwise, above the first leg or spine."""
     legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
-    paths = [_ancestors(joint, parents) for joint in legs]
+    paths = [path_to_root(parents, joint)[1:] for joint in legs]
     shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
     if not shared and spine:
-        shared = _ancestors(spine[0], parents)
+        shared = path_to_root(parents, spine[0])[1:]
     if shared and not result[shared[0]]:
         result[shared[0]] = "pelvis"
 
@@ -225,23 +226,15 @@ def _without_neck(
 ) -> list[int]:
     """Return the spine up to the chest; later joints are neck and head (Rigify)."""
     arms = [result.index(name) for name in _ARMS if name in result]
-    paths = [_ancestors(joint, parents) for joint in arms]
+    paths = [path_to_root(parents, joint)[1:] for joint in arms]
     chest = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
     if necks or "head" in result or len(arms) < 2 or not chest or chest[0] not in spine:
         return spine
-    above = [joint for joint in spine if chest[0] in _ancestors(joint, parents)]
+    above = [joint for joint in spine if chest[0] in path_to_root(parents, joint)[1:]]
     if above:
         result[above[-1]] = "head"
         necks += above[:1] if len(above) > 1 else []
     return [joint for joint in spine if joint not in above]
-
-
-def _ancestors(joint: int, parents: Ints) -> list[int]:
-    path = []
-    while parents[joint] >= 0:
-        joint = int(parents[joint])
-        path.append(joint)
-    return path
 
 
 def _roles(names: Sequence[str]) -> list[str]:

@@ -22,11 +22,12 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import Remedy, agree, counted, listed, one_of, rounded
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.hierarchy import path_to_root
 from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -297,7 +298,7 @@ def _shifts(
     # Only the root translates, by the part that the joints between root and anchor do not
     # contribute.
     anchor = _anchor(job)
-    path = _path(job.target.parents, anchor)
+    path = path_to_root(job.target.parents, anchor)[::-1]
     linear = np.eye(3)
     reached = np.zeros((len(worlds), 3))
     for joint in path:
@@ -316,14 +317,6 @@ def _anchor(job: _Job) -> int:
     if "pelvis" in names and matched[names.index("pelvis")]:
         return names.index("pelvis")
     return int(np.flatnonzero(matched)[0])
-
-
-def _path(parents: Ints, joint: int) -> list[int]:
-    """Return the joints from the root to one joint."""
-    path = [joint]
-    while parents[path[-1]] >= 0:
-        path.append(int(parents[path[-1]]))
-    return path[::-1]
 
 
 def _source_places(job: _Job, worlds: Floats) -> Floats:
@@ -375,7 +368,7 @@ def _dropped_translations(job: _Job) -> list[Diagnostic]:
         return []
     largest = np.linalg.norm(moves, axis=2).max(axis=0)
     size = float(np.ptp(job.rests[0].points, axis=0).max()) or 1.0
-    largest[_path(job.source.parents, job.matches.partners[_anchor(job)])] = 0.0
+    largest[path_to_root(job.source.parents, int(job.matches.partners[_anchor(job)]))] = 0.0
     found = np.flatnonzero(largest > _STILL * size)
     if not len(found):
         return []
