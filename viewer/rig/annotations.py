@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,8 +19,8 @@ class BodyParts:
     """(V,) int32. Index into ``names``."""
 
     def __post_init__(self) -> None:
-        values = frozen("of_vertex", self.of_vertex, (None,), np.int32)
-        object.__setattr__(self, "of_vertex", values)
+        freeze_fields(self, np.int32, of_vertex=(None,))
+        values = self.of_vertex
         if len(values) and not 0 <= values.min() <= values.max() < len(self.names):
             raise RigError(
                 f"body parts: expected 0 to {len(self.names) - 1}, "
@@ -43,10 +43,8 @@ class Keypoints:
 
     def __post_init__(self) -> None:
         count = len(self.names)
-        put = object.__setattr__
-        put(self, "joints", frozen("joints", self.joints, (count,), np.int32))
-        put(self, "vertices", frozen("vertices", self.vertices, (count, 3), np.int32))
-        put(self, "weights", frozen("weights", self.weights, (count, 3)))
+        freeze_fields(self, np.int32, joints=(count,), vertices=(count, 3))
+        freeze_fields(self, weights=(count, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,9 +57,7 @@ class ReducedMesh:
     """(T, 3) int32. Indices into ``vertices``."""
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "vertices", frozen("vertices", self.vertices, (None,), np.int32))
-        put(self, "triangles", frozen("triangles", self.triangles, (None, 3), np.int32))
+        freeze_fields(self, np.int32, vertices=(None,), triangles=(None, 3))
         corners = self.triangles
         if len(corners) and not 0 <= corners.min() <= corners.max() < len(self.vertices):
             raise RigError(
@@ -86,7 +82,7 @@ class VertexField:
     """Names of the classes if the values are indices."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen("values", self.values, (None,)))
+        freeze_fields(self, values=(None,))
         low, high = (0.0, len(self.names) - 1.0) if self.names else (-np.inf, np.inf)
         values = self.values
         if len(values) and not low <= values.min() <= values.max() <= high:

@@ -86,6 +86,14 @@ def frozen(
     return array
 
 
+def freeze_fields(
+    owner: object, dtype: DTypeLike = np.float64, /, **shapes: tuple[int | None, ...]
+) -> None:
+    """Pass fields of a frozen dataclass through ``frozen``, each with its shape, in this order."""
+    for name, shape in shapes.items():
+        object.__setattr__(owner, name, frozen(name, getattr(owner, name), shape, dtype))
+
+
 def freeze(array: NDArray[Item]) -> NDArray[Item]:
     """Make an array, and the arrays whose memory it uses, read-only, so that ``frozen`` keeps it.
 

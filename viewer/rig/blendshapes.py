@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+from viewer.rig.arrays import Deferred, Floats, Ints, freeze_fields, frozen
 from viewer.rig.bodies.offsets import DeferredOffsets, SparseOffsets
 from viewer.rig.bodies.pose_features import Feature
 from viewer.rig.expressions import ExpressionRules, MaterialBinds
@@ -60,20 +60,16 @@ class BlendShapes:
     def __post_init__(self) -> None:
         for name, size in (("origins", ()), ("ranges", (2,))):
             if getattr(self, name) is not None:
-                numbers = frozen(name, getattr(self, name), (len(self.names), *size))
-                object.__setattr__(self, name, numbers)
+                freeze_fields(self, **{name: (len(self.names), *size)})
         if not isinstance(self.offsets, Deferred):
-            offsets = frozen("offsets", self.offsets, (len(self.names), None, 3))
-            object.__setattr__(self, "offsets", offsets)
-        given = self.normal_offsets
-        if given is not None and not isinstance(given, Deferred):
-            given = frozen("normal_offsets", given, (None, None, 3))
-            object.__setattr__(self, "normal_offsets", given)
+            freeze_fields(self, offsets=(len(self.names), None, 3))
+        if self.normal_offsets is not None and not isinstance(self.normal_offsets, Deferred):
+            freeze_fields(self, normal_offsets=(None, None, 3))
         if not self.groups:
             object.__setattr__(self, "groups", ("shape",) * len(self.names))
         _check_shape("offsets", self.offsets.shape, (len(self.names), self.n_vertices, 3))
-        if given is not None:
-            _check_shape("normal_offsets", given.shape, self.offsets.shape)
+        if self.normal_offsets is not None:
+            _check_shape("normal_offsets", self.normal_offsets.shape, self.offsets.shape)
         if self.rest_weights is not None:
             weights = frozen("rest_weights", self.rest_weights, (len(self.names),))
             object.__setattr__(self, "rest_weights", weights if weights.any() else None)
@@ -190,7 +186,7 @@ class Correctives:
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
-            object.__setattr__(self, "offsets", frozen("offsets", self.offsets, (None, None, 3)))
+            freeze_fields(self, offsets=(None, None, 3))
         count = self.offsets.shape[0]
         if self.feature is not None:
             _check_shape(
@@ -277,14 +273,12 @@ class JointRegressor:
 
     def __post_init__(self) -> None:
         if self.axes is not None:
-            axes = frozen("axes", self.axes, (len(self.joints), 2), np.int32)
-            object.__setattr__(self, "axes", axes)
+            freeze_fields(self, np.int32, axes=(len(self.joints), 2))
         if self.bias is not None:
-            bias = frozen("bias", self.bias, (self.n_joints, 3))
-            object.__setattr__(self, "bias", bias)
-        for name, dtype in (("joints", np.int32), ("vertices", np.int32), ("weights", np.float64)):
-            values = frozen(name, getattr(self, name), (len(self.joints),), dtype)
-            object.__setattr__(self, name, values)
+            freeze_fields(self, bias=(self.n_joints, 3))
+        count = len(self.joints)
+        freeze_fields(self, np.int32, joints=(count,), vertices=(count,))
+        freeze_fields(self, weights=(count,))
         if len(self.joints) and not 0 <= self.joints.min() <= self.joints.max() < self.n_joints:
             raise RigError(f"joints: expected indices 0 to {self.n_joints - 1}")
         if len(self.vertices) and self.vertices.min() < 0:

@@ -13,7 +13,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields
 from viewer.rig.material import TEXTURES, Material, Rim, Texture
 
 PROCEDURAL = {
@@ -59,13 +59,10 @@ class ExpressionRules:
     empty."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...], dtype: type) -> None:
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
-
-        put("rows", (None,), np.int32)
-        put("is_binary", (len(self.rows),), np.bool_)
-        put("kinds", (len(self.rows),), np.int32)
-        put("overrides", (len(self.rows), len(PROCEDURAL)), np.int32)
+        freeze_fields(self, np.int32, rows=(None,))
+        count = len(self.rows)
+        freeze_fields(self, np.bool_, is_binary=(count,))
+        freeze_fields(self, np.int32, kinds=(count,), overrides=(count, len(PROCEDURAL)))
 
     def shown(self, weights: Floats) -> Floats:
         """Return the displayed weights (N,), expressions within 0 and 1 (VRM 1.0)."""
@@ -104,10 +101,8 @@ class MaterialBinds:
 
     def __post_init__(self) -> None:
         count = len(self.kinds)
-        for name in ("shapes", "materials"):
-            values = frozen(name, getattr(self, name), (count,), np.int32)
-            object.__setattr__(self, name, values)
-        object.__setattr__(self, "targets", frozen("targets", self.targets, (count, 4)))
+        freeze_fields(self, np.int32, shapes=(count,), materials=(count,))
+        freeze_fields(self, targets=(count, 4))
         unknown = set(self.kinds) - {*COLOR_KINDS, TRANSFORM}
         if unknown:
             raise RigError(f"kinds: found {', '.join(sorted(unknown))}")

@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bytes, Floats, frozen
+from viewer.rig.arrays import Bytes, Floats, freeze_fields
 
 ALPHA_MODES = ("opaque", "mask", "blend")
 """Alpha is ignored; surfaces are cut out below the cutoff; or they are blended with the
@@ -161,13 +161,11 @@ class Texture:
     """The PNG or JPEG file that ``image`` was decoded from, if it was part of another file."""
 
     def __post_init__(self) -> None:
-        def put(name: str, values: object) -> None:
-            object.__setattr__(self, name, values)
-
         if self.image is not None:
-            put("image", frozen("image", self.image, (None, None, 4), np.uint8))
-        placed = np.eye(2, 3) if self.transform is None else self.transform
-        put("transform", frozen("transform", placed, (2, 3)))
+            freeze_fields(self, np.uint8, image=(None, None, 4))
+        if self.transform is None:
+            object.__setattr__(self, "transform", np.eye(2, 3))
+        freeze_fields(self, transform=(2, 3))
         _check_choice("channel", self.channel, range(4))
         _check_choice("minification", self.minification, ("", *MINIFICATIONS))
         if self.uv_set < 0:

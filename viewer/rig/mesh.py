@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields, frozen
 
 if TYPE_CHECKING:
     from viewer.rig.material import Material
@@ -62,19 +62,17 @@ class Mesh:
         def put(name: str, values: object) -> None:
             object.__setattr__(self, name, values)
 
-        put("positions", frozen("positions", self.positions, (None, 3)))
-        put("normals", frozen("normals", self.normals, (self.n_vertices, 3)))
-        put("triangles", frozen("triangles", self.triangles, (None, 3), np.int32))
+        freeze_fields(self, positions=(None, 3))
+        freeze_fields(self, normals=(self.n_vertices, 3))
+        freeze_fields(self, np.int32, triangles=(None, 3))
         if self.uvs is not None:
-            rows = self.n_vertices if self.uv_triangles is None else None
-            put("uvs", frozen("uvs", self.uvs, (rows, 2)))
+            freeze_fields(self, uvs=(self.n_vertices if self.uv_triangles is None else None, 2))
         rows = 0 if self.uvs is None else len(self.uvs)
         put("other_uvs", tuple(frozen("other_uvs", uvs, (rows, 2)) for uvs in self.other_uvs))
         if self.uv_triangles is not None:
-            shape = (self.n_triangles, 3)
-            put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))
+            freeze_fields(self, np.int32, uv_triangles=(self.n_triangles, 3))
         if self.colors is not None:
-            put("colors", frozen("colors", self.colors, (self.n_vertices, 4)))
+            freeze_fields(self, colors=(self.n_vertices, 4))
         for name in ("triangle_materials", "triangle_parts"):
             given = getattr(self, name)
             if name == "triangle_parts" and not self.parts and np.all(np.asarray(given) == -1):

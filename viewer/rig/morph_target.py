@@ -12,7 +12,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import Skeleton
@@ -36,13 +36,12 @@ class MorphTarget:
     """(N, 3) or None. Normals as stored; None if the normals of the mesh are unchanged."""
 
     def __post_init__(self) -> None:
-        vertices = frozen("vertices", self.vertices, (None,), np.int32)
-        object.__setattr__(self, "vertices", vertices)
-        shape = (len(vertices), 3)
-        object.__setattr__(self, "positions", frozen("positions", self.positions, shape))
+        freeze_fields(self, np.int32, vertices=(None,))
+        count = len(self.vertices)
+        freeze_fields(self, positions=(count, 3))
         if self.normals is not None:
-            object.__setattr__(self, "normals", frozen("normals", self.normals, shape))
-        if len(np.unique(vertices)) < len(vertices):
+            freeze_fields(self, normals=(count, 3))
+        if len(np.unique(self.vertices)) < count:
             raise RigError(f"morph {self.name}: a vertex is listed twice")
 
 

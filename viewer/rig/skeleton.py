@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields
 from viewer.rig.memo import Memo
 
 if TYPE_CHECKING:
@@ -69,21 +69,17 @@ class Skeleton:
     """Rules by which joints follow the DOFs instead of rotating about x, y and z."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
-
         joints = len(self.names)
-        put("parents", (joints,), np.int32)
-        put("rest_translations", (joints, 3))
-        put("rest_rotations", (joints, 4))
-        put("rest_scales", (joints, 3))
-        put("dof_joints", (None,), np.int32)
-        put("dof_kinds", (self.n_dofs,), np.int32)
-        put("rest_dofs", (self.n_dofs,))
+        freeze_fields(self, np.int32, parents=(joints,))
+        freeze_fields(self, rest_translations=(joints, 3), rest_rotations=(joints, 4))
+        freeze_fields(self, rest_scales=(joints, 3))
+        freeze_fields(self, np.int32, dof_joints=(None,))
+        freeze_fields(self, np.int32, dof_kinds=(self.n_dofs,))
+        freeze_fields(self, rest_dofs=(self.n_dofs,))
         if self.boxes is not None:
-            put("boxes", (joints, 2, 3))
+            freeze_fields(self, boxes=(joints, 2, 3))
         if self.auxiliary is not None:
-            put("auxiliary", (joints,), np.bool_)
+            freeze_fields(self, np.bool_, auxiliary=(joints,))
         limits = np.array(self.dof_limits, dtype=np.float64)
         if limits.shape != (self.n_dofs, 2) or np.isnan(limits).any():
             raise RigError(f"dof_limits: expected shape {self.n_dofs} x 2 without NaN")

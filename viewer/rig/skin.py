@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields
 from viewer.rig.skeleton import Skeleton, shown_joint_of, shown_joints
 
 _NO_SUM = 1e-12  # minimum sum of weights that can be scaled to 1
@@ -39,15 +39,10 @@ class Skin:
     the rest is linear; None for linear blend skinning."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
-
-        put("starts", (None,), np.int32)
-        put("joints", (None,), np.int32)
-        put("weights", (len(self.joints),))
-        put("inverse_bind", (None, 4, 4))
+        freeze_fields(self, np.int32, starts=(None,), joints=(None,))
+        freeze_fields(self, weights=(len(self.joints),), inverse_bind=(None, 4, 4))
         if self.dqs_fractions is not None:
-            put("dqs_fractions", (len(self.starts) - 1,))
+            freeze_fields(self, dqs_fractions=(len(self.starts) - 1,))
         counts = np.diff(self.starts)
         if len(self.starts) == 0 or self.starts[0] != 0 or (counts < 0).any():
             raise RigError("starts: expected indices that begin at 0 and never decrease")

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, frozen
+from viewer.rig.arrays import Floats, freeze_fields
 
 # Ratio of the second to the first extent below which points are collinear, so that the rotation is
 # undetermined.
@@ -31,13 +31,7 @@ class Similarity:
     """(3,). Additional scales along the axes of the source space."""
 
     def __post_init__(self) -> None:
-        for name, shape in (
-            ("rotation", (3, 3)),
-            ("shift", (3,)),
-            ("factors", (3,)),
-            ("own_factors", (3,)),
-        ):
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        freeze_fields(self, rotation=(3, 3), shift=(3,), factors=(3,), own_factors=(3,))
         if not 0.0 < self.scale < np.inf:
             raise RigError(f"alignment: expected a scale above 0, found {self.scale:g}")
 

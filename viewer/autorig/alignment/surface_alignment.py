@@ -25,7 +25,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import Remedy, rounded
 from viewer.progress import part_of_work, report_fraction
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 
 SCALES = ("uniform", "axes", "none")
 """One common scale, one scale along each axis of the target, or the template's size unchanged."""
@@ -92,7 +92,7 @@ class AlignmentSettings:
             raise RigError(f'scale: expected {", ".join(SCALES)}, found "{self.scale}"')
         for name, shape in (("landmarks", (None, 2, 3)), ("matrix", (4, 4))):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+                freeze_fields(self, **{name: shape})
         if self.landmarks is not None and len(self.landmarks) < 3:
             raise RigError(f"landmarks: expected 3 or more pairs, found {len(self.landmarks)}")
 

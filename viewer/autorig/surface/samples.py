@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import triangle_areas
 
@@ -21,9 +21,8 @@ class SurfaceSamples:
     """(N, 3). Unit normals of the triangles on which they lie."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "positions", frozen("positions", self.positions, (None, 3)))
-        shape = (len(self.positions), 3)
-        object.__setattr__(self, "normals", frozen("normals", self.normals, shape))
+        freeze_fields(self, positions=(None, 3))
+        freeze_fields(self, normals=(len(self.positions), 3))
 
 
 def triangle_normals(positions: Floats, triangles: Ints) -> Floats:

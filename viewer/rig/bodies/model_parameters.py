@@ -12,7 +12,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
 
@@ -32,8 +32,7 @@ class ModelParameters:
     """(7 J, P). Joint parameters per unit of each model parameter: lengths, radians and octaves."""
 
     def __post_init__(self) -> None:
-        values = frozen("transform", self.transform, (None, len(self.names)))
-        object.__setattr__(self, "transform", values)
+        freeze_fields(self, transform=(None, len(self.names)))
 
     @property
     def count(self) -> int:

@@ -18,7 +18,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.skeleton import Skeleton
@@ -114,9 +114,9 @@ class NetworkFeature:
     """(N,). Value of each entry."""
 
     def __post_init__(self) -> None:
-        for name, dtype in (("outputs", np.int32), ("inputs", np.int32), ("entries", np.float64)):
-            values = frozen(name, getattr(self, name), (len(self.outputs),), dtype)
-            object.__setattr__(self, name, values)
+        count = len(self.outputs)
+        freeze_fields(self, np.int32, outputs=(count,), inputs=(count,))
+        freeze_fields(self, entries=(count,))
         ends = {"outputs": self.n_weights, "inputs": _WIDTH * max(self.n_joints - _FIRST, 0)}
         for name, end in ends.items():
             values = getattr(self, name)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Bytes, Floats, frozen
+from viewer.rig.arrays import Bytes, Floats, freeze_fields
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import (
     matrix_to_quaternion,
@@ -42,11 +42,9 @@ class CameraMotion:
 
     def __post_init__(self) -> None:
         count = len(self.rotations)
-        for name, shape in {"rotations": (count, 3, 3), "translations": (count, 3)}.items():
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        freeze_fields(self, rotations=(count, 3, 3), translations=(count, 3))
         if self.intrinsics is not None:
-            intrinsics = frozen("intrinsics", self.intrinsics, (count, 3, 3))
-            object.__setattr__(self, "intrinsics", intrinsics)
+            freeze_fields(self, intrinsics=(count, 3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +73,7 @@ class CameraMount:
     """The nodes that move the camera; None if they are still."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", frozen("matrix", self.matrix, (4, 4)))
+        freeze_fields(self, matrix=(4, 4))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,10 +104,8 @@ class CameraView:
     """The joint or the nodes that move it; rotation and translation then apply to the rest pose."""
 
     def __post_init__(self) -> None:
-        shapes = {"intrinsic": (3, 3), "rotation": (3, 3), "translation": (3,)}
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
-        object.__setattr__(self, "distortion", frozen("distortion", self.distortion, (None,)))
+        freeze_fields(self, intrinsic=(3, 3), rotation=(3, 3), translation=(3,))
+        freeze_fields(self, distortion=(None,))
 
 
 def view_at(view: CameraView, seconds: float) -> CameraView:

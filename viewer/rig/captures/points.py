@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.motion.samples import Samples
 from viewer.rig.motion.timing import Timing
 
@@ -31,8 +31,7 @@ class PointLayout:
 
     def __post_init__(self) -> None:
         count = len(self.names)
-        object.__setattr__(self, "limbs", frozen("limbs", self.limbs, (None, 2), np.int32))
-        object.__setattr__(self, "sides", frozen("sides", self.sides, (count,), np.int32))
+        freeze_fields(self, np.int32, limbs=(None, 2), sides=(count,))
         if self.limbs.size and not 0 <= self.limbs.min() <= self.limbs.max() < count:
             raise RigError(f"limbs: expected 0 to {count - 1}, found {self.limbs.max()}")
 
@@ -51,7 +50,7 @@ class PointClip:
     undefined."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen("points", self.points, (None, None, 4)))
+        freeze_fields(self, points=(None, None, 4))
 
     @property
     def start(self) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields, frozen
 
 _PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
 _LONG = 3.0  # multiple of the median radius above which pieces are split
@@ -45,13 +45,9 @@ class SurfacePoints:
     """(N,). Distances from the query points, in the mesh's unit."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
-
-        put("triangles", (None,), np.int32)
-        put("barycentric", (len(self.triangles), 3))
-        put("positions", (len(self.triangles), 3))
-        put("distances", (len(self.triangles),))
+        freeze_fields(self, np.int32, triangles=(None,))
+        count = len(self.triangles)
+        freeze_fields(self, barycentric=(count, 3), positions=(count, 3), distances=(count,))
 
 
 class Surface:

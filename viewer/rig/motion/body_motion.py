@@ -14,7 +14,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.phrases import counted, listed
-from viewer.rig.arrays import Floats, freeze, frozen
+from viewer.rig.arrays import Floats, freeze, freeze_fields, frozen
 from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.coefficients import apply_coefficients, space_misfit, unused_coefficients
 from viewer.rig.figure import Figure
@@ -101,9 +101,8 @@ class ParameterMotion:
 
     def __post_init__(self) -> None:
         count = len(self.parameters)
-        for name in ("parameters", "identity", "expression", "places"):
-            size = 3 if name == "places" else None
-            object.__setattr__(self, name, frozen(name, getattr(self, name), (count, size)))
+        freeze_fields(self, parameters=(count, None), identity=(count, None))
+        freeze_fields(self, expression=(count, None), places=(count, 3))
 
 
 def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:

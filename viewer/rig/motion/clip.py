@@ -20,7 +20,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.phrases import all_of
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields
 from viewer.rig.memo import Memo
 from viewer.rig.motion.samples import Samples
 from viewer.rig.motion.timing import DEFAULT_RATE
@@ -57,9 +57,9 @@ class Channel:
     """(before, after). Two of ``EXTRAPOLATIONS``."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "times", frozen("times", self.times, (None,)))
+        freeze_fields(self, times=(None,))
         count = len(self.times)
-        object.__setattr__(self, "values", frozen("values", self.values, (count,)))
+        freeze_fields(self, values=(count,))
         if len(self.tangents) != count:
             raise RigError(f"tangents: expected {count} pairs, found {len(self.tangents)}")
         if (np.diff(self.times) < 0).any():

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields
 
 SLOWEST, FASTEST = 1e-6, 1e6
 """Limits of the frame rate, outside which the times of long motions lose precision."""
@@ -62,7 +62,7 @@ class Timing:
     absent."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rows", frozen("rows", self.rows, (None,), np.int32))
+        freeze_fields(self, np.int32, rows=(None,))
         if not is_rate(self.frame_rate):
             raise RigError(f"frame rate: expected {RATES}, found {self.frame_rate:g}")
 

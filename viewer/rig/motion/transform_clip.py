@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.memo import Memo
 from viewer.rig.motion.samples import Samples
 from viewer.rig.motion.timing import DEFAULT_RATE
@@ -68,24 +68,21 @@ class TransformChannel:
     """(C,) int32 or None. Blend shape of each component; only for ``"weights"``."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
-
         if self.path not in TRANSFORM_PATHS or self.interpolation not in INTERPOLATIONS:
             raise RigError(f"channel: found {self.path!r} with {self.interpolation!r}")
-        put("times", (None,))
+        freeze_fields(self, times=(None,))
         count = len(self.times)
-        put("values", (count, _COMPONENTS.get(self.path)))
+        freeze_fields(self, values=(count, _COMPONENTS.get(self.path)))
         if count == 0 or (self.times[1:] <= self.times[:-1]).any():
             raise RigError("times: expected increasing seconds of at least one key")
         if (self.tangents is not None) != (self.interpolation == "cubic"):
             raise RigError("tangents: expected for cubic interpolation, and only there")
         if self.tangents is not None:
-            put("tangents", (count, 2, self.n_components))
+            freeze_fields(self, tangents=(count, 2, self.n_components))
         if (self.shapes is not None) != (self.path == "weights"):
             raise RigError("shapes: expected for weights, and only there")
         if self.shapes is not None:
-            put("shapes", (self.n_components,), np.int32)
+            freeze_fields(self, np.int32, shapes=(self.n_components,))
         if self.path == "rotation" and not self.values.any(axis=1).all():
             key = int(np.argmin(self.values.any(axis=1)))
             raise RigError(f"values of key {key}: expected a quaternion, found 0 0 0 0")

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields
 from viewer.rig.geometry.rotation import (
     axis_rotations,
     matrix_to_euler,
@@ -39,9 +39,8 @@ class PoseLayout:
     """Index of the figure's translation (three values) and scale (one); -1 for none."""
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "starts", frozen("starts", self.starts, (None,), np.int32))
-        put(self, "is_euler", frozen("is_euler", self.is_euler, (len(self.starts),), np.bool_))
+        freeze_fields(self, np.int32, starts=(None,))
+        freeze_fields(self, np.bool_, is_euler=(len(self.starts),))
 
 
 def rotation_rows(skeleton: Skeleton) -> Ints:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.arrays import Floats, Ints, freeze_fields, frozen
 
 OUTSIDE, INSIDE, PLANE = 0, 1, 2
 """Kinds of colliders."""
@@ -34,9 +34,8 @@ class Colliders:
         count = len(self.joints)
         kinds = self.kinds if len(self.kinds) else np.zeros(count, np.int32)
         object.__setattr__(self, "kinds", frozen("kinds", kinds, (count,), np.int32))
-        for name, shape in (("offsets", (count, 3)), ("tails", (count, 3)), ("radii", (count,))):
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
-        object.__setattr__(self, "joints", frozen("joints", self.joints, (count,), np.int32))
+        freeze_fields(self, offsets=(count, 3), tails=(count, 3), radii=(count,))
+        freeze_fields(self, np.int32, joints=(count,))
 
     @property
     def n_colliders(self) -> int:
@@ -74,16 +73,10 @@ class Springs:
     """Number of chains in the file."""
 
     def __post_init__(self) -> None:
-        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
-            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
-
         count = len(self.joints)
-        for name in ("tails", "gravities"):
-            put(name, (count, 3))
-        for name in ("stiffness", "drags", "radii"):
-            put(name, (count,))
-        for name in ("joints", "centers"):
-            put(name, (count,), np.int32)
+        freeze_fields(self, tails=(count, 3), gravities=(count, 3))
+        freeze_fields(self, stiffness=(count,), drags=(count,), radii=(count,))
+        freeze_fields(self, np.int32, joints=(count,), centers=(count,))
         if len(np.unique(self.joints)) != count:
             raise RigError("springs: expected each joint once")
         if not self.obstacles:
