@@ -23,8 +23,9 @@ from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
+from viewer.rig.geometry.topology import CLOSED, edges_of, part_volumes
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.mesh import Mesh, area_vectors, vertex_normals
 
 _INSIDE_OUT = math.radians(120.0)  # angle above which a triangle is reversed rather than folded
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
@@ -35,8 +36,6 @@ _TOGETHER = math.radians(80.0)
 # Two sides of a sheet cancel out if less than this fraction of the area around a vertex remains.
 _CANCELLED = 1e-3
 
-# Squared number of border edges per triangle, below which the volume's sign is reliable.
-_CLOSED = 0.25
 _MOST_REVERSED = 0.5  # fraction of the target's area above which an island is reversed
 
 MAX_ANGLE = 30.0
@@ -113,8 +112,7 @@ class Template:
 
 def sheet_normals(mesh: Welded) -> Floats:
     """Return unit normals (W, 3), 0 without triangles and where two sides of a sheet cancel out."""
-    a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
-    vectors = np.cross(b - a, c - a)
+    vectors = area_vectors(mesh.positions, mesh.triangles)
     corners, count = mesh.triangles.ravel(), len(mesh.positions)
     areas = np.bincount(corners, np.repeat(np.linalg.norm(vectors, axis=1), 3), minlength=count)
     columns = [
@@ -182,8 +180,7 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
     barycentric, found = np.tile([1.0, 0.0, 0.0], (count, 1)), positions.copy()
     grid = np.array([axes for axes in product((-1.0, 0.0, 1.0), repeat=3) if any(axes)])
     directions = unit(grid)
-    a, b, c = (template.positions[template.triangles[:, corner]] for corner in range(3))
-    faces = unit(np.cross(b - a, c - a))
+    faces = unit(area_vectors(template.positions, template.triangles))
     # Directions are grouped by the 26 directions of a cube's faces, edges and corners; each is
     # within 28 degrees of one of them. Each group is searched in its own subset of triangles.
     group = (normals @ directions.T).argmax(axis=1) if count else np.zeros(0, dtype=int)
@@ -278,23 +275,16 @@ def _keys(pairs: Ints, template: Welded) -> Ints:
 
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     """Return the vertices (V,) of parts whose triangles should be reversed."""
-    count = target.n_islands
     of = target.islands[target.triangles[:, 0]]
-    corners = target.positions[target.triangles]
-    members = np.bincount(of, minlength=count)
-    sums = [np.bincount(of, corners[:, :, k].mean(axis=1), minlength=count) for k in range(3)]
-    middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
-    a, b, c = (corners[:, k] - middle[of] for k in range(3))
-    # An island that is wound backwards encloses a negative volume, sum a . (b x c) / 6 about its
-    # middle. The sign is reliable if it is closed except for small holes, or has more than half of
-    # the area.
-    volumes = np.bincount(of, np.einsum("ta,ta->t", a, np.cross(b, c)), minlength=count)
-    areas = np.bincount(of, np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
-    is_whole = _border_edges(target, of) ** 2 <= _CLOSED * members
+    count = target.n_islands
+    volumes, areas, members = part_volumes(target.positions[target.triangles], of, count)
+    # An island that is wound backwards encloses a negative volume. The sign is reliable if it is
+    # closed except for small holes, or has more than half of the area.
+    borders = np.bincount(np.repeat(of, 3)[edges_of(target.triangles).counts == 1], None, count)
+    is_whole = borders**2 <= CLOSED * members
     is_most = areas > _MOST_REVERSED * areas.sum()
-    wrong = (volumes < 0.0) & (is_whole | is_most)
-    chosen = np.isin(np.arange(count), facing_away) & wrong
-    return chosen[target.islands][target.vertices]
+    wrong = np.flatnonzero((volumes < 0.0) & (is_whole | is_most))
+    return np.isin(target.islands, np.intersect1d(wrong, facing_away))[target.vertices]
 
 
 def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
@@ -310,13 +300,3 @@ def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
 
 def _reversed(triangles: Ints, rows: Bools) -> Ints:
     return np.where(rows[:, None], triangles[:, ::-1], triangles)
-
-
-def _border_edges(target: Welded, of: Ints) -> Any:
-    """Return the number of edges of each island that belong to only one triangle."""
-    edges = target.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    low, high = edges.min(axis=1).astype(np.int64), edges.max(axis=1)
-    _, first, counts = np.unique(
-        low * len(target.positions) + high, return_index=True, return_counts=True
-    )
-    return np.bincount(of[first[counts == 1] // 3], minlength=target.n_islands)

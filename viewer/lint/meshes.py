@@ -8,18 +8,22 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Indices, Subject
 from viewer.phrases import agree, counted, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.topology import Edges, edges_of, orientations, welded
+from viewer.rig.geometry.topology import (
+    CLOSED,
+    HOLLOW,
+    Edges,
+    edges_of,
+    orientations,
+    part_volumes,
+    welded,
+)
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.inspection.faults import stray_vertices
-from viewer.rig.mesh import Mesh, flat_triangles
+from viewer.rig.mesh import Mesh, area_vectors, flat_triangles
 
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # maximum length of a zero normal
 _AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are smoothed over an edge
-# Squared number of border edges per triangle: with smaller holes, the sign of the volume is
-# reliable.
-_CLOSED = 0.25
-_HOLLOW = 1e-6  # volume within rounding, relative to area^1.5, as of two coincident caps
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -192,21 +196,15 @@ def _inside_out(
     edges: Edges,
 ) -> list[Finding]:
     """Report closed components with negative volume, sum a . (b x c) / 6."""
-    count = len(valid)
+    corners = mesh.positions[mesh.triangles[valid]]
+    volumes, areas, members = part_volumes(corners, component, len(valid), signs)
+    # Missing triangles do not close a surface, because it may have had a border there.
     is_known = signs != 0.0
-    members = np.bincount(component, is_known, minlength=count)
-    open_edges = _open_edges(component, is_known, edges)
-    centers = mesh.positions[mesh.triangles[valid]].mean(axis=1)
-    sums = [
-        np.bincount(component, centers[:, axis] * is_known, minlength=count) for axis in range(3)
-    ]
-    middle = np.stack(sums, axis=1) / np.maximum(members, 1)[:, None]
-    a, b, c = (mesh.positions[mesh.triangles[valid, k]] - middle[component] for k in range(3))
-    volumes = signs * np.einsum("ta,ta->t", a, np.cross(b, c))
-    total = np.bincount(component, volumes, minlength=count)
-    areas = np.bincount(component, np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
-    is_closed = open_edges**2 <= _CLOSED * members
-    wrong = np.flatnonzero((total < -_HOLLOW * areas**1.5) & is_closed & (members >= 4))
+    alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
+    beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
+    owners = component[np.concatenate([alone, beside])]
+    is_closed = np.bincount(owners, minlength=len(valid)) ** 2 <= CLOSED * members
+    wrong = np.flatnonzero((volumes < -HOLLOW * areas**1.5) & is_closed & (members >= 4))
     if len(wrong) == 0:
         return []
     triangles = valid[np.isin(component, wrong)]
@@ -221,14 +219,6 @@ def _inside_out(
             are=agree(len(wrong), "is", "are"),
         )
     ]
-
-
-def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
-    """Return each component's number of edges with a single valid triangle: (T,)."""
-    alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
-    beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
-    owners = component[np.concatenate([alone, beside])]
-    return np.bincount(owners, minlength=len(component))
 
 
 def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
@@ -264,8 +254,7 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
 def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
     """Report normals that point to the opposite side of all triangles at their vertex."""
     corners = mesh.triangles[valid]
-    a, b, c = (mesh.positions[corners[:, k]] for k in range(3))
-    facing = unit(np.cross(b - a, c - a))
+    facing = unit(area_vectors(mesh.positions, corners))
     cosines = np.einsum("tka,ta->tk", unit(mesh.normals)[corners], facing)
     places, count = corners.ravel(), mesh.n_vertices
     numbers = np.bincount(places, minlength=count)

@@ -1,6 +1,6 @@
 import numpy as np
 
-from viewer.autorig.surface.welding import edges, islands, non_manifold_edges, weld
+from viewer.autorig.surface.welding import edges, islands, weld
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 
@@ -75,8 +75,3 @@ def test_edges_are_listed_once():
         [1, 3],
         [2, 3],
     ]
-
-
-def test_edges_of_three_triangles_are_non_manifold():
-    assert non_manifold_edges(np.array([[0, 1, 2], [1, 0, 3]])).tolist() == []
-    assert non_manifold_edges(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])).tolist() == [[0, 1]]

@@ -63,3 +63,10 @@ def test_flipped_triangles_of_a_grid_are_found(seed: int) -> None:
 def test_ties_are_resolved_in_favour_of_the_first_triangle() -> None:
     triangles = np.array([[0, 1, 2], [0, 1, 3]])  # both run from 0 to 1
     assert orientations(2, edges_of(triangles))[1].tolist() == [False, True]
+
+
+def test_triangles_of_each_edge_are_counted() -> None:
+    two = edges_of(np.array([[0, 1, 2], [1, 0, 3]]))
+    assert two.counts.tolist() == [2, 1, 1, 2, 1, 1] and two.pairs.tolist() == [[0, 1]]
+    three = edges_of(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]]))
+    assert three.counts.tolist() == [3, 1, 1, 3, 1, 1, 3, 1, 1] and len(three.pairs) == 0

@@ -19,6 +19,7 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.geometry.topology import edges_of, welded
 from viewer.rig.geometry.vectors import unit
 
 _FAR = 3.0  # multiple of the median distance, above which pairs are rejected
@@ -80,7 +81,10 @@ class Triangles:
         self.samples = sample_surface(positions, triangles, count)
         self._surface = Surface(positions, triangles)
         self._normals = triangle_normals(positions, triangles)
-        self._border = _border_edges(positions, triangles)
+        # Corner k is opposite the edge that starts at the next corner. Coincident vertices are
+        # treated as one: a texture seam is not a border.
+        counts = edges_of(welded(positions, triangles)).counts.reshape(-1, 3)
+        self._border = np.roll(counts, -1, axis=1) == 1
         self.size = _size(positions[triangles].reshape(-1, 3))
 
     def find(self, points: Floats) -> _Found:
@@ -94,17 +98,6 @@ class Triangles:
 
 def _size(points: Floats) -> float:
     return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-
-
-def _border_edges(positions: Floats, triangles: Ints) -> Bools:
-    """Return for each corner whether the opposite edge belongs to only one triangle: (T, 3)."""
-    _, place = np.unique(positions, axis=0, return_inverse=True)
-    # Coincident vertices are treated as one: a texture seam is not a border.
-    corners = place.reshape(-1)[triangles].astype(np.int64)
-    edges = np.sort(corners[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
-    keys = edges[..., 0] * (int(place.max()) + 1) + edges[..., 1]
-    _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    return (counts[inverse.reshape(-1)] == 1).reshape(triangles.shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

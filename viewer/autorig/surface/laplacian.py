@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from viewer.autorig.surface.welding import Welded, edges, non_manifold_edges
+from viewer.autorig.surface.welding import Welded, edges
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.topology import edges_of
 
 # Cotangent of 0.6 degrees; triangles with smaller angles are treated as equilateral.
 _STEEPEST = 100.0
@@ -24,7 +25,8 @@ def laplacian(mesh: Welded) -> tuple[Any, Floats]:
     """
     # Islands with non-manifold edges have no cotangent operator: they get the graph Laplacian of
     # their edges, and their vertices all have the mesh's mean area.
-    broken = np.unique(mesh.islands[non_manifold_edges(mesh.triangles)])
+    crowded = mesh.triangles.ravel()[edges_of(mesh.triangles).counts > 2]
+    broken = np.unique(mesh.islands[crowded])
     is_broken: Bools = np.isin(mesh.islands, broken)
     graph_like = is_broken[mesh.triangles[:, 0]]
     sound = mesh.triangles[~graph_like]

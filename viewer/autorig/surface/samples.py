@@ -8,7 +8,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, freeze_fields
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import triangle_areas
+from viewer.rig.mesh import area_vectors, triangle_areas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,8 +27,7 @@ class SurfaceSamples:
 
 def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
     """Return unit normals of triangles, 0 for triangles without area: (T, 3)."""
-    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
-    return unit(np.cross(b - a, c - a))
+    return unit(area_vectors(positions, triangles))
 
 
 def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSamples:

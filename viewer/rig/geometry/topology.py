@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.mesh import Mesh, area_vectors
+from viewer.rig.mesh import Mesh
 from viewer.rig.skin import Skin, skin_rows
 
 Indices = NDArray[np.int64]
@@ -21,9 +21,11 @@ Indices = NDArray[np.int64]
 _MOST_TRIANGLES = 500_000
 _MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
 
-# Maximum squared number of edges of openings per triangle for which the volume's sign is reliable.
-_CLOSED = 0.25
-_HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
+CLOSED = 0.25
+"""Squared number of border edges per triangle of a part, up to which its volume's sign is reliable:
+the area of a hole grows with the square of its border."""
+HOLLOW = 1e-6
+"""Volume relative to area^1.5 below which it is rounding, as for two coincident sheets."""
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
@@ -31,7 +33,8 @@ def welded(positions: Floats, triangles: Ints) -> Indices:
     # Sorting rows as three keys is several times faster than np.unique over rows.
     order = np.lexsort(positions.T)
     ordered = positions[order]
-    is_new = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
+    is_new = np.ones(len(order), dtype=np.bool_)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
     groups = np.cumsum(is_new) - 1
     first = np.full(int(groups[-1]) + 1 if len(groups) else 0, len(positions))
     np.minimum.at(first, groups, order)
@@ -57,7 +60,7 @@ class Edges:
     neighbours do."""
 
 
-def edges_of(corners: Indices) -> Edges:
+def edges_of(corners: Ints | Indices) -> Edges:
     """Return the edges of triangles (T, 3); pairs exclude those between equal vertices."""
     start = corners.ravel().astype(np.int64)
     end = np.roll(corners, -1, axis=1).ravel().astype(np.int64)
@@ -72,7 +75,7 @@ def edges_of(corners: Indices) -> Edges:
     return Edges(keys, forward, counts, order // 3, agree)
 
 
-def components(count: int, pairs: Indices) -> Indices:
+def components(count: int, pairs: Ints | Indices) -> Indices:
     """Return the smallest member of each node's component: (count,); ``pairs``: (P, 2)."""
     # In each round, every root takes the smallest label across its edges, and labels are followed
     # until they refer to themselves, so the number of rounds is logarithmic in the number of nodes.
@@ -115,6 +118,29 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     return component, flipped, one_sided
 
 
+def part_volumes(
+    corners: Floats, parts: Ints | Indices, count: int, signs: Floats | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """Return the volume, area and number of triangles of each part of a surface: (count,) each.
+
+    ``corners``: (T, 3, 3). ``parts``: (T,), part of each triangle. ``signs``: (T,), -1 for
+    triangles that count as flipped, 0 for those whose volume is unknown. The volume is negative if
+    a part is inside out.
+    """
+    signs = np.ones(len(corners)) if signs is None else signs
+    is_known = (signs != 0.0).astype(np.float64)
+    members = np.bincount(parts, is_known, count).astype(np.float64)
+    # All tetrahedra of a part, with the volume a . (b x c) / 6, share its middle as a corner, so
+    # that a small hole hardly changes the sum.
+    centers = corners.mean(axis=1) * is_known[:, None]
+    sums = [np.bincount(parts, centers[:, axis], count) for axis in range(3)]
+    middle = np.stack(sums, axis=1) / np.maximum(members, 1.0)[:, None]
+    a, b, c = np.moveaxis(corners - middle[parts][:, None], 1, 0)
+    volumes = np.bincount(parts, signs * np.einsum("ta,ta->t", a, np.cross(b, c)), count) / 6.0
+    areas = np.bincount(parts, np.linalg.norm(np.cross(b - a, c - a), axis=1), count) / 2.0
+    return volumes, areas, members
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Shell:
     """A closed surface whose triangles are counter-clockwise from outside."""
@@ -150,11 +176,16 @@ def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     corners = corners[(a != b) & (b != c) & (c != a)]
     if _has_long_borders(corners, mesh.n_vertices):
         return None
-    found = _neighbours(corners)
-    if found is None:
+    edges = edges_of(corners)
+    is_open = edges.counts == 1
+    if (edges.counts > 2).any() or not edges.agree.all() or is_open.sum() > _MOST_OPEN:
         return None
-    pairs, is_open = found
-    if is_open.sum() > _MOST_OPEN or not _face_outwards(mesh.positions, corners, pairs, is_open):
+    count = len(corners)
+    labels = components(count, edges.pairs)
+    volumes, areas, members = part_volumes(mesh.positions[corners], labels, count)
+    open_edges = np.bincount(np.repeat(labels, 3)[is_open], minlength=count)
+    is_outward = volumes > HOLLOW * areas**1.5
+    if not (is_outward & (open_edges**2 <= CLOSED * members))[members > 0].all():
         return None
     is_border = np.zeros(mesh.n_vertices, dtype=np.bool_)
     is_border[corners.ravel()[is_open]] = True
@@ -194,44 +225,3 @@ def _scattered(count: int) -> Floats:
     values = (values ^ values >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
     values = (values ^ values >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
     return ((values ^ values >> np.uint64(31)) >> np.uint64(34)).astype(np.float64)
-
-
-def _neighbours(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools] | None:
-    """Return pairs of adjacent triangles and which of the 3 T edges have no second triangle.
-
-    None if an edge has more than two triangles or two that traverse it in the same direction.
-    """
-    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    keys = np.minimum(start, end) * (int(start.max(initial=0)) + 1) + np.maximum(start, end)
-    order = np.argsort(keys)
-    ordered = keys[order]
-    twice = ordered[1:] == ordered[:-1]
-    if (twice[1:] & twice[:-1]).any():
-        return None
-    pairs = np.stack([order[:-1][twice], order[1:][twice]], axis=1)
-    forward = start < end
-    if (forward[pairs[:, 0]] == forward[pairs[:, 1]]).any():
-        return None
-    is_open = np.ones(len(keys), dtype=np.bool_)
-    is_open[pairs.ravel()] = False
-    return pairs // 3, is_open
-
-
-def _face_outwards(
-    positions: Floats, corners: NDArray[np.int64], pairs: NDArray[np.int64], is_open: Bools
-) -> bool:
-    """Return whether every connected part encloses a positive volume."""
-    count = len(corners)
-    labels = components(count, pairs)
-    # The mean is the common corner of all tetrahedra, so a small opening hardly changes the sum.
-    centered = positions - positions.mean(axis=0)
-    doubled = area_vectors(centered, corners.astype(np.int32))
-    sums = np.einsum("ta,ta->t", centered[corners[:, 0]], doubled)
-    volumes = np.bincount(labels, sums / 6.0, count)
-    areas = np.bincount(labels, 0.5 * np.sqrt(np.einsum("ta,ta->t", doubled, doubled)), count)
-    sizes = np.bincount(labels, minlength=count)
-    open_edges = np.bincount(np.repeat(labels, 3)[is_open], minlength=count)
-    parts = sizes > 0
-    is_outward = volumes[parts] > _HOLLOW * areas[parts] ** 1.5
-    is_closed = open_edges[parts] ** 2 <= _CLOSED * sizes[parts]
-    return bool((is_outward & is_closed).all())

@@ -8,6 +8,7 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.topology import edges_of, welded
 from viewer.rig.mesh import bounding_box, triangle_areas, volume
 
 DENSITY = 985.0
@@ -53,18 +54,9 @@ def measure(figure: Figure) -> Measures:
 
 def _open_edges(positions: Floats, triangles: Ints) -> Ints:
     """Return the edges that belong to a single triangle, as vertices (E, 2)."""
-    corners: Ints = triangles
-    for merges in (False, True):
-        if merges:
-            # Vertices are often duplicated along texture seams.
-            same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
-            corners = same[triangles]
-        following = np.roll(corners, -1, axis=1)
-        low, high = np.minimum(corners, following), np.maximum(corners, following)
-        keys = low.astype(np.int64) * len(positions) + high
-        _, first, counts = np.unique(keys.reshape(-1), return_index=True, return_counts=True)
-        if (counts != 1).all():
-            break
-    chosen = first[counts == 1]
+    is_open = edges_of(triangles).counts == 1
+    if is_open.any():
+        # Vertices are often duplicated along texture seams.
+        is_open = edges_of(welded(positions, triangles)).counts == 1
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
-    return ends.reshape(-1, 2)[chosen]
+    return ends.reshape(-1, 2)[is_open]
