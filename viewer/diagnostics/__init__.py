@@ -17,6 +17,7 @@ from viewer.diagnostics.diagnostic import (
     Phrase,
     described,
     frame_range,
+    note,
 )
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ __all__ = [
     "Phrase",
     "described",
     "frame_range",
+    "note",
 ]
 
 

@@ -151,6 +151,11 @@ class Diagnostic:
         return ": ".join(filter(None, (self.place, self.message)))
 
 
+def note(key: str, path: Path | None = None, /, **values: Any) -> Diagnostic:
+    """Return a message, mostly about a whole file, with the values of its sentence."""
+    return Diagnostic(key, path, values=values)
+
+
 class Phrase:
     """Part of a sentence with values of its own; equal to its text."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, frame_range
+from viewer.diagnostics import Diagnostic, Phrase, frame_range, note
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._exporter import FOLDER, Content, Exporter, Part, SampledParts, Selection
 from viewer.export._left_out import motion_notes
@@ -366,9 +366,7 @@ def _plan(selection: Actor | Selection, path: Path, options: ExportOptions) -> _
         else "X003.no-skeleton: {figure}: no skeleton, not written"
     )
     omitted += [
-        Diagnostic(lacking, values={"figure": part.actor.name})
-        for part in selection.parts
-        if part not in able
+        note(lacking, figure=part.actor.name) for part in selection.parts if part not in able
     ]
     if is_together(kind, path, options):
         parts = [part if scene is None else _placed(scene, part) for part in there]
@@ -406,13 +404,13 @@ def _span(part: Part) -> Phrase:
 
 def _absent_note(part: Part) -> Diagnostic:
     if part.frames is None or isinstance(part.frames, SampledParts):
-        return Diagnostic(
-            "X003.absent-now: {figure}: absent at that time, not written",
-            values={"figure": part.actor.name},
+        return note(
+            "X003.absent-now: {figure}: absent at that time, not written", figure=part.actor.name
         )
-    return Diagnostic(
+    return note(
         "X003.absent: {figure}: absent in {frames}, not written",
-        values={"figure": part.frames.name, "frames": _span(part)},
+        figure=part.frames.name,
+        frames=_span(part),
     )
 
 
@@ -432,9 +430,9 @@ def _untracked_note(plan: _Plan) -> list[Diagnostic]:
                 names.append(printable(path.name if len(each.parts) == 1 else part.frames.name))
     return (
         [
-            Diagnostic(
+            note(
                 "X005.untracked: {names}: not tracked, possibly a different person in each frame",
-                values={"names": all_of(names)},
+                names=all_of(names),
             )
         ]
         if names
@@ -445,12 +443,7 @@ def _untracked_note(plan: _Plan) -> list[Diagnostic]:
 def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
     count = sum(len(actor.hidden_parts) for actor in actors)
     return (
-        [
-            Diagnostic(
-                "X005.hidden-parts: {n} also written",
-                values={"n": counted(count, "hidden part", "is", "are")},
-            )
-        ]
+        [note("X005.hidden-parts: {n} also written", n=counted(count, "hidden part", "is", "are"))]
         if count
         else []
     )

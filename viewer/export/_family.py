@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
 from viewer.export._options import ExportOptions
@@ -18,8 +18,8 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, root_positions
-from viewer.rig.motion.evaluation import Frames, frames_of, rest_translations_of
-from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.evaluation import Frames, frames_of
+from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, UNIT_NAMES
@@ -117,8 +117,7 @@ def family_frames(
     if up_axis(options) != options.world_up:
         # For another up axis the world is rotated by Q about x: R' = Q R, and as the root moves
         # from t + J0 to Q (t + J0) while J0 stays, t' = Q (t + J0) - J0.
-        angle = np.pi / 2 if up_axis(options) == "z" else -np.pi / 2
-        rotation = np.array([angle, 0.0, 0.0])
+        rotation = _quarter_turn(up_axis(options))
         rotations = rotations.copy()
         rotations[:, 0] = multiply(rotation_vector_to_quaternion(rotation), rotations[:, 0])
         # A rotation by 90 degrees has integer entries.
@@ -134,12 +133,12 @@ def family_frames(
     space = ShapeSpace(model or member.title)
     if not space.shares_coefficients(figure.shape_space):
         if any(rows.any() for rows in coefficients.values()):
-            values = {"own": figure.shape_space.model, "other": space.model}
             notes.append(
-                Diagnostic(
+                note(
                     "X003.other-shape-space: the shape coefficients of {own} do not apply to "
                     "{other} and are written as 0",
-                    values=values,
+                    own=figure.shape_space.model,
+                    other=space.model,
                 )
             )
         coefficients = {kind: np.zeros((1, rows.shape[1])) for kind, rows in coefficients.items()}
@@ -177,15 +176,11 @@ def _own_shapes(figure: Figure) -> list[Diagnostic]:
     if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
         return []
     return [
-        Diagnostic(
+        note(
             "X005.own-shape: shape and translation are those of {figure}, which is not an SMPL "
             "model: other models appear with another shape, and offset ({remedy})",
-            values={
-                "figure": figure.name,
-                "remedy": Remedy(
-                    "open another model before the motion", "--model selects the model"
-                ),
-            },
+            figure=figure.name,
+            remedy=Remedy("open another model before the motion", "--model selects the model"),
         )
     ]
 
@@ -195,7 +190,7 @@ def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
     notes = []
     if figure.unit != "m":
         unit = UNIT_NAMES[figure.unit]
-        notes.append(Diagnostic(wording.UNIT_CONVERTED, values={"unit": unit}))
+        notes.append(note(wording.UNIT_CONVERTED, unit=unit))
     if figure.mesh is None:
         remedy = Remedy(
             "translations are exact if that model is opened first",
@@ -203,10 +198,11 @@ def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
         )
         place = dict(zip("xyz", root.tolist(), strict=True))
         notes.append(
-            Diagnostic(
+            note(
                 "X005.own-root: translations are relative to the root at rest, ({x:z.4g}, "
                 "{y:z.4g}, {z:z.4g}) m: a model whose root is elsewhere is offset ({remedy})",
-                values={**place, "remedy": remedy},
+                **place,
+                remedy=remedy,
             )
         )
     return notes
@@ -218,17 +214,18 @@ def _losses(frames: Frames, skeleton: Skeleton, moved: Floats) -> list[Diagnosti
     farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
     if farthest > _NEGLIGIBLE:
         notes.append(
-            Diagnostic(
+            note(
                 "X003.body-translations: translations of joints are omitted (up to {distance} m)",
-                values={"distance": rounded(float(farthest))},
+                distance=rounded(float(farthest)),
             )
         )
     scales = frames.figure_scales[present]
     if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
-        values = {"low": rounded(float(scales.min()), 6), "high": rounded(float(scales.max()), 6)}
         notes.append(
-            Diagnostic(
-                "X003.body-scale: the figure's scale is omitted ({low} to {high})", values=values
+            note(
+                "X003.body-scale: the figure's scale is omitted ({low} to {high})",
+                low=rounded(float(scales.min()), 6),
+                high=rounded(float(scales.max()), 6),
             )
         )
     notes += joint_scales_note(
@@ -250,12 +247,19 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Export
     found = frames_of(figure, clip, np.arange(count) / timing.frame_rate)
     if up_axis(options) == options.world_up:
         return found
-    angle = -np.pi / 2 if up_axis(options) == "z" else np.pi / 2
-    # Frames in a rotated world: R' = Q R, T' = Q (p + T) - p; p is the root at rest.
-    vector = np.array([angle, 0.0, 0.0])
-    rotations = found.rotations.copy()
-    rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
-    root = rest_translations_of(animation.figure, found.shape_weights)[:, 0]
-    rotation = np.round(rotation_vector_to_matrix(vector))
-    places = (root + found.figure_translations) @ rotation.T - root
-    return replace(found, rotations=rotations, figure_translations=places)
+    back = -_quarter_turn(up_axis(options))
+    return rotated_frames(figure, found, rotation_vector_to_quaternion(back))
+
+
+def _quarter_turn(up: str) -> Floats:
+    """Return the rotation vector about x from the other up axis, y or z, to ``up``."""
+    return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
+
+
+def padded(rows: Floats, fewest: int) -> Floats:
+    """Return coefficients of at least ``fewest`` components, all others up to the last nonzero."""
+    used = np.flatnonzero(rows.any(axis=0))
+    width = max(fewest, int(used[-1]) + 1 if len(used) else 0)
+    found = np.zeros((len(rows), width))
+    found[:, : rows.shape[1]] = rows[:, :width]
+    return found

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.export._options import GAPS
 from viewer.phrases import agree, listed
@@ -39,10 +39,7 @@ def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> lis
     )
     done = Phrase({**_CLOSED, **how}[closing], poses=Phrase(held))
     return [
-        Diagnostic(
-            "X004.closed: missing {noun} {gaps}: {how}",
-            values={**_gaps(present, first_frame), "how": done},
-        )
+        note("X004.closed: missing {noun} {gaps}: {how}", **_gaps(present, first_frame), how=done)
     ]
 
 
@@ -74,6 +71,12 @@ def _gaps(present: Bools, first_frame: int) -> dict[str, object]:
     ]
     n = int((~present).sum())
     return {"n": n, "gaps": listed(found), "noun": agree(n, "frame", "frames")}
+
+
+def check_gaps(gaps: str) -> None:
+    """Raise RigError unless a handling of gaps is a key of ``GAPS``."""
+    if gaps not in GAPS:
+        raise RigError(f'handling of gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
 
 
 def filled(frames: Frames, interpolate: bool) -> Frames:
@@ -109,8 +112,7 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
 
 def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, list[Diagnostic]]:
     """Return frames with gaps unless ``gaps`` asks to close them, and a note about closed ones."""
-    if gaps not in ("", *GAPS):
-        raise RigError(f'handling of gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
+    check_gaps(gaps or "split")
     present = frames.present
     if gaps in ("", "split") or present.all() or not present.any():
         return frames, []

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.phrases import all_of, counted, listed, rounded
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -47,17 +47,12 @@ def joint_scales_note(frames: Frames, skeleton: Skeleton, key: str) -> list[Diag
     changed = scales[np.abs(scales - skeleton.rest_scales) > _NEGLIGIBLE]
     if not len(changed):
         return []
-    values = {"low": rounded(float(changed.min()), 6), "high": rounded(float(changed.max()), 6)}
-    return [Diagnostic(key, values=values)]
+    return [note(key, low=rounded(float(changed.min()), 6), high=rounded(float(changed.max()), 6))]
 
 
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:
     """Return a note that lists the parts that a format cannot store, if there are any."""
-    return (
-        [Diagnostic(wording.PARTS, values={"format": kind, "parts": all_of(parts)})]
-        if parts
-        else []
-    )
+    return [note(wording.PARTS, format=kind, parts=all_of(parts))] if parts else []
 
 
 def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnostic]:
@@ -70,12 +65,10 @@ def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnosti
     if not names:
         return []
     return [
-        Diagnostic(
+        note(
             "X003.other-animations: {n} not written: {names}",
-            values={
-                "names": listed(names, 8),
-                "n": counted(len(names), "other animation", "is", "are"),
-            },
+            names=listed(names, 8),
+            n=counted(len(names), "other animation", "is", "are"),
         )
     ]
 
@@ -86,10 +79,10 @@ def rate_note(animation: SampledAnimation) -> list[Diagnostic]:
     if motion.kind != "transforms" or is_regular(motion) or rate != motion.frame_rate:
         return []
     return [
-        Diagnostic(
+        note(
             "X005.irregular-keys: the keys are at irregular times, so the motion is sampled at "
             "{rate:g} frames per second",
-            values={"rate": rate},
+            rate=rate,
         )
     ]
 

@@ -18,32 +18,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError
+from viewer.diagnostics import Diagnostic, note
 from viewer.export._exporter import Selection
 from viewer.export._family import (
     FamilyFrames,
     check_unit,
     family_frames,
     member_of_figure,
+    padded,
     read_frames,
     up_axis,
 )
-from viewer.export._gaps import filled, gaps_note
+from viewer.export._gaps import check_gaps, filled, gaps_note
 from viewer.export._losses.motion_errors import frames_losses, resampling_losses
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import GAPS, ExportOptions
+from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.phrases import counted
-from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
 Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
 """Returns the arrays of a range of rows, given the frame rate and the up axis."""
-_FEWEST = 16  # minimum number of shape coefficients, as readers of AMASS require
+FEWEST = 16
+"""Minimum number of shape coefficients, as readers of AMASS require."""
 _CLOSED = {
     "hold": "{poses}, and the frames are marked in present",
     "interpolate": "interpolated along the shorter arc, and marked in present",
@@ -85,10 +85,7 @@ def write_layout(
     check_unit(options, title)
     member = member_of_figure(animation.figure, f"an {title} motion", ("pelvis",))
     present = animation.frames.present
-    if options.closing not in GAPS:
-        raise RigError(
-            f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
-        )
+    check_gaps(options.closing)
     frames = filled(animation.frames, options.closing == "interpolate")
     model = title if title == "SMPL-X" else member.title
     body, notes = family_frames(animation, frames, member, options, model)
@@ -103,15 +100,14 @@ def write_layout(
             if not is_split and not present.all():
                 arrays["present"] = present
             save_arrays(file, arrays)
-            values = {
-                "n": counted(stop - start, "frame"),
-                "model": member.title if title == "AMASS" else title,
-                "rate": animation.frame_rate,
-                "up": up,
-            }
             written.append(
-                Diagnostic(
-                    "X001.amass: {n} of {model} at {rate:g} fps, {up} up", file, values=values
+                note(
+                    "X001.amass: {n} of {model} at {rate:g} fps, {up} up",
+                    file,
+                    n=counted(stop - start, "frame"),
+                    model=member.title if title == "AMASS" else title,
+                    rate=animation.frame_rate,
+                    up=up,
                 )
             )
     lost = []
@@ -128,7 +124,7 @@ def write_layout(
 
 
 def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
-    shape = padded(body.shape)
+    shape = padded(body.shape, FEWEST)
     vectors = body.vectors[part]
     arrays: dict[str, NDArray[Any]] = {
         "poses": vectors.reshape(len(vectors), -1),
@@ -145,12 +141,3 @@ def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, 
         rows = np.broadcast_to(body.expression, (len(body.vectors), body.expression.shape[1]))
         arrays["expressions"] = rows[part].copy()
     return arrays
-
-
-def padded(shape: Floats) -> Floats:
-    """Return shape coefficients padded to the usual number, without trailing zeros beyond it."""
-    used = np.flatnonzero(shape.any(axis=0))
-    count = max(_FEWEST, int(used[-1]) + 1 if len(used) else 0)
-    padded = np.zeros((len(shape), count))
-    padded[:, : shape.shape[1]] = shape[:, :count]
-    return padded

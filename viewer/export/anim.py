@@ -10,11 +10,11 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
-from viewer.export._gaps import filled, gaps_note
+from viewer.export._gaps import check_gaps, filled, gaps_note
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.motion_errors import between_losses, frames_losses
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import GAPS, ExportOptions
+from viewer.export._options import ExportOptions
 from viewer.export.bvh.angles import euler_angles, unrolled
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.phrases import counted, optional
@@ -51,10 +51,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     figure, frames = animation.figure, animation.frames
     require(figure)
     skeleton = figure.require_skeleton()
-    if options.closing not in GAPS:
-        raise RigError(
-            f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
-        )
+    check_gaps(options.closing)
     if animation.motion.kind == "curves" and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
             write(animation.motion, path)

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError, RigError
 from viewer.export._exporter import Selection
@@ -34,6 +34,7 @@ from viewer.export._family import (
     check_unit,
     family_frames,
     member_of_figure,
+    padded,
     read_frames,
     up_axis,
 )
@@ -96,18 +97,14 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         people.append(_Person(taken, animation, _Records(person, body), _ReadRecords(member)))
         if body.gender != "neutral":
             losses.append(
-                Diagnostic(
+                note(
                     "X003.gender: EasyMocap cannot store the gender: open the folder {remedy}",
-                    values={
-                        "gender": body.gender,
-                        "remedy": Remedy(
-                            f"after the {body.gender} model", f"with --gender {body.gender}"
-                        ),
-                    },
+                    gender=body.gender,
+                    remedy=Remedy(f"after the {body.gender} model", f"with --gender {body.gender}"),
                 )
             )
         own = [*losses, *filling, *kept_note(frames.present, taken.first_frame)]
-        notes += own if len(animations) == 1 else [_of_person(person, note) for note in own]
+        notes += own if len(animations) == 1 else [_of_person(person, each) for each in own]
     first = min(animation.first_frame for animation in animations)
     stop = max(animation.first_frame + animation.frames.n_frames for animation in animations)
     with _new_folder(path) as folder:
@@ -119,20 +116,17 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
         # Within the block: parts of the figure may be read now, and the file may be damaged.
         errors = [line for person in people for line in person.losses(path / _FOLDER, options)]
-    values = {
-        "n": counted(stop - first, "frame"),
-        "people": Shown(
-            "1 person" if len(animations) == 1 else f"{len(animations)} people", len(animations)
-        ),
-        "up": up_axis(options),
-        "rate": animations[0].frame_rate,
-    }
     return [
-        Diagnostic(
+        note(
             "X001.easymocap: {n} of {people}, {up} up; EasyMocap does not store the frame rate of "
             "{rate:g} fps",
             path / _FOLDER,
-            values=values,
+            n=counted(stop - first, "frame"),
+            people=Shown(
+                "1 person" if len(animations) == 1 else f"{len(animations)} people", len(animations)
+            ),
+            up=up_axis(options),
+            rate=animations[0].frame_rate,
         ),
         *errors,
         *notes,
@@ -144,9 +138,9 @@ def require(figure: Figure) -> None:
     member_of_figure(figure, "an EasyMocap folder", ("pelvis", "wrist"))
 
 
-def _of_person(person: int, note: Diagnostic) -> Diagnostic:
-    values = {"person": person_label(person), "remark": note}
-    return Diagnostic(f"{note.code}.of-person: {{person}}: {{remark}}", values=values)
+def _of_person(person: int, remark: Diagnostic) -> Diagnostic:
+    sentence = f"{remark.code}.of-person: {{person}}: {{remark}}"
+    return note(sentence, person=person_label(person), remark=remark)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,10 +200,10 @@ class _Records:
             ("Rh", body.vectors[:, 0]),
             ("Th", body.about_origin()),
             ("poses", poses),
-            ("shapes", _used(body.shape, count)),
+            ("shapes", _every_frame(body.shape, count)),
         ]
         if body.has_expression:
-            self.parts.append(("expression", _used(body.expression, count)))
+            self.parts.append(("expression", _every_frame(body.expression, count)))
 
         self._first, self._texts = 0, list[list[str]]()
 
@@ -263,13 +257,10 @@ class _ReadRecords:
         return np.array([record[key] for record in self._rows], dtype=np.float64)
 
 
-def _used(rows: Floats, count: int) -> Floats:
-    """Return the coefficients of every frame: ten, or all up to the last nonzero one."""
-    used = np.flatnonzero(rows.any(axis=0))
-    width = max(_SHAPES, int(used[-1]) + 1 if len(used) else 0)
-    padded = np.zeros((count, width))
-    padded[:, : rows.shape[1]] = rows[:, :width]
-    return padded
+def _every_frame(rows: Floats, count: int) -> Floats:
+    """Return coefficients (F, S) or (1, S) for each of ``count`` frames."""
+    found = padded(rows, _SHAPES)
+    return np.repeat(found, count // len(found), axis=0)
 
 
 @contextlib.contextmanager

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._gaps import kept_gaps
@@ -87,7 +87,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
         losses.look(pose, _read(again, "vertices"), _read(again, "joints"))
     notes = losses.notes(path)
     return [
-        Diagnostic("X001.arrays: arrays {names}", path, values={"names": all_of([*arrays])}),
+        note("X001.arrays: arrays {names}", path, names=all_of([*arrays])),
         *notes,
     ]
 
@@ -137,11 +137,9 @@ def _export_frames(
     with keeping_written() as saved, all_or_none([path]):
         save_arrays(path, arrays)
         errors = _motion_losses(animation, open_archive(Source(path, saved[path])), path, options)
-    values = {**_counts(frames.present, animation.frame_rate), "names": all_of([*arrays])}
-    note = Diagnostic(
-        "X001.motion-arrays: {n} at {rate:g} fps{missing}: {names}", path, values=values
-    )
-    return [note, *filling, *errors]
+    counts = _counts(frames.present, animation.frame_rate)
+    sentence = "X001.motion-arrays: {n} at {rate:g} fps{missing}: {names}"
+    return [note(sentence, path, **counts, names=all_of([*arrays])), *filling, *errors]
 
 
 def _motion_losses(
@@ -188,14 +186,13 @@ def _export_points(
     }
     arrays |= _point_arrays(animation.layout, points, animation.confidences)
     save_arrays(path, arrays)
-    values = {
-        **_counts(animation.present, animation.frame_rate),
-        "up": up,
-        "names": all_of([*arrays]),
-    }
     return [
-        Diagnostic(
-            "X001.point-arrays: {n} at {rate:g} fps{missing}, {up} up: {names}", path, values=values
+        note(
+            "X001.point-arrays: {n} at {rate:g} fps{missing}, {up} up: {names}",
+            path,
+            **_counts(animation.present, animation.frame_rate),
+            up=up,
+            names=all_of([*arrays]),
         )
     ]
 

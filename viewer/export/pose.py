@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.errors import RigError
 from viewer.export._exporter import Selection
 from viewer.export._left_out import not_held_note
@@ -45,9 +45,7 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     losses, how = PoseLosses(figure, skinning.unreduced()), skinning.unreduced()
     vertices = None if figure.mesh is None else deform(figure, again, how)[0]
     losses.look(pose, vertices, joint_matrices(figure, again)[:, :3, 3])
-    notes = [
-        Diagnostic("X001.pose: {n}", path, values={"n": counted(figure.skeleton.n_dofs, "DOF")})
-    ]
+    notes = [note("X001.pose: {n}", path, n=counted(figure.skeleton.n_dofs, "DOF"))]
     notes += losses.notes(path)
     lost = _lost(figure.skeleton, pose, again)
     if stored.shape_space != record.shape_space:

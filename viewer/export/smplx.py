@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, note
 from viewer.export._exporter import Selection
-from viewer.export._family import FamilyFrames, member_of_figure
+from viewer.export._family import FamilyFrames, member_of_figure, padded
 from viewer.export._options import ExportOptions
-from viewer.export.amass import padded, write_layout
+from viewer.export.amass import FEWEST, write_layout
 from viewer.phrases import Remedy, counted
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
@@ -54,20 +54,18 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
     if len(animation.frames.shape_weights) > 1:
         n_present = int(animation.frames.present.sum())
         notes.append(
-            Diagnostic(
+            note(
                 "X005.shape-averaged: the shape changes: betas are its average over {n}",
-                values={"n": counted(n_present, "frame")},
+                n=counted(n_present, "frame"),
             )
         )
     if len(animation.figure.require_skeleton().names) != len(_MEMBER.names):
         notes.append(
-            Diagnostic(
+            note(
                 "X005.as-smplx: {figure} is not SMPL-X: translations are exact only with an SMPL-X "
                 "model{remedy}",
-                values={
-                    "figure": animation.figure.name,
-                    "remedy": Remedy(", opened before the motion", " (--model)"),
-                },
+                figure=animation.figure.name,
+                remedy=Remedy(", opened before the motion", " (--model)"),
             )
         )
     return notes
@@ -89,7 +87,7 @@ def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, 
     }
     # Filled frames repeat or blend others and must not count.
     rows = body.shape if len(body.shape) == 1 else body.shape[body.present]
-    shape = padded(rows.mean(axis=0, keepdims=True))[0]
+    shape = padded(rows.mean(axis=0, keepdims=True), FEWEST)[0]
     return arrays | {
         "poses": vectors.reshape(count, -1),
         "trans": body.translations[part],

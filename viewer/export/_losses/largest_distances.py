@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.export._losses.posed_bodies import Rows, Side, body_rows, vertices
 from viewer.phrases import Shown, brief, optional
 from viewer.progress import report
@@ -247,7 +247,7 @@ def apart_notes(
         "extent": optional(" ({})", extent_of(found)),
     }
     key += "{extent}{causes}{estimate}{rate}"
-    return [Diagnostic(key, path, values={**values, **_NO_REASONS})]
+    return [note(key, path, **values, **_NO_REASONS)]
 
 
 def with_values(notes: list[Diagnostic], **values: object) -> list[Diagnostic]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, note
 from viewer.export._losses.largest_distances import (
     Apart,
     Farthest,
@@ -107,16 +107,13 @@ def look_at_mesh(
         losses.look(actor.pose, found.positions, frame=frame)
     if is_same and np.array_equal(found.triangles, mesh.triangles):
         return []
-    values = {
-        "n": counted(found.n_triangles, "triangle"),
-        "all": counted(mesh.n_triangles, "triangle"),
-        "vertices": counted(found.n_vertices, "vertex"),
-    }
     return [
-        Diagnostic(
+        note(
             "X002.topology: {n} on {vertices} were read back instead of the {all} of the figure",
             source.path,
-            values=values,
+            n=counted(found.n_triangles, "triangle"),
+            all=counted(mesh.n_triangles, "triangle"),
+            vertices=counted(found.n_vertices, "vertex"),
         )
     ]
 

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.diagnostics import Diagnostic, Phrase, note, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._source import Source, remark_on
@@ -392,21 +392,23 @@ class _Reading:
         if unseen:
             people = [*map(person_label, unseen)]
             found.append(
-                Diagnostic(
+                note(
                     "F007.record-unseen: {name}: no keypoint of {people} is ever visible: every "
                     "confidence is 0",
-                    values={**values, "people": listed(people)},
+                    **values,
+                    people=listed(people),
                 )
             )
         if self._names:
             names = [f"{number}: {printable(name, 40)}" for name, number in self._names.items()]
-            found.append(Diagnostic(wording.PERSON_NAMES, values={"names": listed(names)}))
+            found.append(note(wording.PERSON_NAMES, names=listed(names)))
         more = self._n_faults - _MOST_WARNINGS
         if more > 0:
             found.append(
-                Diagnostic(
+                note(
                     "F007.records: {name}: {n} in frame files",
-                    values={**values, "n": counted(more, "more error")},
+                    **values,
+                    n=counted(more, "more error"),
                 )
             )
         return found

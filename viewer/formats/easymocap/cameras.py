@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source, remark_on
 from viewer.formats._text.numbers import to_number
@@ -89,12 +89,11 @@ def find_cameras(
                 ]
         if there:
             lacking = _EXTRINSIC if there == [_INTRINSIC] else _INTRINSIC
-            values = {"name": lacking}
             return (), [
-                Diagnostic(
+                note(
                     "F007.cameras-beside: no {name} in the same folder; cameras omitted",
                     folder / there[0],
-                    values=values,
+                    name=lacking,
                 )
             ]
     return (), []
@@ -390,8 +389,9 @@ class ImageFolders:
         except FormatError as problem:
             self._faults[path] = str(problem)
         except OSError as problem:
-            values = {"reason": str(problem.strerror or problem)}
-            self._faults[path] = str(Diagnostic(wording.PICTURE, path, values=values))
+            self._faults[path] = str(
+                note(wording.PICTURE, path, reason=str(problem.strerror or problem))
+            )
         return None
 
     def size_of(self, camera: str) -> tuple[int, int] | None:

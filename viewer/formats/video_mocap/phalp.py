@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import note, wording
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value
@@ -71,10 +71,10 @@ def read(source: Source, archive: Archive) -> Results:
                 found[person].append((number, row))
         size = size or _size(frame)
     people = {person: _track(archive, rows) for person, rows in sorted(found.items())}
-    ghosts = Diagnostic(
+    ghosts = note(
         "F007.video-ghosts: {n} of people who are not visible omitted",
         source.path,
-        values={"n": counted(n_ghosts, "detection")},
+        n=counted(n_ghosts, "detection"),
     )
     facts = (("shots", f"{n_cuts + 1}"),) if n_cuts else ()
     return Results(

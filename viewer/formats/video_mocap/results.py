@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import Diagnostic, note, wording
 from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_frames
 from viewer.formats._placeholders import held_rows
 from viewer.formats._source import Source
@@ -240,54 +240,43 @@ def _without_invalid(
         n_points = sum(track.n_unseen for track in people[space].values())
         people[space] = {person: track.seen() for person, track in people[space].items()}
         if n_points:
-            values = {
-                "n": counted(n_points, "point"),
-                "problem": problem,
-                "are": agree(n_points, "is", "are"),
-            }
             notes[space].append(
-                Diagnostic(
+                note(
                     "F007.points-lost: {n} with invalid numbers {are} not visible; first error: "
                     "{problem}",
                     source.path,
-                    values=values,
+                    n=counted(n_points, "point"),
+                    problem=problem,
+                    are=agree(n_points, "is", "are"),
                 )
             )
         for person in lost:
-            values = {
-                "person": person_label(person),
-                "n": counted(len(bad[person]), "frame"),
-                "problem": problem,
-            }
             notes[space].append(
-                Diagnostic(
+                note(
                     "F007.person-lost: {person} omitted: {n}, none of them valid; first error: "
                     "{problem}",
                     source.path,
-                    values=values,
+                    person=person_label(person),
+                    n=counted(len(bad[person]), "frame"),
+                    problem=problem,
                 )
             )
     cameras: dict[str, Cameras] = {}
     for space, camera in results.cameras.items():
         held, gaps = _held(camera), camera.frames[camera.invalid]
         if held is None:
-            notes.setdefault(space, []).append(
-                Diagnostic(wording.CAMERA, source.path, values={"problem": problem})
-            )
+            notes.setdefault(space, []).append(note(wording.CAMERA, source.path, problem=problem))
             continue
         cameras[space] = held
         if len(gaps):
-            values = {
-                "n": counted(len(gaps), "frame"),
-                "frames": listed(frame_spans(gaps)),
-                "problem": problem,
-            }
             notes.setdefault(space, []).append(
-                Diagnostic(
+                note(
                     "F007.camera-frames: camera: held during {n} with invalid numbers ({frames}); "
                     "first error: {problem}",
                     source.path,
-                    values=values,
+                    n=counted(len(gaps), "frame"),
+                    frames=listed(frame_spans(gaps)),
+                    problem=problem,
                 )
             )
     return replace(results, people=people, cameras=cameras), notes
@@ -333,11 +322,11 @@ class _Capture:
         if shown is not None and (shown.intrinsics[:, [0, 1], [0, 1]] <= 0.0).any():
             # Frusta and pictures need positive focal lengths.
             focal = float(shown.intrinsics[:, [0, 1], [0, 1]].min())
-            odd = Diagnostic(
+            odd = note(
                 "F007.video-focal: camera omitted: expected a positive focal length, found "
                 "{found:g} pixels",
                 self.source.path,
-                values={"found": focal},
+                found=focal,
             )
             cameras, cameras_of, notes = None, None, (*notes, odd)
         return Capture(

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import note
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of, within_reach
 from viewer.formats._archive.values import Archive
@@ -229,10 +229,11 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
             cameras.setdefault(frame, camera)
     layout = _point_layout(*(sizes or (0, 0, 0)))
     people = {person: _track(source, rows, layout) for person, rows in sorted(placed.items())}
-    thinned = Diagnostic(
+    thinned = note(
         "F007.video-vertices: {n} of {all} vertices kept because there are many frames",
         source.path,
-        values={"n": sum(sizes[-1:]), "all": most},
+        n=sum(sizes[-1:]),
+        all=most,
     )
     return Results(
         "SAM 3D Body",
