@@ -22,8 +22,8 @@ from plain_bvh import about
 import viewer
 from viewer.export._options import ROTATION_ORDERS
 from viewer.export.bvh.angles import euler_angles, unrolled
-from viewer.export.bvh.text import safe_names
 from viewer.formats import Source, bvh
+from viewer.formats.bvh.text import safe_names
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import sample_animation

@@ -17,8 +17,7 @@ from viewer.formats._source import Source
 from viewer.phrases import Remedy, listed
 
 if TYPE_CHECKING:
-    from viewer.formats._mesh.texture import read_picture
-    from viewer.formats._references import referenced_path
+    from viewer.formats._references import read_picture, referenced_path
     from viewer.formats.rig import NamedFiles
     from viewer.media.file_names import file_stem, folder_name, opened_text
     from viewer.media.image import is_picture, save_image
@@ -210,8 +209,7 @@ FORMATS = {
 
 
 _REEXPORTED = {
-    "viewer.formats._mesh.texture": ("read_picture",),
-    "viewer.formats._references": ("referenced_path",),
+    "viewer.formats._references": ("read_picture", "referenced_path"),
     "viewer.media.file_names": ("file_stem", "folder_name", "opened_text"),
     "viewer.media.image": ("is_picture", "save_image"),
     "viewer.media.named_arrays": ("save_arrays",),

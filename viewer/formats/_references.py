@@ -1,4 +1,4 @@
-"""Rule for the location of files that are referenced by other files.
+"""Files that are referenced by other files: where they may be, and images.
 
 A file may reference only files in or below its folder, with links resolved: opening or converting a
 downloaded model must not show or copy images from elsewhere on the disk. Refused references are
@@ -16,7 +16,12 @@ import os
 import re
 from pathlib import Path
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, wording
+from viewer.errors import FormatError
+from viewer.formats._file_bytes import read_bytes
+from viewer.formats._source import Source
+from viewer.media.image import decode_picture
+from viewer.rig.arrays import Bytes
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 
@@ -55,3 +60,27 @@ def is_file(path: Path) -> bool:
 
 def _is_absolute(written: str) -> bool:
     return written.startswith("/") or _DRIVE.match(written) is not None
+
+
+def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | None:
+    """Return a texture's pixels as ``read_picture``, or None with a warning about its path."""
+    path = referenced_path(source.path.parent, name)
+    if path is None:
+        source.warn(
+            "F005.texture-refused: texture {name} {reason}",
+            offset,
+            name=name,
+            reason=refused_text(name),
+        )
+        return None
+    source.also_read.append(path)
+    try:
+        return decode_picture(path, read_bytes(path))
+    except FormatError as problem:
+        source.warn(wording.TEXTURE, offset, problem=problem.diagnostic)
+        return None
+
+
+def read_picture(source: Source) -> Bytes:
+    """Return the pixels of an image file: (H, W, 4) uint8, sRGB with alpha, top row first."""
+    return decode_picture(source.path, source.data)

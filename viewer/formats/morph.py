@@ -19,7 +19,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
 from viewer.errors import FormatError
 from viewer.formats._source import Source
-from viewer.formats.skin.tables import find_block, read_count, read_rows, to_whole
+from viewer.formats.skin.sections import find_block, read_count, read_rows, to_whole
 from viewer.phrases import optional, quoted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.morph_target import MorphTarget

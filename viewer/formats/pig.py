@@ -33,7 +33,7 @@ from viewer.formats._archive.checking import archive_of, finite
 from viewer.formats._archive.values import Archive
 from viewer.formats._placeholders import neutral_corners, neutral_positions
 from viewer.formats._source import Source
-from viewer.formats._text.table import read_table
+from viewer.formats._text.words import read_table
 from viewer.media.file_names import folder_name
 from viewer.phrases import listed, optional, printable
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh

@@ -49,7 +49,7 @@ from viewer.formats._text.json_places import (
     value_place,
 )
 from viewer.formats._text.numbers import LARGEST
-from viewer.formats._text.table import read_numbers
+from viewer.formats._text.words import read_numbers
 from viewer.media.named_arrays import save_arrays
 from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question

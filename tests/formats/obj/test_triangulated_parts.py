@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from viewer.formats._mesh import polygons
-from viewer.formats._mesh.polygons import triangulate
+from viewer.formats import _polygons
+from viewer.formats._polygons import triangulate
 
 
 @pytest.mark.parametrize("part", [1, 2, 3, 7])
@@ -13,7 +13,7 @@ def test_parts_give_the_triangles_of_single_polygons(monkeypatch, part):
     counts = np.array([4, 3, 5, 3, 3, 4, 8, 6, 3, 4])
     points = rng.normal(size=(40, 3))
     corners = rng.integers(0, 40, counts.sum())
-    monkeypatch.setattr(polygons, "_PART", part)
+    monkeypatch.setattr(_polygons, "_PART", part)
     picks, owners = triangulate(points, corners, counts)
     assert owners.tolist() == np.repeat(np.arange(10), counts - 2).tolist()
     starts = np.cumsum(counts) - counts

@@ -4,7 +4,7 @@ import pytest
 
 from viewer.errors import FormatError
 from viewer.formats import Source, ply
-from viewer.formats.ply import rows
+from viewer.formats.ply import elements
 
 HEAD = """ply
 format ascii 1.0
@@ -27,7 +27,7 @@ FACES = "3 0 1 2 1\n3 1 2 3 2\n3 2 3 0 3\n"
 
 @pytest.fixture(params=[1, 2, 3, 100], autouse=True)
 def _parts(request, monkeypatch):
-    monkeypatch.setattr(rows, "_PART", request.param)
+    monkeypatch.setattr(elements, "_PART", request.param)
 
 
 @pytest.mark.parametrize("quality", ["4", "0.5", "5e9"])

@@ -20,8 +20,8 @@ from viewer.export._options import GAPS, ROTATION_ORDERS, ExportOptions
 from viewer.export.bvh.angles import Unroller
 from viewer.export.bvh.body import BLOCK, Conversion, Space, rest_matrices, shape_at
 from viewer.export.bvh.losses import FileLosses
-from viewer.export.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.formats import all_or_none, save_parts
+from viewer.formats.bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.phrases import Remedy, agree, brief, counted, listed, optional
 from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints

@@ -25,8 +25,7 @@ import numpy as np
 import viewer
 from viewer.diagnostics import Phrase, wording
 from viewer.errors import FormatError
-from viewer.formats._mesh.texture import load_image
-from viewer.formats._references import referenced_path
+from viewer.formats._references import load_image, referenced_path
 from viewer.formats._scene_graph.content import (
     REACH,
     NodeAnimation,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.formats._mesh.polygons import triangulate
+from viewer.formats._polygons import triangulate
 from viewer.formats._scene_graph.content import MorphTargets, NodeMesh, NodeSkin, Primitive
 from viewer.formats._source import Source
 from viewer.formats.fbx.message import Arrays

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
-from viewer.formats._mesh.polygons import (
+from viewer.formats._placeholders import neutral_positions
+from viewer.formats._polygons import (
     Picks,
     filled_normals,
     picked,
@@ -35,21 +36,18 @@ from viewer.formats._mesh.polygons import (
     stated_up,
     triangulate,
 )
-from viewer.formats._placeholders import neutral_positions
 from viewer.formats._source import Source
 from viewer.formats._text.growing_table import GrowingTable
-from viewer.formats.obj.faces import (
-    CornerFault,
-    FaceRows,
-    checked_corners,
-    read_faces,
-)
 from viewer.formats.obj.lines import (
     KEYWORDS,
+    CornerFault,
+    FaceRows,
     Lines,
     Places,
+    checked_corners,
     number_rows,
     pieces,
+    read_faces,
 )
 from viewer.formats.obj.mtl import read_libraries
 from viewer.phrases import counted, listed, optional, quoted

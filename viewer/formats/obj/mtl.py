@@ -28,8 +28,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._mesh.texture import load_image
-from viewer.formats._references import is_file, referenced_path, refused_text
+from viewer.formats._references import is_file, load_image, referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number, to_number
 from viewer.phrases import counted, listed, quoted

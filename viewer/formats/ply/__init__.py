@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase, wording
-from viewer.formats._mesh.polygons import (
+from viewer.formats._placeholders import neutral_positions
+from viewer.formats._polygons import (
     filled_normals,
     first_known,
     picked,
@@ -31,12 +32,10 @@ from viewer.formats._mesh.polygons import (
     triangles_of,
     triangulate,
 )
-from viewer.formats._mesh.texture import load_image
-from viewer.formats._placeholders import neutral_positions
+from viewer.formats._references import load_image
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
-from viewer.formats.ply.header import CORNERS, Header, read_header
-from viewer.formats.ply.rows import Table, read_tables
+from viewer.formats.ply.elements import CORNERS, Header, Table, read_header, read_tables
 from viewer.phrases import brief, counted, listed, printable
 from viewer.rig.arrays import Floats, Ints, freeze
 from viewer.rig.figure import Figure

@@ -26,13 +26,12 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, wording
 from viewer.errors import OutputError, UnsupportedFormatError
-from viewer.formats._mesh.polygons import filled_normals
-from viewer.formats._mesh.texture import load_image
 from viewer.formats._placeholders import neutral_corners, neutral_positions
+from viewer.formats._polygons import filled_normals
+from viewer.formats._references import load_image
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
-from viewer.formats.skin.sections import Sections, check_declared, read_sections
-from viewer.formats.skin.tables import KEYWORDS, LOST
+from viewer.formats.skin.sections import KEYWORDS, LOST, Sections, check_declared, read_sections
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
 from viewer.phrases import all_of, optional, printable, rounded
@@ -280,7 +279,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     is no mesh, or a name or number does not conform to the grammar. Raises ``OutputError`` if a
     file cannot be written.
     """
-    from viewer.formats.skin.weights import weights_lines
+    from viewer.formats.skin.sections import weights_lines
 
     if figure.mesh is None:
         raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")

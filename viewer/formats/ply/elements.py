@@ -1,4 +1,4 @@
-"""Parser for the rows after the header of a ``.ply``: text or binary, element after element.
+"""Elements of a ``.ply``: the header declares them, and rows of text or binary numbers follow.
 
 In most files, all rows of an element have the same size. Their columns are then views of one array,
 and the positions of individual numbers are not needed. Otherwise a cursor for each row moves from
@@ -19,15 +19,24 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase, wording
 from viewer.errors import FormatError
-from viewer.formats._mesh.polygons import triangles_of
+from viewer.formats._polygons import triangles_of
 from viewer.formats._source import Source
 from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
 from viewer.formats._text.words import number_key
-from viewer.formats.ply.header import CORNERS, Element, Header, Property
-from viewer.phrases import brief, counted, quoted
+from viewer.phrases import brief, counted, listed, quoted
 from viewer.progress import report_bytes
 
+CORNERS = ("vertex_indices", "vertex_index")
+"""Names of the property that lists a face's vertices."""
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_LINE = re.compile(rb"([^\r\n]*)(\r\n|\r+\n|\n|\r|\Z)")
+_LONGEST = 1 << 20  # maximum size of a header, bytes
 _PART = 1 << 17  # rows that are parsed together, to limit the memory of their values
 _PIECE = 1 << 18  # bytes per piece, whose temporary arrays stay in the processor's cache
 _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
@@ -41,11 +50,163 @@ _Columns = tuple[dict[str, _Numbers], dict[str, tuple[NDArray[np.int64], _Number
 all values."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Property:
+    """One property: its type in numpy's notation, and the type of the count if it is a list."""
+
+    name: str
+    kind: str
+    count_kind: str = ""
+
+
+@dataclass(slots=True)
+class _Element:
+    """Consecutive rows with the same properties."""
+
+    name: str
+    count: int
+    offset: int
+    properties: list[_Property] = field(default_factory=list)
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows may have different sizes."""
+        return any(prop.count_kind for prop in self.properties)
+
+
+@dataclass(slots=True)
+class Header:
+    """Contents of a file."""
+
+    order: str = ""
+    """One of "", "<" or ">". Byte order; empty for text."""
+    elements: list[_Element] = field(default_factory=list)
+    """In file order."""
+    comments: list[tuple[str, int]] = field(default_factory=list)
+    """Comment strings and their offsets."""
+    end: int = 0
+    """Offset of the data."""
+
+
+def read_header(source: Source) -> Header:
+    """Read the lines up to ``end_header``."""
+    header = Header()
+    position, number, has_format = 0, 0, False
+    while position < min(len(source.data), _LONGEST):
+        match = _LINE.match(source.data, position)
+        assert match is not None  # the pattern matches every text
+        words = match[1].decode("utf-8", "surrogateescape").split()
+        if number == 0 and words != ["ply"]:
+            raise _no_ply(source, match[1])
+        if words == ["end_header"]:
+            if not has_format:
+                raise source.fault(
+                    "F002.ply-no-format: expected a `format` line, found none before end_header",
+                    position,
+                )
+            header.end = _behind(source.data, match)
+            return header
+        keyword = words[0] if words else ""
+        if keyword == "format":
+            header.order, has_format = _order(source, words, position), True
+        elif keyword in ("comment", "obj_info"):
+            text = match[1].decode("utf-8", "surrogateescape").strip()
+            header.comments.append((text[len(keyword) :].strip(), position))
+        elif keyword == "element":
+            header.elements.append(_element(source, words, position))
+        elif keyword == "property":
+            if not header.elements:
+                raise source.fault(
+                    "F002.ply-no-element: property: expected an element before it, found none",
+                    position,
+                )
+            properties = header.elements[-1].properties
+            properties.append(_property(source, properties, words, position))
+        elif keyword and number:
+            raise source.fault(
+                'F002.ply-line: expected element, property, comment or end_header, found "{found}"',
+                position,
+                found=brief(keyword),
+            )
+        position, number = match.end(), number + 1
+    raise source.fault("F002.ply-no-end: missing end_header", position)
+
+
+def _no_ply(source: Source, line: bytes) -> FormatError:
+    """Return the error for a file in another format."""
+    looks = source.looks_like()
+    if looks is not None:
+        return source.fault(
+            'F002.ply-looks: expected "ply" on the first line, found {looks}', 0, looks=looks
+        )
+    return source.fault(
+        'F002.ply-start: expected "ply" on the first line, found {found}',
+        0,
+        found=quoted(line[:40]),
+    )
+
+
+def _behind(data: bytes, match: re.Match[bytes]) -> int:
+    """Return the offset of the data, whose first byte may resemble the LF of a CR LF."""
+    if match[2] == b"\r\n" and not data.startswith((b"ply\r\n", b"ply \r\n")):
+        return match.end() - 1
+    return match.end()
+
+
+def _order(source: Source, words: list[str], offset: int) -> str:
+    if len(words) != 3 or words[1] not in _ORDERS or words[2] != "1.0":
+        found = " ".join(words[1:])
+        raise source.fault(
+            'F002.ply-format: format: expected one of {orders} and 1.0, found "{found}"',
+            offset,
+            orders=listed(list(_ORDERS)),
+            found=brief(found),
+        )
+    return _ORDERS[words[1]]
+
+
+def _element(source: Source, words: list[str], offset: int) -> _Element:
+    is_count = len(words) == 3 and words[2].isascii() and words[2].isdecimal()
+    if not is_count or len(words[2]) > 18:
+        raise source.fault(
+            'F002.ply-element: element: expected a name and a count, found "{found}"',
+            offset,
+            found=brief(" ".join(words[1:])),
+        )
+    return _Element(words[1], int(words[2]), offset)
+
+
+def _property(source: Source, others: list[_Property], words: list[str], offset: int) -> _Property:
+    kinds, name = (words[2:-1], words[-1]) if words[1:2] == ["list"] else (words[1:-1], words[-1])
+    is_list = words[1:2] == ["list"]
+    if len(kinds) != 1 + is_list or any(kind not in _TYPES for kind in kinds):
+        raise source.fault(
+            "F002.ply-property: property: expected a type and a name, or list, two types and a "
+            'name, found "{found}"',
+            offset,
+            found=brief(" ".join(words[1:])),
+        )
+    if any(prop.name == name for prop in others):
+        raise source.fault(
+            'F002.ply-property-again: property: expected a unique name, found "{found}" again',
+            offset,
+            found=brief(name),
+        )
+    if is_list and _TYPES[kinds[0]].startswith("f"):
+        raise source.fault(
+            "F002.ply-list-count: property: expected an integer type for the list count, found "
+            '"{found}"',
+            offset,
+            found=brief(kinds[0]),
+        )
+    return _Property(name, _TYPES[kinds[-1]], _TYPES[kinds[0]] if is_list else "")
+
+
 @dataclass(slots=True)
 class Table:
     """One element's rows."""
 
-    element: Element
+    element: _Element
     """Declaration of the element in the header."""
     columns: dict[str, _Numbers] = field(default_factory=dict)
     """dict of str to (N,). Properties of the element that are not lists."""
@@ -141,7 +302,7 @@ class _TextRows:
         self.line = last
         return True
 
-    def _even_rows(self, element: Element, width: int) -> _Numbers | None:
+    def _even_rows(self, element: _Element, width: int) -> _Numbers | None:
         """Return the numbers of an element, (N, width), as integers if all are; None if invalid."""
         has_lists = any(prop.count_kind for prop in element.properties)
         table = GrowingTable((width,), np.int32 if has_lists else np.float64)
@@ -158,7 +319,7 @@ class _TextRows:
             report_bytes(end, len(self.data))
         return table.rows()
 
-    def begin(self, element: Element) -> _Places:
+    def begin(self, element: _Element) -> _Places:
         """Return the first word of each row."""
         _ = self.values  # parsed first, so that invalid words are known
         last = self.line + element.count * bool(element.properties)
@@ -179,7 +340,7 @@ class _TextRows:
         """Return a function that finds the offset of a row in the file."""
         return lambda row: self._offset(int(cursor[row]))
 
-    def take(self, table: Table, cursor: _Places, prop: Property) -> tuple[_Numbers, _Places]:
+    def take(self, table: Table, cursor: _Places, prop: _Property) -> tuple[_Numbers, _Places]:
         """Return the next number of each row."""
         self._need(cursor + 1)
         values = self.values[cursor]
@@ -191,7 +352,7 @@ class _TextRows:
         return values, cursor + 1
 
     def take_lists(
-        self, table: Table, cursor: _Places, prop: Property
+        self, table: Table, cursor: _Places, prop: _Property
     ) -> tuple[_Places, _Numbers, _Places]:
         """Return the next list of each row."""
         self._need(cursor + 1)
@@ -256,7 +417,7 @@ class _TextRows:
             )
         return self.source.fault(wording.PLY_LIST, self._offset(word), item=item, found=found)
 
-    def end(self, element: Element, cursor: _Places) -> None:
+    def end(self, element: _Element, cursor: _Places) -> None:
         """Refuse rows with more numbers than their properties need."""
         more = np.flatnonzero(cursor[: len(self.rows_left)] < self.rows_left)
         if len(more) and element.properties:
@@ -317,7 +478,7 @@ class _BinaryRows:
         self.source, self.order = source, header.order
         self.data, self.position = source.data, header.end
 
-    def begin(self, element: Element) -> _Places:
+    def begin(self, element: _Element) -> _Places:
         """Return the offset of each row; rows of different sizes are followed by their counts."""
         sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
         sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
@@ -348,7 +509,7 @@ class _BinaryRows:
         self.position += size * element.count
         return True
 
-    def _list_sizes(self, element: Element, start: int) -> tuple[int, list[int]]:
+    def _list_sizes(self, element: _Element, start: int) -> tuple[int, list[int]]:
         """Return the bytes of a row and the lengths of its lists, 0 beyond the end of the file."""
         place, counts = start, list[int]()
         for prop in element.properties:
@@ -366,7 +527,7 @@ class _BinaryRows:
                 place += size
         return place - start, counts
 
-    def _walked(self, element: Element) -> _Places:
+    def _walked(self, element: _Element) -> _Places:
         """Return the starts of rows, followed one by one because their lists differ in length."""
         starts = np.empty(element.count, dtype=np.int64)
         place, end = self.position, len(self.data)
@@ -377,7 +538,7 @@ class _BinaryRows:
                 raise self._short(element, end - self.position)
         return starts
 
-    def take(self, table: Table, cursor: _Places, prop: Property) -> tuple[_Numbers, _Places]:
+    def take(self, table: Table, cursor: _Places, prop: _Property) -> tuple[_Numbers, _Places]:
         """Return the next number of each row."""
         return self._numbers(cursor, prop.kind)
 
@@ -393,7 +554,7 @@ class _BinaryRows:
         return windows[cursor].astype(kind), cursor + size
 
     def take_lists(
-        self, table: Table, cursor: _Places, prop: Property
+        self, table: Table, cursor: _Places, prop: _Property
     ) -> tuple[_Places, _Numbers, _Places]:
         """Return the next list of each row."""
         counts, cursor = self._numbers(cursor, prop.count_kind)
@@ -407,7 +568,7 @@ class _BinaryRows:
         values, _ = self._numbers(_list_places(cursor, whole, size), prop.kind)
         return whole, values, cursor + whole * size
 
-    def end(self, element: Element, cursor: _Places) -> None:
+    def end(self, element: _Element, cursor: _Places) -> None:
         """Continue after the last row."""
         if len(cursor):
             self.position = int(cursor[-1])
@@ -420,7 +581,7 @@ class _BinaryRows:
                 "F006.ply-bytes: ignored {n} after the last element", n=counted(left, "byte")
             )
 
-    def _short(self, element: Element, left: int) -> FormatError:
+    def _short(self, element: _Element, left: int) -> FormatError:
         return self.source.fault(
             "F002.ply-short: {element}: expected {expected}, found the end of the file after "
             "{size} bytes",
@@ -431,7 +592,7 @@ class _BinaryRows:
         )
 
 
-def _even_text(element: Element, block: _Numbers) -> _Columns | None:
+def _even_text(element: _Element, block: _Numbers) -> _Columns | None:
     """Split numbers into an element's columns (N, C); None if its rows differ or do not fit."""
     lists = [prop.name for prop in element.properties if prop.count_kind]
     width = block.shape[1] - len(element.properties)
@@ -454,7 +615,7 @@ def _even_text(element: Element, block: _Numbers) -> _Columns | None:
 
 
 def _even_binary(
-    element: Element, data: bytes, start: int, order: str, counts: list[int]
+    element: _Element, data: bytes, start: int, order: str, counts: list[int]
 ) -> tuple[_Columns, int] | None:
     """Return columns and bytes per row; None if later lists are not as long as the first row's."""
     left = iter(counts)

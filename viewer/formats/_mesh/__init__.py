@@ -1,1 +1,0 @@
-"""Mesh data that several formats share: polygons, surfaces and textures."""
