@@ -26,10 +26,9 @@ from viewer.export.gltf.body import Body, Built
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.gltf.figures import Added, add_figure, figure_losses, place_figures
 from viewer.export.gltf.keyed import Clips
-from viewer.export.gltf.losses import Written, not_held
+from viewer.export.gltf.losses import GltfFile, Written, not_held
 from viewer.export.gltf.materials import material_losses
 from viewer.export.gltf.nodes import Tree, to_metres
-from viewer.export.gltf.reading import GltfFile
 from viewer.export.gltf.sampled import (
     add_sampled,
     common_name,

@@ -12,9 +12,8 @@ from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.gltf.materials import Color, Materials
-from viewer.export.gltf.mesh import EXTENSION, Encoding, add_mesh, parts_of, quantized
+from viewer.export.gltf.mesh import EXTENSION, Encoding, Placed, add_mesh, parts_of, quantized
 from viewer.export.gltf.nodes import Locals, Tree, add_nodes
-from viewer.export.gltf.reading import Placed
 from viewer.export.gltf.skin import Influences, Shape, influences_of, inverse_bind_matrices
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats

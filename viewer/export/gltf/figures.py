@@ -21,6 +21,8 @@ from viewer.export.gltf.body import Body, Built, add_body, body_of
 from viewer.export.gltf.document import Document, text_of
 from viewer.export.gltf.keyed import Clips, first_time
 from viewer.export.gltf.losses import (
+    GltfFile,
+    Keys,
     Written,
     causes_of,
     first_set_note,
@@ -29,18 +31,13 @@ from viewer.export.gltf.losses import (
     sides,
 )
 from viewer.export.gltf.nodes import locals_of, to_metres
-from viewer.export.gltf.reading import GltfFile, Keys
 from viewer.export.gltf.skin import shape_of
+from viewer.formats._scene_graph.content import NodeChannel
 from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_of, still_frames, still_pose
-from viewer.rig.motion.transform_clip import (
-    Interpolation,
-    TransformChannel,
-    TransformClip,
-    sample_transforms,
-)
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
 from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
@@ -51,7 +48,6 @@ from viewer.rig.skinning import Skinning
 _MOST_VERTICES = 4_000_000
 _FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
 _BLOCK = 64  # number of times per block
-_MODES: dict[str, Interpolation] = {"STEP": "step", "LINEAR": "linear", "CUBICSPLINE": "cubic"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -299,15 +295,15 @@ def _sampled(
     frames, owners, seconds = [still_frames(figure, pose)], [-1], [0.0]
     moved: list[tuple[int, Keys]] = []
     file = written.file
-    animations = [file.root["animations"][index] for index in written.animations]
-    for index, (clip, animation) in enumerate(zip(clips, animations, strict=True)):
-        times = key_times(animation, file)
+    animations = [file.animations[index].read() for index in written.animations]
+    for index, (clip, keyed) in enumerate(zip(clips, animations, strict=True)):
+        times = np.unique(np.concatenate([channel.times for channel in keyed]))
         times = np.union1d(times, 0.5 * (times[1:] + times[:-1]))
         chosen = np.linspace(0, len(times) - 1, min(most, len(times))).round().astype(int)
         times = times[chosen]
         own = times + first_time(clip)
         frames.append(frames_of(figure, clip, own, pose))
-        moved.append((len(seconds), _keys_at(file, animation, times)))
+        moved.append((len(seconds), _keys_at(keyed, times)))
         owners += [index] * len(times)
         seconds += own.tolist()
     keys: Keys = {}
@@ -323,8 +319,7 @@ def _still(file: GltfFile, node: int, path: str) -> Floats:
     """Return the value of a property that is not animated."""
     tree = file.tree
     if path == "weights":
-        mesh = file.root["meshes"][int(tree.meshes[node])]
-        return np.array(mesh["weights"], dtype=np.float64)
+        return file.meshes[int(tree.meshes[node])].shape_weights
     still = {"translation": tree.translations, "rotation": tree.rotations, "scale": tree.scales}
     return still[path][node]
 
@@ -351,28 +346,17 @@ def _one(parts: list[Frames]) -> Frames:
     )
 
 
-def key_times(animation: dict[str, Any], file: GltfFile) -> Floats:
-    """Return all key times of an animation, increasing: (T,)."""
-    inputs = {sampler["input"] for sampler in animation["samplers"]}
-    return np.unique(np.concatenate([file.floats(index)[:, 0] for index in sorted(inputs)]))
-
-
-def _keys_at(file: GltfFile, animation: dict[str, Any], times: Floats) -> Keys:
+def _keys_at(keyed: Sequence[NodeChannel], times: Floats) -> Keys:
     """Return the animated values at times (T,), by node and path: (T, C) each."""
     channels, shapes = list[TransformChannel](), dict[int, Ints]()
-    for channel in animation["channels"]:
-        sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
-        inputs = file.floats(sampler["input"])[:, 0]
-        kind = _MODES[sampler.get("interpolation", "LINEAR")]
-        # Each key of a cubic curve has an incoming tangent, a value and an outgoing tangent.
-        rows = file.floats(sampler["output"]).reshape(len(inputs), 3 if kind == "cubic" else 1, -1)
-        values, tangents = rows[:, rows.shape[1] // 2], rows[:, (0, 2)] if kind == "cubic" else None
-        node, path, own = target["node"], target["path"], None
-        if path == "weights":
+    for each in keyed:
+        own, joint = None, each.node
+        if each.path == "weights":
             first = sum(map(len, shapes.values()))
-            shapes[node] = own = np.arange(first, first + values.shape[1], dtype=np.int32)
-        joint = -1 if path == "weights" else node
-        channels.append(TransformChannel(joint, path, inputs, values, kind, tangents, own))
+            joint, own = -1, np.arange(first, first + each.values.shape[1], dtype=np.int32)
+            shapes[each.node] = own
+        rows = each.times, each.values, each.interpolation, each.tangents
+        channels.append(TransformChannel(joint, each.path, *rows, own))
     found = sample_transforms(TransformClip("", tuple(channels), 0.0, 0.0), times)
     keys: Keys = {}
     for path, nodes, sampled in (

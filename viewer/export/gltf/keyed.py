@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.mesh import Placed
 from viewer.export.gltf.nodes import Locals, Tree
-from viewer.export.gltf.reading import Placed
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.motion.evaluation import Frames

@@ -1,10 +1,15 @@
-"""Parts of a figure that glTF cannot store, and errors measured by reading a file back."""
+"""Parts of a figure that glTF cannot store, and errors measured by reading a file back.
+
+Joints and vertices of the file, as the program's reader of glTF returns them, are compared in the
+figure's space, below the node that rotates and scales the whole figure.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -19,17 +24,62 @@ from viewer.export._losses.largest_distances import (
     with_values,
 )
 from viewer.export._losses.pose_errors import requested_causes
-from viewer.export._losses.posed_bodies import Rows, Side, body_rows, changing, figure_side
+from viewer.export._losses.posed_bodies import (
+    Body,
+    Poses,
+    Rows,
+    Side,
+    body_rows,
+    changing,
+    figure_side,
+)
+from viewer.export.gltf.mesh import Placed
 from viewer.export.gltf.nodes import Tree
-from viewer.export.gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
 from viewer.export.gltf.skin import PER_SET, Influences, Shape
+from viewer.formats import Source
+from viewer.formats._scene_graph.content import NodeTree
+from viewer.formats.gltf.animations import Targets, read_animations
+from viewer.formats.gltf.document import Document, open_document, parsed_json
+from viewer.formats.gltf.meshes import read_vertices
+from viewer.formats.gltf.nodes import read_skins, read_tree
 from viewer.phrases import agree, counted, listed, optional
-from viewer.rig.arrays import Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin, influence_counts, skin_from_entries
 from viewer.rig.skinning import METHODS, Skinning
+
+Keys: TypeAlias = dict[tuple[int, str], Floats]
+"""Animated values by node and path, one row per frame."""
+
+
+class GltfFile:
+    """A written file, read again from the bytes of a ``.glb``, or of a ``.gltf`` and its buffer.
+
+    ``unplaced``: nodes whose matrices are ignored, as errors are measured in each figure's space.
+    """
+
+    def __init__(self, path: Path, files: Sequence[bytes], unplaced: Sequence[int] = ()) -> None:
+        source, (first, *others) = Source(path, files[0]), files
+        if first[:4] == b"glTF":
+            document = open_document(source)
+        else:
+            root = parsed_json(source, first, has_lines=True)
+            for buffer in root.get("buffers", ()):
+                del buffer["uri"]
+            document = Document(source, root, memoryview(b"".join(others)))
+            document.buffers.n_bytes_read += sum(map(len, others))
+        for node in unplaced:
+            del document.root.values["nodes"][node]["matrix"]
+        self.tree, self.skins = read_tree(document), read_skins(document)
+        count = len(document.table("meshes"))
+        self.meshes = tuple(read_vertices(document, mesh) for mesh in range(count))
+        self.animations = read_animations(document, Targets(self.tree, self.meshes))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,6 +146,156 @@ def sides(
     keys = frame_keys(written.file) if written.keys is None else written.keys
     place = written.file, written.tree, written.meshes, shape.figure, targets, keys, written.start
     return expected, lambda sets: read_back(*place, sets)
+
+
+def read_back(
+    file: GltfFile,
+    tree: Tree,
+    meshes: list[Placed],
+    figure: Figure,
+    targets: Rows,
+    keys: Keys,
+    start: int = 0,
+    sets: int | None = None,
+) -> Side:
+    """Return the contents of a file in a form that can be compared with the figure."""
+    parents, n_joints = file.tree.parents, len(tree.joints)
+    bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
+    joints = [*tree.joints, file.tree.n_nodes if tree.place < 0 else tree.place]
+    if figure.skin is not None and n_joints:
+        bound[:-1] = figure.skin.inverse_bind
+    for placed in meshes:
+        number = int(file.tree.skins[placed.node])
+        if number >= 0:
+            skin = file.skins[number]
+            bound[: len(skin.joints)] = skin.inverse_bind @ np.linalg.inv(placed.decoding)
+            joints[: len(skin.joints)] = skin.joints.tolist()
+        elif placed.part.joint < 0:
+            joints[-1] = placed.node
+            bound[-1] = np.linalg.inv(placed.decoding)
+    body, morphs = None, np.zeros((1, 0))
+    if meshes:
+        body, morphs = _body(file, meshes, keys, bound, targets, sets)
+
+    def poses(rows: Rows) -> Poses:
+        world = _world(file.tree, keys, rows - start)
+        world = np.concatenate([world, np.broadcast_to(np.eye(4), (len(rows), 1, 4, 4))], axis=1)
+        above = parents[tree.place] if tree.place >= 0 else -1
+        if above >= 0:
+            world = np.linalg.inv(world[:, above : above + 1]) @ world
+        places = world[:, tree.joints][..., :3, 3]
+        weights = morphs if len(morphs) == 1 else morphs[rows - start]
+        still = np.zeros((len(rows), 3))
+        return Poses(places, world[:, joints] @ bound, still, weights, np.zeros((len(rows), 0)))
+
+    return Side(body, poses)
+
+
+def frame_keys(file: GltfFile) -> Keys:
+    """Return the animated values of a file with one key per frame."""
+    return {
+        (channel.node, channel.path): channel.values
+        for animation in file.animations
+        for channel in animation.read()
+    }
+
+
+def _world(tree: NodeTree, keys: Keys, rows: Rows) -> Floats:
+    """Return the global matrices of all nodes: (F, N, 4, 4)."""
+    still = {
+        "translation": tree.translations,
+        "rotation": tree.rotations,
+        "scale": tree.scales,
+    }
+    parts = {path: np.repeat(values[:, None], len(rows), axis=1) for path, values in still.items()}
+    for (node, path), moved in keys.items():
+        if path in parts:
+            parts[path][node] = moved[rows]
+    rotations = parts["rotation"] / np.linalg.norm(parts["rotation"], axis=-1, keepdims=True)
+    linear = quaternion_to_matrix(rotations) * parts["scale"][..., None, :]
+    return joint_worlds(
+        tree.parents, np.swapaxes(linear, 0, 1), np.swapaxes(parts["translation"], 0, 1)
+    )
+
+
+def _body(
+    file: GltfFile,
+    meshes: list[Placed],
+    keys: Keys,
+    bound: Floats,
+    changing: Rows,
+    sets: int | None,
+) -> tuple[Body, Floats]:
+    """Return all meshes in the shape of the first frame, and the weights that change it: (F, M)."""
+    found = [_one_body(file, placed, keys, bound, sets) for placed in meshes]
+    positions = np.concatenate([each.positions for each in found])
+    skin = _joined([each.skin for each in found], bound)
+    count = max((len(each.weights) for each in found), default=1)
+    weights = np.zeros((count, len(changing)))
+    shapes = np.zeros((len(changing), len(positions), 3))
+    first = 0
+    for placed, each in zip(meshes, found, strict=True):
+        rows = slice(first, first + len(each.positions))
+        first = rows.stop
+        for column, target in enumerate(changing.tolist()):
+            for own in np.flatnonzero(placed.part.targets == target).tolist():
+                shapes[column, rows] = each.targets[own]
+                weights[:, column] = each.weights[:, own] - each.weights[0, own]
+    return Body(positions, skin, shapes if len(changing) else None), weights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OneBody:
+    """One mesh: positions (V, 3) in the first frame, skin, targets (S, V, 3), weights (F, S)."""
+
+    positions: Floats
+    skin: Skin
+    targets: Floats
+    weights: Floats
+
+
+def _one_body(
+    file: GltfFile, placed: Placed, keys: Keys, bound: Floats, sets: int | None
+) -> _OneBody:
+    mesh = file.meshes[int(file.tree.meshes[placed.node])]
+    (primitive,) = mesh.primitives
+    positions, weights = primitive.positions, np.zeros((1, 0))
+    directions = np.zeros((0, *positions.shape))
+    if primitive.targets is not None:
+        directions = primitive.targets.dense()
+        weights = keys.get((placed.node, "weights"), mesh.shape_weights[None])
+        positions = positions + np.einsum("s,sva->va", weights[0], directions)
+    joint = placed.part.joint
+    # The comparison is in binding space.
+    space = placed.decoding if joint < 0 else np.linalg.inv(bound[joint])
+    if not np.array_equal(space, np.eye(4)):
+        positions = apply_transform(space, positions)
+        directions = directions @ space[:3, :3].T
+    count = len(positions)
+    if primitive.joints is not None and primitive.weights is not None:
+        most = None if sets is None else PER_SET * sets
+        slots, values = primitive.joints[:, :most], primitive.weights[:, :most]
+        if sets is not None:
+            values = values / values.sum(axis=1, keepdims=True)
+        used = values != 0.0
+        rows, followed, values = np.nonzero(used)[0], slots[used], values[used]
+    else:
+        # All vertices follow the node of the mesh.
+        rows, values = np.arange(count), np.ones(count)
+        followed = np.full(count, joint if joint >= 0 else len(bound) - 1)
+    skin = skin_from_entries(count, rows.astype(np.int32), followed.astype(np.int32), values, bound)
+    return _OneBody(positions, skin, directions, weights)
+
+
+def _joined(skins: list[Skin], bound: Floats) -> Skin:
+    """Return one skin with the concatenated vertices of several."""
+    counts = np.concatenate([influence_counts(skin) for skin in skins])
+    return Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.concatenate([skin.joints for skin in skins]),
+        weights=np.concatenate([skin.weights for skin in skins]),
+        inverse_bind=bound,
+    )
 
 
 def _split(side: Side, sources: Ints) -> Side:

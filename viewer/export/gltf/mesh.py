@@ -174,6 +174,18 @@ class Part:
     """Their names."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A mesh in a file, and the figure's vertices in it."""
+
+    node: int
+    """Its node."""
+    part: Part
+    """The part from which it was written."""
+    decoding: Floats = field(default_factory=lambda: np.eye(4))
+    """(4, 4): from positions in the file, which may be quantised, to the figure's."""
+
+
 def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Part]:
     """Return the parts of a figure; a mesh without parts is one part, named ``name``."""
     figure, mesh = shape.figure, shape.figure.require_mesh()

@@ -17,10 +17,9 @@ from viewer.export._options import GAPS, ExportOptions
 from viewer.export.gltf.body import Body, Built, add_body, body_of
 from viewer.export.gltf.document import Document
 from viewer.export.gltf.keyed import add_animation, moving, still_locals
-from viewer.export.gltf.losses import Written, gltf_losses
+from viewer.export.gltf.losses import GltfFile, Written, frame_keys, gltf_losses
 from viewer.export.gltf.materials import Color
 from viewer.export.gltf.nodes import locals_of
-from viewer.export.gltf.reading import GltfFile, frame_keys
 from viewer.export.gltf.skin import shape_of
 from viewer.phrases import agree, counted, listed
 from viewer.rig.motion.evaluation import Frames, frames_between

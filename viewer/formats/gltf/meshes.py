@@ -80,15 +80,39 @@ def _mesh(reading: _Reading, mesh: Element) -> NodeMesh:
     primitives = mesh.table("primitives")
     if not len(primitives):
         mesh.warn("G002.no-primitives: mesh without primitives")
-    count = _n_targets(primitives)
     read = (_primitive(reading, primitives[place]) for place in range(len(primitives)))
+    return _mesh_of(mesh, [primitive for primitive in read if primitive is not None])
+
+
+def _mesh_of(mesh: Element, read: list[Primitive]) -> NodeMesh:
+    primitives = mesh.table("primitives")
+    count = _n_targets(primitives)
     return NodeMesh(
         mesh.text("name"),
-        tuple(primitive for primitive in read if primitive is not None),
+        tuple(read),
         _target_names(mesh, primitives, count),
         _default_weights(mesh, count),
         mesh.values.get("extras"),
     )
+
+
+def read_vertices(document: Document, mesh: int) -> NodeMesh:
+    """Return a mesh as the vertices that its primitives share, without triangles and looks."""
+    element = document.table("meshes")[mesh]
+    primitive = element.table("primitives")[0]
+    told = primitive.part("attributes")
+    assert told is not None  # a mesh that this program wrote
+    position = told.required_index("POSITION", len(document.accessors), "accessors")
+    attributes = _Attributes(document, told, document.accessors.count(position))
+    joints, weights = _read_influences(attributes)
+    vertices = Primitive(
+        positions=_read_positions(attributes),
+        triangles=np.zeros((0, 3), dtype=np.int32),
+        joints=joints,
+        weights=weights,
+        targets=_offsets(attributes, primitive.table("targets"), "POSITION"),
+    )
+    return _mesh_of(element, [vertices])
 
 
 def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
