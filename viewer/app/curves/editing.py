@@ -45,7 +45,6 @@ from viewer.rig.transform_keys.edit import (
     key_transform_pose,
     move_transform_keys,
     set_clip_interpolation,
-    set_clip_range,
     set_transform_key,
     set_transform_slope,
 )
@@ -273,7 +272,7 @@ class TransformKeys:
 
     def ranged(self, start: float, end: float) -> TransformClip:
         """Set the playback range, seconds."""
-        return set_clip_range(self.clip, start, end)
+        return set_range(self.clip, start, end)
 
     def posed(self, actor: Actor, time: float, only_changed: bool) -> TransformClip:
         """Key an actor's pose at a time."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.sampled_clip import SampledClip, with_rows
 from viewer.rig.motion.timing import Timing
 
 Captured = SampledClip | PointClip
@@ -56,18 +55,7 @@ def _with_rows(clip: Captured, frames: _Indices) -> Captured:
     moved = replace(
         timing, rows=rows, first_frame=timing.first_frame + first, start=timing.time(first)
     )
-    count = clip.n_rows
-    arrays: dict[str, Any] = {}
-    for field in fields(clip):
-        value = getattr(clip, field.name)
-        # A single row that applies to all frames is unchanged.
-        if (
-            isinstance(value, np.ndarray)
-            and len(value) == count
-            and not is_shared(clip, field.name)
-        ):
-            arrays[field.name] = value[kept]
-    return replace(clip, timing=moved, **arrays)
+    return with_rows(clip, moved, lambda _, rows: rows[kept])
 
 
 def resampled(clip: Captured, rate: float) -> Captured:
@@ -89,21 +77,7 @@ def resampled(clip: Captured, rate: float) -> Captured:
     if clip.points is not None:
         return replace(clip, timing=again, points=points_between(clip, times[present]))
     found = clip.sample(None, times[present])
-
-    def values(name: str) -> Floats | None:
-        own: Floats | None = getattr(clip, name)
-        return own if own is None or is_shared(clip, name) else getattr(found, name)
-
-    return SampledClip(
-        clip.name,
-        again,
-        found.rotations,
-        values("translations"),
-        values("figure_translations"),
-        values("figure_scales"),
-        values("shape_weights"),
-        values("scales"),
-    )
+    return with_rows(clip, again, lambda name, _: getattr(found, name))
 
 
 def _present(timing: Timing, times: Floats) -> Bools:
@@ -118,14 +92,6 @@ def _present(timing: Timing, times: Floats) -> Bools:
     after = np.clip(np.ceil(place).astype(int), 0, last)
     both: Bools = timing.present[before] & timing.present[after]
     return both
-
-
-def is_shared(clip: Captured, name: str) -> bool:
-    """Return whether an array of a clip has a single row, which applies to all frames."""
-    if name not in ("shape_weights", "scales"):
-        return False
-    rows = getattr(clip, name)
-    return rows is not None and len(rows) == 1
 
 
 def points_between(clip: PointClip, times: Floats, interpolate: bool = False) -> Floats:

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frames import Captured, in_frame_order, runs_of
 from viewer.rig.geometry.quaternion import (
     align_signs,
@@ -47,7 +47,8 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
     """Filter rotations and translations between gaps; ``metres``: length of the clip's unit."""
     ordered = in_frame_order(clip)
     rate = ordered.timing.frame_rate
-    runs = _rows_of_runs(ordered.timing.present)
+    before = np.concatenate([[0], np.cumsum(ordered.timing.present)])
+    runs = [slice(int(before[a]), int(before[b])) for a, b in runs_of(ordered.timing.present)]
     if ordered.points is not None:
         return replace(ordered, points=_points(ordered.points, runs, chosen, rate, metres))
     rotations = ordered.rotations.copy()
@@ -79,12 +80,6 @@ def run_lengths(clip: Captured) -> list[int]:
     rows = clip.timing.rows
     seen = (clip.points[rows, :, 3] > 0.0) & (rows >= 0)[:, None]
     return [stop - start for each in seen.T for start, stop in runs_of(each)]
-
-
-def _rows_of_runs(present: Bools) -> list[slice]:
-    """Return the rows of each run of present frames, for rows in frame order."""
-    before = np.concatenate([[0], np.cumsum(present)])
-    return [slice(int(before[a]), int(before[b])) for a, b in runs_of(present)]
 
 
 def _points(

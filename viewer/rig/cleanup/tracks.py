@@ -8,10 +8,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Ints
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frames import Captured, is_shared, points_between, runs_of
-from viewer.rig.motion.sampled_clip import SampledClip, joined
+from viewer.rig.cleanup.frames import Captured, points_between, runs_of
+from viewer.rig.motion.sampled_clip import SampledClip, joined, with_rows
 
 Span = tuple[int, int]
 
@@ -54,29 +54,9 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
     if clip.points is not None:
         points = np.concatenate([clip.points, points_between(clip, times, interpolate=True)])
         return replace(clip, timing=whole, points=points), Gaps(closed, left)
-    return replace(_extended(clip, times), timing=whole), Gaps(closed, left)
-
-
-def _extended(clip: SampledClip, times: Floats) -> SampledClip:
-    """Return a clip with additional rows for times inside its gaps."""
     found = clip.sample(None, times, interpolate=True)
-
-    def longer(name: str) -> Floats | None:
-        own = getattr(clip, name)
-        if own is None or is_shared(clip, name):
-            return None if own is None else np.asarray(own)
-        return np.concatenate([own, getattr(found, name)])
-
-    return SampledClip(
-        clip.name,
-        clip.timing,
-        np.concatenate([clip.rotations, found.rotations]),
-        longer("translations"),
-        longer("figure_translations"),
-        longer("figure_scales"),
-        longer("shape_weights"),
-        longer("scales"),
-    )
+    longer = with_rows(clip, whole, lambda name, rows: np.concatenate([rows, getattr(found, name)]))
+    return longer, Gaps(closed, left)
 
 
 def common_frames(first: Captured, second: Captured) -> Ints:

@@ -26,7 +26,7 @@ from viewer.rig.geometry.closest_point import Surface, SurfacePoints
 from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.material import Material, Outline, Rim, Texture
-from viewer.rig.mesh import Mesh, bounding_box, box_size
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor, actor_points
 from viewer.rig.shape import shaped_skeleton
@@ -172,7 +172,8 @@ class _Comparison:
         if first is None or second is None:
             self._lone("D001.mesh: only the {side} has a mesh", first, second)
             return
-        self.has_meshes, self.is_same = True, _is_same_topology(first, second)
+        self.has_meshes, is_as_large = True, first.n_vertices == second.n_vertices
+        self.is_same = is_as_large and np.array_equal(first.triangles, second.triangles)
         if self.is_same:
             self.vertices = self._tally("vertices", "length", first.n_vertices)
             return
@@ -380,12 +381,6 @@ def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
     return Surface(positions, actor.figure.require_mesh().triangles).closest(points)
 
 
-def _is_same_topology(first: Mesh, second: Mesh) -> bool:
-    return first.n_vertices == second.n_vertices and np.array_equal(
-        first.triangles, second.triangles
-    )
-
-
 def _joint_frames(actor: Actor) -> Floats:
     """Return the joint matrices with the figure's own scale and translation: (J, 4, 4)."""
     pose = actor.require_pose()
@@ -462,23 +457,19 @@ def _different(one: Material, other: Material) -> list[str]:
 
 def _equal(one: object, other: object) -> bool:
     if isinstance(one, Texture) and isinstance(other, Texture):
-        return _same_texture(one, other)
+        # Textures are the same if they look the same: their names are file names.
+        placed = (one.channel, one.uv_set, one.wrap) == (other.channel, other.uv_set, other.wrap)
+        if not placed or not _same_transform(one, other):
+            return False
+        if one.image is None or other.image is None:
+            return one.image is other.image
+        return one.image is other.image or np.array_equal(one.image, other.image)
     if isinstance(one, Rim | Outline) and type(one) is type(other):
         return all(_equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
     if isinstance(one, float | tuple) and isinstance(other, float | tuple):
         first, second = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
         return first.shape == second.shape and np.allclose(first, second, atol=_ROUNDING)
     return one == other
-
-
-def _same_texture(one: Texture, other: Texture) -> bool:
-    """Return whether two textures look the same: their names are file names."""
-    placed = (one.channel, one.uv_set, one.wrap) == (other.channel, other.uv_set, other.wrap)
-    if not placed or not _same_transform(one, other):
-        return False
-    if one.image is None or other.image is None:
-        return one.image is other.image
-    return one.image is other.image or np.array_equal(one.image, other.image)
 
 
 def _same_transform(one: Texture, other: Texture) -> bool:

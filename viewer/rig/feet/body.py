@@ -121,8 +121,7 @@ def body_legs(figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats) ->
     if (chains.place[constrained] >= 0).any():
         return None
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
-    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
-    world = chain_worlds(still, chains, *rests)[0]
+    world = rest_worlds(skeleton, chains, rests)
     if not is_solvable(world[:, :3, :3]):
         return None
     place = chains.place
@@ -201,6 +200,12 @@ def chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
     place[joints] = np.arange(len(joints))
     above = np.where(parents[joints] >= 0, place[parents[joints]], -1).astype(np.int32)
     return Chains(joints, above, place)
+
+
+def rest_worlds(skeleton: Skeleton, chains: Chains, rests: Floats) -> Floats:
+    """Return the world matrices (K, 4, 4) of some joints at rest, with all DOFs at 0."""
+    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
+    return chain_worlds(still, chains, *rests)[0]
 
 
 def chain_worlds(clip: SampledClip, chains: Chains, translations: Floats, scales: Floats) -> Floats:

@@ -104,7 +104,7 @@ def bend(
     upper, lower = knees - hips, ankles - knees
     a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
     line = unit(ankles - hips)
-    aside = upper - _dot(upper, line)[:, None] * line
+    aside = upper - np.einsum("fa,fa->f", upper, line)[:, None] * line
     ahead = unit(aside + _FORWARDS * (a + b)[:, None] * np.cross(line, axis))
     distance = np.linalg.norm(targets - hips, axis=1)
     distance = np.clip(distance, np.abs(a - b) * (2.0 - _REACH), _REACH * (a + b))
@@ -114,10 +114,6 @@ def bend(
     turn = between(line, targets - hips)
     thigh, shin = between(upper, knee), between(lower, distance[:, None] * line - knee)
     return multiply(turn, thigh), multiply(turn, shin)
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("fa,fa->f", a, b)
 
 
 def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats) -> Floats:

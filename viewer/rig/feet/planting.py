@@ -353,7 +353,14 @@ def levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan) 
     normals = np.stack([_normals(steady[0], body.level), _normals(steady[1], body.toe_level)])
     cosines = normals @ up
     flat *= falling((_TILTED[1] - cosines) / (_TILTED[1] - _TILTED[0]))
-    tilts = _faded_tilts(plan, _tilts(normals, up) * (flat > 0.0)[..., None], flat)
+    targets = _tilts(normals, up) * (flat > 0.0)[..., None]
+    # A row's weight is compared with s^4 of the smooth curve, s = _LEVELS seconds in rows: 168 at
+    # 60 rows per second. 1 lets the tilt fade to its target 0; 10^6 of a fully held row enforces it
+    # to a few ten-thousandths; the exponent in between lets the weight grow evenly over the orders
+    # of magnitude, so that the curve tightens gradually as a foot lands.
+    weights = 1.0 + flat * 10.0 ** (_FLAT * flat)
+    weights, targets = weights.swapaxes(1, 2), targets.swapaxes(1, 2)
+    tilts = _smoothed(plan, targets, weights, _LEVELS).swapaxes(1, 2)
     return _rotated(clip, body, old, multiply(rotation_vector_to_quaternion(tilts), steady))
 
 
@@ -398,17 +405,6 @@ def _tilts(normals: Floats, up: Floats) -> Floats:
     axes = np.cross(normals, up)
     sines = np.linalg.norm(axes, axis=-1, keepdims=True)
     return axes / np.maximum(sines, 1e-30) * np.arctan2(sines, (normals @ up)[..., None])
-
-
-def _faded_tilts(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
-    """Return corrections, (2, N, L, 3), that fade out where soles are not flat."""
-    # A row's weight is compared with s^4 of the smooth curve, s = _LEVELS seconds in rows: 168 at
-    # 60 rows per second. 1 lets the tilt fade to its target 0; 10^6 of a fully held row enforces it
-    # to a few ten-thousandths; the exponent in between lets the weight grow evenly over the orders
-    # of magnitude, so that the curve tightens gradually as a foot lands.
-    weights = 1.0 + holds * 10.0 ** (_FLAT * holds)
-    weights, targets = weights.swapaxes(1, 2), targets.swapaxes(1, 2)
-    return _smoothed(plan, targets, weights, _LEVELS).swapaxes(1, 2)
 
 
 def _rotated(clip: SampledClip, body: BodyLegs, old: Floats, new: Floats) -> SampledClip:

@@ -12,7 +12,6 @@ from viewer.phrases import quoted
 from viewer.rig.figure import Figure
 from viewer.rig.motion.transform_clip import Animation, TransformClip
 from viewer.rig.motion.upright import own_up
-from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene, figure_pose
 
 NONE = "none"
@@ -104,21 +103,18 @@ def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) 
     if index >= 0:
         chosen = clip or actor.figure.animations[index].clip()
     if actor.pose is not None:
-        actor.pose = _returned(actor, actor.pose)
+        # The pose stored in the file with the current placement and shape.
+        own = figure_pose(actor.figure)
+        own.figure_scale = actor.pose.figure_scale
+        own.figure_translation = actor.pose.figure_translation
+        weights = actor.pose.shape_weights.copy()
+        if actor.transforms is not None:
+            for channel in actor.transforms.channels:
+                if channel.shapes is not None:
+                    weights[channel.shapes] = own.shape_weights[channel.shapes]
+        own.shape_weights = weights
+        actor.pose = own
     actor.clip, actor.animation = chosen, index
-
-
-def _returned(actor: Actor, pose: Pose) -> Pose:
-    """Return the pose stored in the file with the current placement and shape."""
-    own = figure_pose(actor.figure)
-    own.figure_scale, own.figure_translation = pose.figure_scale, pose.figure_translation
-    weights = pose.shape_weights.copy()
-    if actor.transforms is not None:
-        for channel in actor.transforms.channels:
-            if channel.shapes is not None:
-                weights[channel.shapes] = own.shape_weights[channel.shapes]
-    own.shape_weights = weights
-    return own
 
 
 def has_own_animations(actor: Actor) -> bool:

@@ -20,7 +20,6 @@ from viewer.rig.coefficients import apply_coefficients, space_misfit, unused_coe
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
-from viewer.rig.hands import Hand
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
@@ -235,8 +234,9 @@ def rest_roots(figure: Figure, shape: Floats | None) -> Floats:
 def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -> list[Diagnostic]:
     """Add the fingers' rotation vectors by joint; return messages about omitted data."""
     notes: list[Diagnostic] = []
+    known = {hand.side: hand for hand in figure.hands}
     for side, coefficients in motion.hands.items():
-        hand = _hand(figure, side)
+        hand = known.get(side) or (known.get("") if len(known) == 1 else None)
         if hand is None:
             if coefficients.any():
                 values = {"side": side or "only", "figure": figure.name}
@@ -263,11 +263,6 @@ def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -
         fingers = fingers.reshape(len(fingers), -1, 3)
         vectors |= {int(joint): fingers[:, row] for row, joint in enumerate(hand.joints)}
     return notes
-
-
-def _hand(figure: Figure, side: str) -> Hand | None:
-    known = {hand.side: hand for hand in figure.hands}
-    return known.get(side) or (known.get("") if len(known) == 1 else None)
 
 
 def _weights(motion: BodyMotion, figure: Figure) -> tuple[Floats, list[Diagnostic]]:

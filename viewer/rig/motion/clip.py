@@ -274,20 +274,7 @@ def _inside(
 
 
 def _hermite(table: _Table, times: Floats) -> Floats:
-    span = _spans(table, times)
-    every = np.arange(len(table.targets))
-    following = np.minimum(span + 1, table.last)
-    start = table.times[every, span]
-    duration = table.times[every, following] - start
-    u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > SHORTEST)
-    p0, p1 = table.values[every, span], table.values[every, following]
-    v0, v1 = duration * table.edges[every, span, 1], duration * table.edges[every, following, 0]
-    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
-    return ((a * u + b) * u + v0) * u + p0
-
-
-def _spans(table: _Table, times: Floats) -> Ints:
-    """Return the index of the key before each time: (T, C)."""
+    # The index of the key before each time: (T, C).
     most = np.maximum(table.last - 1, 0)
     if len(times) * table.times.size <= 1 << 16:
         found = (table.times <= times[:, :, None]).sum(axis=2) - 1
@@ -297,7 +284,23 @@ def _spans(table: _Table, times: Floats) -> Ints:
             for keys, column in zip(table.times, times.T, strict=True)
         ]
         found = np.stack(columns, axis=1)
-    return np.clip(found, 0, most)
+    span = np.clip(found, 0, most)
+    every = np.arange(len(table.targets))
+    following = np.minimum(span + 1, table.last)
+    start = table.times[every, span]
+    duration = table.times[every, following] - start
+    u = np.divide(times - start, duration, out=np.zeros(times.shape), where=duration > SHORTEST)
+    p0, p1 = table.values[every, span], table.values[every, following]
+    v0, v1 = duration * table.edges[every, span, 1], duration * table.edges[every, following, 0]
+    return hermite(p0, p1, v0, v1, u)[0]
+
+
+def hermite(
+    p0: Floats, p1: Floats, v0: Floats, v1: Floats, u: Floats | float
+) -> tuple[Floats, Floats]:
+    """Return value and slope at u, 0 to 1, of the cubic with these values and slopes at 0 and 1."""
+    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
+    return ((a * u + b) * u + v0) * u + p0, (3.0 * a * u + 2.0 * b) * u + v0
 
 
 def suits(clip: Clip, skeleton: Skeleton) -> bool:

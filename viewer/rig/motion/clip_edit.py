@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,8 +22,10 @@ from viewer.rig.motion.clip import (
     Tangent,
     evaluate,
     evaluate_all,
+    hermite,
     slopes,
 )
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
@@ -88,9 +91,7 @@ def slope_at(channel: Channel, time: float) -> float:
     edges = slopes(channel)
     u = (time - times[key]) / h
     p0, p1 = channel.values[key], channel.values[key + 1]
-    v0, v1 = h * edges[key, 1], h * edges[key + 1, 0]
-    a, b = 2.0 * p0 - 2.0 * p1 + v0 + v1, -3.0 * p0 + 3.0 * p1 - 2.0 * v0 - v1
-    return float(((3.0 * a * u + 2.0 * b) * u + v0) / h)
+    return float(hermite(p0, p1, h * edges[key, 1], h * edges[key + 1, 0], u)[1] / h)
 
 
 def move_keys(
@@ -177,7 +178,10 @@ def _no_keys(target: int) -> Channel:
     return Channel(target, np.zeros(0), np.zeros(0), ())
 
 
-def set_range(clip: Clip, start: float, end: float) -> Clip:
+_Keyed = TypeVar("_Keyed", Clip, TransformClip)
+
+
+def set_range(clip: _Keyed, start: float, end: float) -> _Keyed:
     """Return a clip with a new playback range; the two times are sorted."""
     return replace(clip, start=min(start, end), end=max(start, end))
 

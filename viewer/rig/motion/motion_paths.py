@@ -8,7 +8,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.pose import Pose
@@ -56,10 +55,15 @@ def motion_path(
     """
     times = path_times(motion) if times is None else np.asarray(times, dtype=np.float64)
     chosen: Ints = np.asarray(joints, dtype=np.int32)
-    if motion.points is not None:
-        return _point_path(motion, chosen, times, min_confidence)
     points = np.zeros((len(times), len(chosen), 3))
     present = np.zeros((len(times), len(chosen)), dtype=np.bool_)
+    if motion.points is not None:
+        before, _, _ = motion.timing.locate(times)
+        if len(motion.points):
+            found = motion.points[np.maximum(before, 0)][:, chosen]
+            certain = (found[..., 3] > 0.0) & (found[..., 3] >= min_confidence)
+            points, present = found[..., :3], certain & (before >= 0)[:, None]
+        return MotionPath(times, points, present)
     count = 1 if figure.skeleton is None else figure.skeleton.n_joints
     step = max(1, _BLOCK // count)
     for first in range(0, len(times), step):
@@ -68,18 +72,6 @@ def motion_path(
         points[rows] = world_frames(figure, frames)[:, chosen][..., :3, 3]
         present[rows] = frames.present[:, None]
     return MotionPath(times, points, present)
-
-
-def _point_path(
-    motion: PointClip, chosen: Ints, times: Floats, min_confidence: float
-) -> MotionPath:
-    before, _, _ = motion.timing.locate(times)
-    if not len(motion.points):
-        nothing = np.zeros((len(times), len(chosen)), dtype=np.bool_)
-        return MotionPath(times, np.zeros((len(times), len(chosen), 3)), nothing)
-    rows = motion.points[np.maximum(before, 0)][:, chosen]
-    certain = (rows[..., 3] > 0.0) & (rows[..., 3] >= min_confidence)
-    return MotionPath(times, rows[..., :3], certain & (before >= 0)[:, None])
 
 
 def segments(path: MotionPath) -> tuple[Floats, Floats, Ints]:

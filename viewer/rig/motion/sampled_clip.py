@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
@@ -165,6 +165,26 @@ def _stacked(clips: Sequence[_Captured], name: str) -> Any:
             for part, n in zip(parts, counts, strict=True)
         ]
     return np.concatenate(parts)
+
+
+def is_shared(clip: SampledClip | PointClip, name: str) -> bool:
+    """Return whether an array of a clip has a single row, which applies to all frames."""
+    if name not in ("shape_weights", "scales"):
+        return False
+    rows = getattr(clip, name)
+    return rows is not None and len(rows) == 1
+
+
+def with_rows(
+    clip: _Captured, timing: Timing, change: Callable[[str, Floats], Floats]
+) -> _Captured:
+    """Return a clip whose arrays have other rows, by name and rows; a shared row stays."""
+    arrays: dict[str, Any] = {}
+    for name in (each.name for each in fields(clip)):
+        rows = getattr(clip, name)
+        if isinstance(rows, np.ndarray) and not is_shared(clip, name):
+            arrays[name] = change(name, rows)
+    return replace(clip, timing=timing, **arrays)
 
 
 def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:

@@ -58,7 +58,9 @@ class SpringMotion:
         clip, figure = actor.joint_motion, actor.figure
         if clip is None:
             raise RigError(f"{actor.name} has no motion of joints")
-        base = _still(actor)
+        base, skeleton = still_pose(actor), actor.figure.require_skeleton()
+        if skeleton.springs is not None:
+            _rest(actor.figure, skeleton.springs, base)
         key = id(clip), pose_key(base)
         if key not in self._tracks:
             while len(self._tracks) >= _MOST_TRACKS:
@@ -132,14 +134,6 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
         frames.shape_weights if actor.figure.n_shapes else None,
         frames.scales,
     )
-
-
-def _still(actor: Actor) -> Pose:
-    """Return the part of an actor's pose that neither its clip nor its springs change."""
-    base, skeleton = still_pose(actor), actor.figure.require_skeleton()
-    if skeleton.springs is not None:
-        _rest(actor.figure, skeleton.springs, base)
-    return base
 
 
 def _rest(figure: Figure, springs: Springs, pose: Pose) -> None:

@@ -496,27 +496,23 @@ def _estimated(clip: TransformClip) -> float:
     for rate in (*_RATES, *_BROADCAST):
         if _is_on_frames(since, rate, rounding):
             return rate
-    return _equal_distances(since, rounding)
+    # No usual rate: keys may still be multiples of their smallest distance apart.
+    apart = np.diff(since)
+    apart = apart[apart > 2.0 * rounding]
+    if not len(apart) or 1.0 / apart.min() > _FASTEST:
+        return 0.0
+    # The whole span has a smaller relative error than one distance.
+    span = float(since[-1] - since[0])
+    rate = round(span / float(apart.min())) / span
+    if not _is_on_frames(since - since[0], rate, rounding):
+        return 0.0
+    near = round(rate, 2)
+    rate = near if _is_on_frames(since - since[0], near, rounding) else rate
+    rate *= max(1, math.ceil(_SLOWEST / rate))
+    return rate if _is_on_frames(since, rate, rounding) else 0.0
 
 
 def _is_on_frames(times: Floats, rate: float, rounding: float) -> bool:
     frames = times * rate
     limit = _ON_FRAME + 2.0 * rate * rounding
     return bool((np.abs(frames - np.round(frames)) <= limit).all())
-
-
-def _equal_distances(times: Floats, rounding: float) -> float:
-    """Return a rate at which keys that are a multiple of their smallest distance apart lie."""
-    apart = np.diff(times)
-    apart = apart[apart > 2.0 * rounding]
-    if not len(apart) or 1.0 / apart.min() > _FASTEST:
-        return 0.0
-    # The whole span has a smaller relative error than one distance.
-    span = float(times[-1] - times[0])
-    rate = round(span / float(apart.min())) / span
-    if not _is_on_frames(times - times[0], rate, rounding):
-        return 0.0
-    near = round(rate, 2)
-    rate = near if _is_on_frames(times - times[0], near, rounding) else rate
-    rate *= max(1, math.ceil(_SLOWEST / rate))
-    return rate if _is_on_frames(times, rate, rounding) else 0.0

@@ -348,7 +348,8 @@ def _apply_part(
     if name == "body_pose":
         return _apply_body(values, figure, pose)
     if name in _HAND_PARTS:
-        return _apply_hand(_hand(figure, name), name, values, record, figure, pose)
+        hand = next((hand for hand in figure.hands if hand.side == _HAND_PARTS[name]), None)
+        return _apply_hand(hand, name, values, record, figure, pose)
     known = [joint for joint in PARTS[name] if joint in skeleton.names]
     if not known:
         if values.any():
@@ -400,10 +401,6 @@ def _left_out(rest: Floats, own: int) -> Diagnostic:
         "F007.body-joints-left-out: {n} in the pose beyond the body's {own} omitted",
         values={"n": counted(count, "joint"), "own": own},
     )
-
-
-def _hand(figure: Figure, name: str) -> Hand | None:
-    return next((hand for hand in figure.hands if hand.side == _HAND_PARTS[name]), None)
 
 
 def _apply_hand(

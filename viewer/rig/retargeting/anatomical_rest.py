@@ -169,8 +169,11 @@ def anatomical_rest(
     # the axes of the joint (the bone points along its x, the knee bends about its z). If W holds
     # directions in the world as columns, and B the same ones in the axes of the joint, then R B = W
     # and R = W B^T. Joints without such knowledge keep their mean rotation relative to the parent.
-    body = _body_axes(postures)
-    stands = _stands(postures.up)
+    # Left, up and forward as columns: of the body in each frame, and of the standing body.
+    up = np.broadcast_to(postures.up, (len(postures.rows), 3))
+    body = np.stack([postures.left(), up, postures.forward()], axis=2)
+    left = np.array([1.0, 0.0, 0.0])
+    stands = np.stack([left, postures.up, np.cross(left, postures.up)], axis=1)
     limbs = limb_axes(postures)
     fixed = _trunk(postures, skeleton, body, stands)
     for limb in limbs:
@@ -205,18 +208,6 @@ def _with_means(
                 _straight(mean, *hands[joint]) if joint in hands else mean
             )
     return result
-
-
-def _stands(up: Floats) -> Floats:
-    """Return axes of the standing body as columns: left, up and forward: (3, 3)."""
-    left = np.array([1.0, 0.0, 0.0])
-    return np.stack([left, up, np.cross(left, up)], axis=1)
-
-
-def _body_axes(postures: Postures) -> Floats:
-    """Return the body's axes in each frame as columns: left, up and forward: (F, 3, 3)."""
-    up = np.broadcast_to(postures.up, (len(postures.rows), 3))
-    return np.stack([postures.left(), up, postures.forward()], axis=2)
 
 
 def _mean(axes: Floats, rotations: Floats) -> Floats:

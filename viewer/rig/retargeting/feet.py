@@ -16,13 +16,12 @@ from viewer.phrases import Remedy, counted
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.frames import in_frame_order
-from viewer.rig.feet.body import body_legs, chain_worlds, chains_to, is_solvable
+from viewer.rig.feet.body import body_legs, chain_worlds, chains_to, is_solvable, rest_worlds
 from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import Leg, animal_legs, legs_of
 from viewer.rig.feet.planting import STEPS, PlantedFeet, plant
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.rest_alignment import rest_of
 from viewer.rig.retargeting.retarget import Retargeted
 from viewer.rig.scalars import length_text
@@ -115,8 +114,7 @@ def _source_paths(
         skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
     )
     rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
-    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
-    rest = chain_worlds(still, chains, *rests)[0]
+    rest = rest_worlds(skeleton, chains, rests)
     world = chain_worlds(clip, chains, *rests)
     axes, result = found.scale * found.to_target, []
     for pair, own in zip(pairs, vectors, strict=True):

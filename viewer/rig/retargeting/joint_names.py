@@ -20,7 +20,7 @@ from functools import lru_cache
 
 from viewer.rig.arrays import Ints
 from viewer.rig.hierarchy import path_to_root
-from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
+from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 from viewer.rig.skeleton import Skeleton
 
 _ARM = ("collar", "shoulder", "elbow", "wrist", "hand")
@@ -145,7 +145,11 @@ def _known_keys(names: tuple[str, ...]) -> tuple[_Key, ...]:
 def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
     """Return ``canonical_names``; the humanoid that a file states takes precedence."""
     if skeleton.humanoid is not None:
-        return _stated(skeleton.humanoid, skeleton.n_joints)
+        joints = skeleton.humanoid.joints
+        spine = [joints[bone] for bone in SPINE_BONES if bone in joints]
+        named = {joint: HUMAN_BONES[bone] for bone, joint in joints.items() if bone in HUMAN_BONES}
+        named |= dict(zip(*_numbered(spine), strict=True))
+        return tuple(named.get(joint, "") for joint in range(skeleton.n_joints))
     return canonical_names(skeleton.names, skeleton.parents)
 
 
@@ -160,15 +164,6 @@ def joints_by_place(skeleton: Skeleton) -> set[int]:
         for joint, meaning in enumerate(meanings)
         if meaning and not meaning.startswith(own[joint] or "-")
     }
-
-
-def _stated(humanoid: Humanoid, n_joints: int) -> tuple[str, ...]:
-    """Return the SMPL family's name for each joint of a humanoid."""
-    joints = humanoid.joints
-    spine = [joints[bone] for bone in SPINE_BONES if bone in joints]
-    named = {joint: HUMAN_BONES[bone] for bone, joint in joints.items() if bone in HUMAN_BONES}
-    named |= dict(zip(*_numbered(spine), strict=True))
-    return tuple(named.get(joint, "") for joint in range(n_joints))
 
 
 def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
@@ -188,7 +183,14 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     result = ["" if role in _CHAINS else role for role in roles]
     spine = chains["spine"]
     if "pelvis" not in result:
-        _put_pelvis(result, parents, spine)
+        # The pelvis is the joint above both legs; otherwise, above the first leg or spine.
+        legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
+        paths = [path_to_root(parents, joint)[1:] for joint in legs]
+        shared = [joint for path in paths[:1] for joint in path if all(joint in p for p in paths)]
+        if not shared and spine:
+            shared = path_to_root(parents, spine[0])[1:]
+        if shared and not result[shared[0]]:
+            result[shared[0]] = "pelvis"
     if "pelvis" in result:
         # A waist above both halves of the body, as in MMD, is no part of the spine.
         above = path_to_root(parents, result.index("pelvis"))
@@ -208,17 +210,6 @@ def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
     if len(spine) == 2:
         return spine, (_SPINES[0], _SPINES[2])
     return [spine[0], spine[(len(spine) - 1) // 2], spine[-1]], _SPINES
-
-
-def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
-    """Name the pelvis: the joint above both legs; otherwise, above the first leg or spine."""
-    legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
-    paths = [path_to_root(parents, joint)[1:] for joint in legs]
-    shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
-    if not shared and spine:
-        shared = path_to_root(parents, spine[0])[1:]
-    if shared and not result[shared[0]]:
-        result[shared[0]] = "pelvis"
 
 
 def _without_neck(

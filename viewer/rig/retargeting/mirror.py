@@ -93,11 +93,6 @@ def posing_partners(figure: Figure) -> Ints:
         skeleton = figure.skeleton
         if skeleton is None or skeleton.humanoid is None:
             raise
-        return _named_partners(figure, skeleton)
-
-
-def _named_partners(figure: Figure, skeleton: Skeleton) -> Ints:
-    """Return counterparts by meaning and name, -1 for none."""
     keys = [
         _sided(meaning) if meaning else named
         for meaning, named in zip(

@@ -153,7 +153,15 @@ def rotate_joints(
     other = target.skeleton
     if other is None:
         raise RigError(Diagnostic(wording.POSE, values={"figure": target.name}))
-    partners = _partners(source, other)
+    # The source joint of each target joint, by name, then by stated bones; -1 for none.
+    partners = joints_by_name(source.names, other.names)
+    if source.meanings or other.humanoid is not None:
+        # Other figures may have the names of the SMPL family.
+        theirs = source.meanings or source.names
+        mine = other.names if other.humanoid is None else joint_meanings(other)
+        meant = joints_by_name(theirs, mine)
+        is_free = (partners < 0) & ~np.isin(meant, partners)
+        partners = np.where(is_free, meant, partners)
     found = np.flatnonzero(partners >= 0)
     if not len(found):
         values = {"pose": source.figure or Phrase("the pose"), "figure": target.name}
@@ -170,21 +178,20 @@ def rotate_joints(
     deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
     rest = _figure_rotations(other, _with_zero_dofs(other))
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
-    moved, missed = _rotate_joints(other, start, wanted)
+    moved, missed = start.copy(), []
+    world = np.empty((other.n_joints, 3, 3))
+    present = joint_rotations(other, start)
+    for joint, parent in enumerate(other.parents.tolist()):
+        # The target rotation of the parent preserves local rotations; the limited one would not.
+        above = world[parent] if parent >= 0 else np.eye(3)
+        world[joint] = wanted.get(joint, above @ present[joint])
+        if joint in wanted:
+            moved.rotations[joint] = other.rest_rotations[joint]
+            fitted = nearest_dofs(other, moved, joint, above.T @ world[joint])
+            moved.dofs[:] = fitted.dofs
+            if fitted.error > _INEXACT:
+                missed.append(joint)
     return moved, _notes(source, target, partners, missed)
-
-
-def _partners(source: JointRotations, target: Skeleton) -> Ints:
-    """Return the source joint of each target joint, by name, then by stated bones; -1 for none."""
-    partners = joints_by_name(source.names, target.names)
-    if source.meanings or target.humanoid is not None:
-        # Other figures may have the names of the SMPL family.
-        theirs = source.meanings or source.names
-        mine = target.names if target.humanoid is None else joint_meanings(target)
-        meant = joints_by_name(theirs, mine)
-        is_free = (partners < 0) & ~np.isin(meant, partners)
-        partners = np.where(is_free, meant, partners)
-    return partners
 
 
 def left_of(figure: Figure) -> Floats:
@@ -212,26 +219,6 @@ def _arc(start: Floats, end: Floats, up: Floats) -> Floats:
     """Return the rotation about the up axis from one horizontal axis to another: (3, 3)."""
     angle = np.arctan2(np.cross(start, end) @ up, start @ end)
     return rotation_vector_to_matrix(angle * up)
-
-
-def _rotate_joints(
-    skeleton: Skeleton, start: Pose, wanted: dict[int, Floats]
-) -> tuple[Pose, list[int]]:
-    """Rotate joints to world rotations; return the pose, and the joints that cannot reach them."""
-    pose, missed = start.copy(), []
-    world = np.empty((skeleton.n_joints, 3, 3))
-    present = joint_rotations(skeleton, start)
-    for joint, parent in enumerate(skeleton.parents.tolist()):
-        # The target rotation of the parent preserves local rotations; the limited one would not.
-        above = world[parent] if parent >= 0 else np.eye(3)
-        world[joint] = wanted.get(joint, above @ present[joint])
-        if joint in wanted:
-            pose.rotations[joint] = skeleton.rest_rotations[joint]
-            fitted = nearest_dofs(skeleton, pose, joint, above.T @ world[joint])
-            pose.dofs[:] = fitted.dofs
-            if fitted.error > _INEXACT:
-                missed.append(joint)
-    return pose, missed
 
 
 def _notes(

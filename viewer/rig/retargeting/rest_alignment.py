@@ -117,7 +117,7 @@ def _at_joint(
 ) -> Floats:
     """Return one joint's rotation; ``reference`` is the nearest matched ancestor's rotation."""
     part = matches.names[joint].removeprefix("left_").removeprefix("right_")
-    mine, theirs = (_directions(bone) for bone in bones)
+    mine, theirs = (bone / np.linalg.norm(bone, axis=-1, keepdims=True) for bone in bones)
     # The end of a chain has no direction of its own: a head or a foot without toes moves with the
     # joint above it.
     if not children:
@@ -155,10 +155,6 @@ def _bones(
     partners = matches.partners
     mine = target.points[children] - target.points[joint]
     return mine, source.points[partners[children]] - source.points[partners[joint]]
-
-
-def _directions(vectors: Floats) -> Floats:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def _knuckles(matches: Matches, children: list[int], bones: tuple[Floats, Floats]) -> Floats | None:

@@ -104,7 +104,10 @@ def retargeted(
     if not (job.is_same and source_rest == "auto"):
         motion, rested = with_source_rest(motion, source_rest)
         job = _job(motion, motion.figure.skeleton or source, (target, figure.up), matches)
-    worlds = _source_rotations(job)
+    worlds = job.clip.rotations.copy()
+    for joint, parent in enumerate(job.source.parents):
+        if parent >= 0:
+            worlds[:, joint] = multiply(worlds[:, parent], worlds[:, joint])
     rotations = _target_rotations(job, worlds)
     scale, by = _path_scale(*job.rests, job.matches)
     shifts, notes = _shifts(job, worlds, rotations, scale)
@@ -206,15 +209,6 @@ def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
     return replace(found, clip=replace(found.clip, figure_translations=place, figure_scales=left))
 
 
-def _source_rotations(job: _Job) -> Floats:
-    """Return the source's world rotations in its own axes: (N, J, 4)."""
-    worlds = job.clip.rotations.copy()
-    for joint, parent in enumerate(job.source.parents):
-        if parent >= 0:
-            worlds[:, joint] = multiply(worlds[:, parent], worlds[:, joint])
-    return worlds
-
-
 def _target_rotations(job: _Job, worlds: Floats) -> Floats:
     """Return the figure's local rotations: (N, J, 4)."""
     source, target = job.rests
@@ -229,7 +223,8 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
         parent = parents[joint]
         above = found[:, parent] if parent >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
         if partner < 0:
-            local[:, joint] = _unit(job.target.rest_rotations[joint])
+            rest = job.target.rest_rotations[joint]
+            local[:, joint] = rest / np.linalg.norm(rest, axis=-1)
             found[:, joint] = multiply(above, local[:, joint])
             continue
         after = source.rotations[partner].T @ job.to_target.T @ corrections[joint]
@@ -238,10 +233,6 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
         local[:, joint] = multiply(conjugate(above), found[:, joint])
     align_signs(local)
     return local
-
-
-def _unit(quaternions: Floats) -> Floats:
-    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
 
 
 def _path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[float, Phrase]:
@@ -327,7 +318,8 @@ def _source_places(job: _Job, worlds: Floats) -> Floats:
         places += clip.translations
     scales = skeleton.rest_scales[None] if clip.scales is None else clip.scales
     if (scales != 1.0).any():
-        places = _scaled_places(job, places, scales)
+        linear = quaternion_to_matrix(job.clip.rotations) * scales[:, :, None, :]
+        places = joint_worlds(job.source.parents, linear, places)[..., :3, 3].copy()
     else:
         for joint, parent in enumerate(skeleton.parents):
             if parent >= 0:
@@ -339,12 +331,6 @@ def _source_places(job: _Job, worlds: Floats) -> Floats:
     if clip.figure_translations is not None:
         places += clip.figure_translations[:, None]
     return places
-
-
-def _scaled_places(job: _Job, offsets: Floats, scales: Floats) -> Floats:
-    """Return the positions of joints below scaled ones, from offsets to their parents."""
-    linear = quaternion_to_matrix(job.clip.rotations) * scales[:, :, None, :]
-    return joint_worlds(job.source.parents, linear, offsets)[..., :3, 3].copy()
 
 
 def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:

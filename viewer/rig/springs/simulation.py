@@ -219,7 +219,15 @@ def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
         joints: Ints = np.flatnonzero(depths == depth).astype(np.int32)
         places: Ints = np.flatnonzero(is_spring[joints]).astype(np.int32)
         rows = row_of[joints[places]]
-        hits = _hits([springs.obstacles[row] for row in rows])
+        # The first colliders of all points, then the second colliders, and so on.
+        listed = [springs.obstacles[row] for row in rows]
+        most = max(map(len, listed), default=0)
+        pairs = []
+        for rank in range(most):
+            chosen = [place for place, each in enumerate(listed) if len(each) > rank]
+            which = [listed[place][rank] for place in chosen]
+            pairs.append((np.array(chosen, np.int32), np.array(which, np.int32)))
+        hits = tuple(pairs)
         levels.append(_Level(joints, skeleton.parents[joints], rows, places, hits))
     return levels
 
@@ -232,17 +240,6 @@ def _depends(needs: list[list[int]], joint: int, on: int) -> bool:
         seen.update(fresh)
         stack += fresh
     return on in seen
-
-
-def _hits(listed: list[tuple[int, ...]]) -> tuple[tuple[Ints, Ints], ...]:
-    """Return the first colliders of all points, then the second colliders, and so on."""
-    most = max(map(len, listed), default=0)
-    pairs = []
-    for rank in range(most):
-        chosen = [place for place, each in enumerate(listed) if len(each) > rank]
-        which = [listed[place][rank] for place in chosen]
-        pairs.append((np.array(chosen, np.int32), np.array(which, np.int32)))
-    return tuple(pairs)
 
 
 def _points(matrices: Floats, points: Floats) -> Floats:

@@ -17,7 +17,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion
-from viewer.rig.motion.clip import Channel
+from viewer.rig.motion.clip import Channel, hermite
 from viewer.rig.motion.clip_edit import move_keys, set_key
 from viewer.rig.motion.transform_clip import (
     Interpolation,
@@ -128,11 +128,6 @@ def set_clip_interpolation(
     for index in channels:
         clip = _with_transform_channel(clip, index, with_interpolation(clip.channels[index], mode))
     return clip
-
-
-def set_clip_range(clip: TransformClip, start: float, end: float) -> TransformClip:
-    """Return a clip with a new playback range; the two times are sorted."""
-    return replace(clip, start=min(start, end), end=max(start, end))
 
 
 def key_transform_pose(
@@ -272,13 +267,6 @@ def _with_value(
     return replace(channel, values=values, tangents=tangents)
 
 
-def _key_at(channel: TransformChannel, time: float) -> int:
-    """Return the key at a time, within the rounding errors of files; -1 if there is none."""
-    near = int(np.abs(channel.times - time).argmin())
-    is_same = abs(channel.times[near] - time) <= max(_SAME, _SINGLE * abs(time))
-    return near if is_same else -1
-
-
 def value_at(channel: TransformChannel, time: float) -> Floats:
     """Return a channel's value at a time: (C,)."""
     alone = TransformClip("", (channel,), 0.0, 0.0)
@@ -299,7 +287,9 @@ def added_key(
 
     Without a value the curve is unchanged; a cubic key with one gets the slope of its neighbours.
     """
-    there = _key_at(channel, time)
+    near = int(np.abs(channel.times - time).argmin())
+    is_same = abs(channel.times[near] - time) <= max(_SAME, _SINGLE * abs(time))
+    there = near if is_same else -1
     if there >= 0:
         return (channel if value is None else _with_key_value(channel, there, value)), there
     key = int(np.searchsorted(channel.times, time))
@@ -354,10 +344,9 @@ def _spline(channel: TransformChannel, time: float) -> tuple[Floats, Floats]:
     key = int(np.searchsorted(times, time, side="right")) - 1
     h = float(times[key + 1] - times[key])
     u = (time - float(times[key])) / h
-    p0, p1 = values[key], values[key + 1]
     m0, m1 = h * channel.tangents[key, 1], h * channel.tangents[key + 1, 0]
-    a, b = 2.0 * p0 - 2.0 * p1 + m0 + m1, -3.0 * p0 + 3.0 * p1 - 2.0 * m0 - m1
-    return ((a * u + b) * u + m0) * u + p0, ((3.0 * a * u + 2.0 * b) * u + m0) / h
+    value, slope = hermite(values[key], values[key + 1], m0, m1, u)
+    return value, slope / h
 
 
 def _without_keys(channel: TransformChannel, keys: Iterable[int]) -> TransformChannel | None:
