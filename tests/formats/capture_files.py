@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 from faults import Fault, fault_of, warnings_of
 
-from viewer.formats import Source
-from viewer.formats.easymocap import open_capture
+from viewer.formats import Source, easymocap
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
@@ -53,7 +52,7 @@ def write_frames(folder: Path, frames: dict[int | str, object]) -> Path:
 def opened(path: Path, **options):
     """Return a capture, its parts, and the warnings of the source."""
     source = Source.open(path)
-    capture = open_capture(source, **options)
+    capture = easymocap.read(source, easymocap.Options(**options))
     return capture, list(capture.parts()), warnings_of(source.diagnostics)
 
 

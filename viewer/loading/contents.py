@@ -228,21 +228,21 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     source.options = _reader_options(settings)
     kind = detect(source)
     if kind == "easymocap":
-        from viewer.formats.easymocap import open_capture
+        from viewer.formats import easymocap
         from viewer.rig.captures.capture import capture_rate
 
         source.used_options |= {"images", "video"}
         video = _video_rate(settings)
         rate = capture_rate(settings.frame_rate, None, video)
-        capture = open_capture(
-            source,
-            frame_rate=rate,
-            flat_hands=settings.flat_hands,
-            up=settings.up,
-            legacy_expression=settings.legacy_expression,
-            layout=settings.layout,
-            images=settings.images,
+        options = easymocap.Options(
+            rate,
+            settings.flat_hands,
+            settings.up,
+            settings.legacy_expression,
+            settings.layout,
+            settings.images,
         )
+        capture = easymocap.read(source, options)
         if capture.n_frames > 1 and not (settings.frame_rate or video):
             source.warn(
                 wording.NO_RATE,
@@ -251,17 +251,17 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             )
         return capture
     if kind == "video_mocap":
-        from viewer.formats.video_mocap import open_results
+        from viewer.formats import video_mocap
 
         source.used_options |= {"images", "video"}
-        return open_results(
-            source,
+        wanted = video_mocap.Options(
             settings.frame_rate,
             settings.space or ("camera" if settings.is_overlay else ""),
             settings.up,
             settings.average_shape,
             _video_rate(settings),
         )
+        return video_mocap.read(source, wanted)
     return read(source)
 
 

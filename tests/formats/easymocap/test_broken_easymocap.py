@@ -18,7 +18,7 @@ from viewer.phrases import listed, one_of
 
 def refusal(path, **options):
     with pytest.raises(FormatError) as caught:
-        easymocap.open_capture(Source.open(path, **options))
+        easymocap.read(Source.open(path, **options))
     assert str(caught.value).isprintable()
     return fault_of(caught.value.diagnostic)
 

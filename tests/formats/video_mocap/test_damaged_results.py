@@ -14,7 +14,7 @@ from formats.video_mocap.tool_files import gvhmr, phalp, prompthmr, slahmr, tram
 from viewer.errors import ViewerError
 from viewer.formats import Source, detect
 from viewer.formats._archive.opening import open_archive
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import read as open_results
 from viewer.rig.captures.capture import Capture
 
 pytestmark = pytest.mark.slow

@@ -17,14 +17,15 @@ from numpy.testing import assert_array_equal
 
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import Options
+from viewer.formats.video_mocap import read as open_results
 from viewer.rig.captures.capture import Capture
 
 NAN = np.nan
 
 
 def opened(data: bytes, space: str = "") -> Capture:
-    return open_results(Source("a.pkl", data), space=space)
+    return open_results(Source("a.pkl", data), Options(space=space))
 
 
 def present(capture: Capture) -> dict[int, list[int]]:

@@ -20,7 +20,8 @@ from numpy.testing import assert_allclose
 from viewer.commands.info import describe
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import Options
+from viewer.formats.video_mocap import read as open_results
 from viewer.rig.captures.cameras import view_at
 
 SPACES = {"world": "smpl_params_global", "camera": "smpl_params_incam"}
@@ -104,7 +105,7 @@ def test_single_space_is_sufficient(tmp_path: Path) -> None:
     capture = open_results(source)
     assert (capture.space, capture.in_space, capture.views) == ("", None, ())
     with pytest.raises(FormatError) as caught:
-        open_results(source, space="world")
+        open_results(source, Options(space="world"))
     assert caught.value.diagnostic.key == "F002.video-space"
 
 

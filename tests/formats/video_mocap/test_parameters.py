@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import read as open_results
 
 VECTORS = waves(4, 24, 3) / 2
 PLACES = waves(4, 3, seed=1.0)

@@ -16,7 +16,7 @@ from formats.npz_bytes import npz
 
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import read as open_results
 
 Presence = dict[int, list[int]]
 

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import read as open_results
 
 
 def image(count: int, seed: float, **changes: Any) -> dict[str, Any]:

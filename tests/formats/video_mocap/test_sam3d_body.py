@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats._archive.checking import archive_of
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import read as open_results
 from viewer.formats.video_mocap.sam3d_body import (
     JOINTS,
     KEYPOINTS,

@@ -13,7 +13,7 @@ from formats.video_mocap.tool_files import phalp, wham
 
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import read as open_results
 
 BOUND = 64 << 20  # limit of allocated memory in bytes
 

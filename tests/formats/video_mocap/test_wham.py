@@ -20,7 +20,8 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
-from viewer.formats.video_mocap import open_results
+from viewer.formats.video_mocap import Options
+from viewer.formats.video_mocap import read as open_results
 
 KEYS = {"world": ("pose_world", "trans_world"), "camera": ("pose", "trans")}
 
@@ -60,7 +61,7 @@ def test_shape_varies_unless_it_is_averaged(tmp_path: Path) -> None:
 def test_frame_rate_is_given_or_assumed(given: float | None, rate: float, tmp_path: Path) -> None:
     source = Source.open(wham_file(tmp_path))
     assert detect(source) == "video_mocap"
-    body = next(iter(open_results(source, given).parts())).bodies[4]
+    body = next(iter(open_results(source, Options(given)).parts())).bodies[4]
     assert (body.timing.frame_rate, body.timing.first_frame) == (rate, 0)
     keys = [found.key for found in source.diagnostics.warnings]
     assert keys == ([] if given else ["F007.no-rate"])

@@ -58,7 +58,6 @@ from viewer.formats.easymocap.files import (
     person_of,
     record_line,
 )
-from viewer.media.file_names import folder_name
 from viewer.phrases import counted, listed, one_of, optional, printable
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats
@@ -71,36 +70,29 @@ from viewer.rig.motion.body_motion import BodyMotion
 _LEVELS = 3  # number of folders that may contain the cameras, from the folder of the frames upwards
 
 
-def read(source: Source) -> Capture:
-    """Open a recording with default options; only its first people have been read."""
-    return open_capture(source)
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Settings that are not in the files."""
+
+    frame_rate: float = 30.0
+    """Frames per second."""
+    flat_hands: bool | None = None
+    """Whether hand components exclude the mean hand; if None, they do for SMPL-X and MANO, but not
+    for SMPL+H."""
+    up: str = ""
+    """"y", "z", "-y" or "-z": up axis of the world; empty to estimate it from the people."""
+    legacy_expression: bool = False
+    """Whether expressions are the last of the shape coefficients, as in the legacy code."""
+    layout: str = ""
+    """Layout among those with the same number of keypoints: ``"h36m"``, ``"panoptic"``."""
+    images: Path | None = None
+    """Folder of the cameras' image folders; ``images`` next to the recording if None."""
 
 
-def open_capture(
-    source: Source,
-    frame_rate: float = 30.0,
-    flat_hands: bool | None = None,
-    up: str = "",
-    legacy_expression: bool = False,
-    layout: str = "",
-    images: Path | None = None,
-) -> Capture:
-    """Open a recording.
-
-    ``frame_rate``: frames per second. ``flat_hands``: whether hand components exclude the mean
-    hand; by default, they do for SMPL-X and MANO, but not for SMPL+H. ``up``: one of "y", "z",
-    "-y", "-z" or "", up axis of the world; empty to estimate it from the people. ``layout``: layout
-    of keypoints, see ``keypoint_layout``, to choose between layouts with the same number of points:
-    ``"h36m"``, ``"panoptic"``. ``images``: folder of the cameras' image folders; by default
-    ``images`` next to the recording. Returns a recording of which only the first people have been
-    read. Errors that concern the files as a whole are in the source's warnings. Raises
-    ``FormatError`` if there are no frames, no person in any frame, or no camera in the given
-    folder.
-    """
+def read(source: Source, options: Options | None = None) -> Capture:
+    """Open a recording, of which only the first people have been read."""
+    options = options or Options()
     files = find_frames(source)
-    options = Options(
-        _name(source), frame_rate, flat_hands, up, legacy_expression, layout, source.max_size
-    )
     looking = _Reading(files, options)
     if not any(part.bodies or part.points for part in looking.parts()):
         raise _refusal(source, len(files.frames), looking.first_fault)
@@ -108,25 +100,20 @@ def open_capture(
     parents = [folder, *folder.parents][:_LEVELS]
     views, notes = find_cameras(parents, source.max_size)
     frames = range(files.first_frame, files.first_frame + files.n_frames)
-    found = find_images(parents, views, frame_rate, frames, images)
+    found = find_images(parents, views, options.frame_rate, frames, options.images)
     if found is not None:
         views = tuple(found.sized(view) for view in views)
     return Capture(
-        options.name,
+        files.name,
         files.n_frames,
         files.first_frame,
         lambda: _Reading(files, options).parts(),
-        up,
+        options.up,
         views,
         looking.body_layout.model if looking.body_layout else "",
         tuple(notes),
         found,
     )
-
-
-def _name(source: Source) -> str:
-    """Return a recording's name, ignoring its ``smpl`` folder, whose name is always the same."""
-    return folder_name(source.path) if source.is_folder else source.path.stem
 
 
 def _refusal(source: Source, count: int, fault: Diagnostic | None) -> FormatError:
@@ -156,19 +143,6 @@ _BESIDE = ("handl3d", "handr3d", "face3d")
 _MOST_POINTS = 1 << 16  # maximum number of keypoints of one person
 _FOUR, _THREE = {4}, {3}  # widths of the rows of a record
 _Parts = tuple[tuple[str, int], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """Settings that are not in the files; see ``open_capture``."""
-
-    name: str
-    frame_rate: float
-    flat_hands: bool | None
-    up: str
-    legacy_expression: bool
-    layout: str
-    max_size: int
 
 
 @dataclass(slots=True)
@@ -208,7 +182,7 @@ class _Reading:
         """Yield the frames up to the first with a person, then parts of growing size."""
         frames, n_frames = self.files.frames, self.files.n_frames
         self._prefixes = [f"{folder.path}{os.sep}" for folder in self.files.folders]
-        self._usual = usual_widths(self.files, self.options.max_size)
+        self._usual = usual_widths(self.files)
         sizes = iter(_SIZES)
         part, size, n_read = _Part(), 0, 0
         for frame, stop in zip(frames, [*frames[1:], n_frames], strict=True):
@@ -227,7 +201,7 @@ class _Reading:
                 continue
             path = prefix + name
             try:
-                people = load_people(path, self.options.max_size)
+                people = load_people(path, self.files.max_size)
             except FormatError as problem:
                 self._fault(problem.diagnostic)
                 continue
@@ -365,7 +339,7 @@ class _Reading:
                 self.note(message, path, item=key)
             if keep.any():
                 bodies[person] = rows.motion(
-                    options.name,
+                    files.name,
                     values,
                     rows.timing(*where, keep),
                     options.flat_hands,
@@ -377,7 +351,7 @@ class _Reading:
             self._faults(person, seen, faults)
             is_seen = bool(places[..., 3].any())
             self._has_seen[person] = self._has_seen.get(person, False) or is_seen
-            clip = PointClip(options.name, seen.timing(*where), places)
+            clip = PointClip(files.name, seen.timing(*where), places)
             points[person] = seen.layout, clip
         if stop == files.n_frames:
             self._found += self._final_messages()
@@ -388,7 +362,7 @@ class _Reading:
         """Return the messages that require the whole recording."""
         found: list[Diagnostic] = []
         unseen = [person for person, has_seen in self._has_seen.items() if not has_seen]
-        values: dict[str, Any] = {"name": self.options.name}
+        values: dict[str, Any] = {"name": self.files.name}
         if unseen:
             people = [*map(person_label, unseen)]
             found.append(
@@ -430,7 +404,7 @@ class _Reading:
         # Finding the line reads the file again, which is skipped for errors that are not shown.
         if self._n_faults >= _MOST_WARNINGS:
             return None
-        return record_line(path, self.options.max_size, place, key)
+        return record_line(path, self.files.max_size, place, key)
 
     def _fault(self, fault: Diagnostic) -> None:
         self.first_fault = self.first_fault or fault

@@ -141,10 +141,10 @@ def with_coefficients(
     return replace(layout, widths=(*layout.widths, *more))
 
 
-def usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
+def usual_widths(files: FrameFiles) -> dict[str, int]:
     """Return the most frequent number of ``poses``, and the largest numbers of coefficients."""
     # The first record alone must not decide for all others, because it may be unusual.
-    found = [dict(layout.widths) for layout in _layouts(files, max_size)]
+    found = [dict(layout.widths) for layout in _layouts(files)]
     if not found:
         return {}
     # The first of several equally frequent numbers is used.
@@ -154,7 +154,7 @@ def usual_widths(files: FrameFiles, max_size: int) -> dict[str, int]:
     return {"poses": usual} | most
 
 
-def _layouts(files: FrameFiles, max_size: int) -> list[BodyLayout]:
+def _layouts(files: FrameFiles) -> list[BodyLayout]:
     """Return the layouts of all valid records in some frames."""
     last = len(files.frames) - 1
     chosen = np.unique(np.linspace(0, last, min(last + 1, _LOOKED_AT)).round().astype(int))
@@ -165,7 +165,7 @@ def _layouts(files: FrameFiles, max_size: int) -> list[BodyLayout]:
             if name is None:
                 continue
             try:
-                people = load_people(str(folder.path / name), max_size)
+                people = load_people(str(folder.path / name), files.max_size)
             except FormatError:  # reported when the frame is read
                 continue
             found += [*filter(None, map(_layout, people))]

@@ -28,6 +28,7 @@ from viewer.formats._text.json_places import (
 )
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import FARTHEST, within_text
+from viewer.media.file_names import folder_name
 from viewer.phrases import Remedy, counted, listed, printable
 
 _BODIES = ("smpl_full", "smplfull", "smpl")
@@ -59,6 +60,10 @@ class FrameFolder:
 class FrameFiles:
     """All frame files of a recording."""
 
+    name: str
+    """The recording's name: not that of the folder ``smpl``, which is always the same."""
+    max_size: int
+    """Larger files, in bytes, are refused."""
     folders: list[FrameFolder]
     """Folders, which are read in this order for each frame."""
     frames: list[int] = field(default_factory=list)
@@ -168,7 +173,8 @@ def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> lis
 
 def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[str]]) -> FrameFiles:
     """Assign a frame to every file: by number, with gaps, if possible; otherwise consecutively."""
-    files = FrameFiles(folders)
+    name = folder_name(source.path) if source.is_folder else source.path.stem
+    files = FrameFiles(name, source.max_size, folders)
     place: dict[str, int] = {}
     numbered = [_numbered(names) for names in found]
     if all(numbers or not names for numbers, names in zip(numbered, found, strict=True)):

@@ -31,13 +31,18 @@ _MOST_FRAMES = 1 << 22  # maximum number of frames: 38 hours at 30 frames per se
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Settings that are not in the files; see ``viewer.formats.video_mocap.open_results``."""
+    """Settings that are not in the files."""
 
     frame_rate: float | None = None
+    """Frames per second; if None, the tool's rate, or 30 if it has none."""
     space: str = ""
+    """"world" or "camera", in which the bodies are; empty for the world, if the file has it."""
     up: str = ""
+    """"y", "z", "-y" or "-z": up axis of the space; empty for that of the tool."""
     average_shape: bool = False
+    """Whether a shape that changes is replaced by its average."""
     video_rate: float | None = None
+    """Frames per second of the video, for tools that do not store a rate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
