@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from viewer.data_classes import dataclass, setting
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
-from viewer.rig.geometry.topology import CLOSED, edges_of, part_volumes
+from viewer.rig.geometry.topology import CLOSED, Indices, edges_of, part_volumes
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, area_vectors, vertex_normals
 
@@ -199,7 +198,9 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
     return SurfacePoints(triangles, barycentric, found, distances)
 
 
-def _replaced(points: SurfacePoints, rows: Any, others: SurfacePoints, of: Bools) -> SurfacePoints:
+def _replaced(
+    points: SurfacePoints, rows: Indices, others: SurfacePoints, of: Bools
+) -> SurfacePoints:
     """Return the points with some rows replaced by others."""
     columns = []
     for name in ("triangles", "barycentric", "positions", "distances"):
@@ -258,7 +259,7 @@ def at_vertices(
     return SurfacePoints(triangles, barycentric, found, distances)
 
 
-def _nearest(points: Floats, asked: Floats) -> tuple[Any, Floats]:
+def _nearest(points: Floats, asked: Floats) -> tuple[Indices, Floats]:
     from scipy import spatial
 
     tree = spatial.cKDTree(points)

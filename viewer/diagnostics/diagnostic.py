@@ -161,7 +161,7 @@ class Phrase:
 
     __slots__ = ("_texts", "sentence", "values")
 
-    def __init__(self, sentence: str, **values: Any) -> None:
+    def __init__(self, sentence: str, **values: object) -> None:
         self.sentence = sentence
         self.values, self._texts = _apart(values)
 
@@ -183,7 +183,7 @@ class Phrase:
         return hash(str(self))
 
 
-def _apart(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], dict[str, Shown | Remedy]]:
+def _apart(values: Mapping[str, object]) -> tuple[Mapping[str, object], dict[str, Shown | Remedy]]:
     """Return values as data, and the texts of those that have one."""
     texts = {name: value for name, value in values.items() if isinstance(value, Shown | Remedy)}
     if not texts:
@@ -196,7 +196,9 @@ def _apart(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], dict[str, Show
     return data, texts
 
 
-def _filled(sentence: str, values: Mapping[str, Any], texts: Mapping[str, Shown | Remedy]) -> str:
+def _filled(
+    sentence: str, values: Mapping[str, object], texts: Mapping[str, Shown | Remedy]
+) -> str:
     """Return a sentence with its values filled in; names and texts come from files."""
     shown = {
         name: printable(value, _LONGEST) if isinstance(value, str | bytes | Path) else value
@@ -269,7 +271,7 @@ def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     return [_joined(alike) for alike in kinds.values()]
 
 
-def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
+def _names(values: Mapping[str, object]) -> Iterator[tuple[object, ...]]:
     for name, value in sorted(values.items()):
         if isinstance(value, Phrase | Diagnostic):
             kind = value.key if isinstance(value, Diagnostic) else value.sentence
@@ -306,7 +308,7 @@ def described(found: Diagnostic) -> dict[str, Any]:
         }
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Return a value as JSON data: bytes and non-finite numbers as text, at most 100 items."""
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}

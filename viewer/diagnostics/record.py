@@ -23,7 +23,7 @@ class Record:
     diagnostics: list[dict[str, Any]] = field(default_factory=list)
     """Warnings and notes as returned by ``described``; entries that are only text have just
     ``severity`` and ``message``."""
-    values: dict[str, Any] = field(default_factory=dict)
+    values: dict[str, object] = field(default_factory=dict)
     """Results as JSON data."""
     outputs: dict[str, None] = field(default_factory=dict)
     """Written files, in order, as keys."""
@@ -62,7 +62,7 @@ def note_found(found: Diagnostic | str, severity: Severity = "warning") -> bool:
     return True
 
 
-def note_values(values: Mapping[str, Any]) -> None:
+def note_values(values: Mapping[str, object]) -> None:
     """Record results as JSON data."""
     if _current is not None:
         _current.values |= values

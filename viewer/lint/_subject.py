@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,7 +151,7 @@ class Subject:
         times: Floats = NO_TIMES,
         seek: float | None = None,
         at: tuple[str, int] | None = None,
-        **values: Any,
+        **values: object,
     ) -> Finding:
         """Return a finding about this actor, with the values of the message ``key``."""
         return Finding(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -44,12 +44,12 @@ def check(subject: Subject) -> list[Finding]:
         return []
     noise = noise_of(track.positions, track.present, _width(clip.timing.frame_rate))
     limit = _LIMIT * track.size
-    labels = [*joint_labels(skeleton)]
-    values = {
-        "noise": subject.length(float(noise.max()) / track.scale),
-        "limit": subject.length(limit / track.scale),
-    }
-    return _found(subject, noise, limit, labels, values, track.numbers, track.times)
+    labels, scale = [*joint_labels(skeleton)], track.scale
+
+    def shown(length: float) -> str:
+        return subject.length(length / scale)
+
+    return _found(subject, noise, limit, labels, shown, track.numbers, track.times)
 
 
 def _points(subject: Subject, clip: PointClip) -> list[Finding]:
@@ -65,10 +65,13 @@ def _points(subject: Subject, clip: PointClip) -> list[Finding]:
         noise[:, point] = noise_of(rows[:, point, None, :3], seen[:, point], width)[:, 0]
     names = [*layout.names, *(f"point {k}" for k in range(len(layout.names), seen.shape[1]))]
     frames = np.arange(timing.n_frames)
-    values = {"noise": f"{rounded(noise.max())} units", "limit": f"{rounded(limit)} units"}
     times = timing.start + frames / timing.frame_rate + subject.actor.offset
     numbers = frames + timing.first_frame
-    return _found(subject, noise, limit, names, values, numbers, times)
+
+    def shown(length: float) -> str:
+        return f"{rounded(length)} units"
+
+    return _found(subject, noise, limit, names, shown, numbers, times)
 
 
 def _found(
@@ -76,7 +79,7 @@ def _found(
     noise: Floats,
     limit: float,
     labels: list[str],
-    values: dict[str, Any],
+    shown: Callable[[float], str],
     numbers: np.ndarray,
     times: Floats,
 ) -> list[Finding]:
@@ -95,7 +98,8 @@ def _found(
             n=counted(len(frames), "frame", of=int((~np.isnan(highest)).sum())),
             all=int((~np.isnan(highest)).sum()),
             joint=labels[joints[0]],
-            **values,
+            noise=shown(float(noise.max())),
+            limit=shown(limit),
             frame=int(numbers[frames[0]]),
             part="clip",
             joints=joints,

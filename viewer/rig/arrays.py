@@ -63,7 +63,7 @@ class Deferred:
 
 
 def frozen(
-    name: str, values: Any, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64
+    name: str, values: object, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64
 ) -> NDArray[Any]:
     """Return a read-only copy of ``values``, or ``values`` itself if nothing can modify its memory.
 
@@ -99,16 +99,16 @@ def freeze(array: NDArray[Item]) -> NDArray[Item]:
 
     For new arrays that no other code changes; a copy would double the memory.
     """
-    owner: Any = array
+    owner: object = array
     while isinstance(owner, np.ndarray):
         owner.flags.writeable = False
         owner = owner.base
     return array
 
 
-def _is_writeable_by_others(array: NDArray[Any]) -> bool:
+def _is_writeable_by_others(array: NDArray[np.generic]) -> bool:
     """Return whether another reference can still change the array's memory."""
-    owner: Any = array
+    owner: object = array
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:
             return True
@@ -119,7 +119,7 @@ def _is_writeable_by_others(array: NDArray[Any]) -> bool:
     return not isinstance(owner, bytes)
 
 
-def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
+def _converted(name: str, values: object, dtype: np.dtype[np.generic]) -> NDArray[Any]:
     """Convert values to an array of a type; an integer type rejects fractions."""
     try:
         given = np.asarray(values)
@@ -134,7 +134,7 @@ def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
     return array
 
 
-def _first_not_finite(array: NDArray[Any]) -> str:
+def _first_not_finite(array: NDArray[np.generic]) -> str:
     """Return the first NaN or infinity of an array and its index, for a message."""
     index = tuple(int(axis[0]) for axis in np.nonzero(~np.isfinite(array)))
     place = ", ".join(map(str, index))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -126,6 +125,6 @@ def _check_vertices(target: MorphTarget, figure: Figure, count: int) -> None:
         )
 
 
-def _refusal(key: str, target: MorphTarget, figure: Figure, **values: Any) -> RigError:
+def _refusal(key: str, target: MorphTarget, figure: Figure, **values: object) -> RigError:
     """Return the error for a target that does not match a figure."""
     return RigError(Diagnostic(key, values={"morph": target.name, "figure": figure.name, **values}))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.geometry.topology import edges_of, welded
 from viewer.rig.geometry.vectors import unit
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _FAR = 3.0  # multiple of the median distance, above which pairs are rejected
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
@@ -58,7 +61,7 @@ class Cloud:
         self.samples, self._dense = samples, dense
         from scipy import spatial
 
-        self._tree: Any = spatial.cKDTree(dense.positions)
+        self._tree: cKDTree = spatial.cKDTree(dense.positions)
         self.size = _size(dense.positions)
 
     def with_samples(self, samples: SurfaceSamples) -> Cloud:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.autorig.surface.welding import Welded, edges
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import edges_of
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Cotangent of 0.6 degrees; triangles with smaller angles are treated as equilateral.
 _STEEPEST = 100.0
@@ -17,7 +20,7 @@ _EVEN = 1.0 / np.sqrt(3.0)  # cotangent of 60 degrees
 _LIGHTEST = 1e-9  # minimum area of a vertex relative to the mean, as areas are divisors
 
 
-def laplacian(mesh: Welded) -> tuple[Any, Floats]:
+def laplacian(mesh: Welded) -> tuple[csr_array, Floats]:
     """Return the Laplace operator of any mesh, sparse (W, W), and the area of each vertex (W,).
 
     The operator is symmetric and positive semidefinite and has no unit: scale the mesh to size 1 if
@@ -39,7 +42,7 @@ def laplacian(mesh: Welded) -> tuple[Any, Floats]:
     return operator, np.maximum(areas, _LIGHTEST * mean if len(positive) else 1.0)
 
 
-def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
+def cotangent_laplacian(positions: Floats, triangles: Ints) -> csr_array:
     """Return the cotangent Laplacian: L_ij = -(cot a + cot b) / 2 on edges, L_ii = -sum_j L_ij.
 
     a and b are the angles opposite to the edge (Pinkall and Polthier 1993); the sign is the
@@ -51,7 +54,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     return _from_edges(len(positions), links, halves.ravel())
 
 
-def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
+def graph_laplacian(n_vertices: int, triangles: Ints) -> csr_array:
     """Return the Laplacian of the graph of edges: L_ij = -1, L_ii = number of neighbours."""
     links = edges(triangles)
     return _from_edges(n_vertices, links, np.ones(len(links)))
@@ -95,7 +98,7 @@ def _steady(cotangents: Floats) -> Floats:
     return np.where(thin[:, None], _EVEN, cotangents)
 
 
-def _from_edges(n_vertices: int, links: Ints, weights: Floats) -> Any:
+def _from_edges(n_vertices: int, links: Ints, weights: Floats) -> csr_array:
     """Return the Laplacian of weighted edges (E, 2); weights of the same edge are summed."""
     from scipy import sparse
 

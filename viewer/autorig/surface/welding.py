@@ -6,8 +6,6 @@ these as borders, or the mesh would tear there.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -46,18 +44,19 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
     where only one side of an edge has a vertex.
     """
     same = welded(positions, np.arange(len(positions), dtype=np.int32))
-    first, vertices = np.unique(same, return_inverse=True)
+    first, inverse = np.unique(same, return_inverse=True)
+    vertices = inverse.astype(np.int32)
     tolerance = _NEAR * _median_edge(positions, triangles)
     if tolerance > 0.0:
         nearby = _joined_nearby(positions[first], tolerance)
         vertices = nearby[vertices]
         first = first[np.unique(nearby, return_index=True)[1]]
-    corners = vertices[triangles].astype(np.int32)
+    corners = vertices[triangles]
     kept = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
     return Welded(
         positions=positions[first],
         triangles=kept,
-        vertices=vertices.astype(np.int32),
+        vertices=vertices,
         islands=islands(len(first), kept),
     )
 
@@ -77,14 +76,14 @@ def edges(triangles: Ints) -> Ints:
     return np.stack([unique // width, unique % width], axis=1).astype(np.int32)
 
 
-def _joined_nearby(positions: Floats, tolerance: float) -> Any:
+def _joined_nearby(positions: Floats, tolerance: float) -> Ints:
     """Return a label for each position; positions within the tolerance get the same label."""
     from scipy import spatial
 
     # Each round merges every position with its nearest neighbour, so the size of clusters at least
     # halves per round; finding all pairs in one pass would take memory quadratic in a cluster's
     # size.
-    labels: Any = np.arange(len(positions))
+    labels = np.arange(len(positions), dtype=np.int32)
     kept = labels
     while True:
         tree = spatial.cKDTree(positions[kept])

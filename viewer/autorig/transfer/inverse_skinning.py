@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import nearest_rotations
 from viewer.rig.skin import Skin
 from viewer.rig.skinning.lbs import blended_matrices
+
+if TYPE_CHECKING:
+    from scipy.sparse import bsr_array, csr_array
 
 SMALLEST_STRETCH = 0.2
 """Singular value below which a blended matrix is treated as singular: with equal weights, two
@@ -105,7 +108,7 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     return moved
 
 
-def _laplacian(count: int, links: Ints) -> Any:
+def _laplacian(count: int, links: Ints) -> csr_array:
     """Return the graph Laplacian: each vertex minus the mean of its neighbours."""
     from scipy import sparse
 
@@ -118,7 +121,7 @@ def _laplacian(count: int, links: Ints) -> Any:
 
 def _normal_equations(
     inverted: InvertedSkinning, posed: Floats, welded: Ints, free: Bools
-) -> tuple[Any, Floats]:
+) -> tuple[bsr_array, Floats]:
     """Return the blocks B^T B, and B^T (t - d), summed over coincident vertices."""
     number = np.cumsum(free) - 1
     inside = np.flatnonzero(free[welded])

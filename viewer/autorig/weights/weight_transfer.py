@@ -15,9 +15,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import field, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.autorig.correspondence import MatchSettings, Template, match, wound_backwards
 from viewer.autorig.surface.laplacian import laplacian
@@ -38,6 +39,9 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.skin import Skin, limit_influences, skin_rows
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _Solve = Callable[[Floats], Floats]
 
@@ -183,8 +187,12 @@ def nearest_weights(
 
 
 def _with_rigid(
-    template: Template, source: Any, target: Welded, rows: Any, islands: Any
-) -> tuple[Any, RigidIslands]:
+    template: Template,
+    source: csr_array,
+    target: Welded,
+    rows: csr_array,
+    islands: NDArray[np.integer],
+) -> tuple[csr_array, RigidIslands]:
     """Give islands without a match the weights of the point closest to their centroid."""
     if len(islands) == 0:
         empty = np.zeros(0, dtype=np.int32)
@@ -209,8 +217,8 @@ def _with_rigid(
 
 
 def _inpainted(
-    target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools
-) -> tuple[Any, str]:
+    target: Welded, size: float, rows: csr_array, matched: Bools, unknown: Bools
+) -> tuple[csr_array, str]:
     """Solve for the unknown rows on the mesh scaled to size 1, as the operator is dimensionless."""
     if not unknown.any():
         return rows, "direct"
@@ -223,8 +231,8 @@ def _inpainted(
 
 
 def inpaint(
-    laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools
-) -> tuple[Any, str]:
+    laplacian: csr_array, areas: Floats, weights: csr_array, matched: Bools, unknown: Bools
+) -> tuple[csr_array, str]:
     """Return the weights of unknown vertices, sparse (U, J), and the solver that succeeded.
 
     ``laplacian``: sparse (W, W), positive semidefinite. Only weights of matched vertices are read;
@@ -254,7 +262,7 @@ def inpaint(
     )
 
 
-def _solved(solve: _Solve, border: Any, weights: Any) -> Any:
+def _solved(solve: _Solve, border: csr_array, weights: csr_array) -> csr_array:
     """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
     from scipy import sparse
 
@@ -275,20 +283,20 @@ def _solved(solve: _Solve, border: Any, weights: Any) -> Any:
     return sparse.csr_array((scaled.data, joints[scaled.indices], scaled.indptr), shape=shape)
 
 
-def _is_true(solve: _Solve, border: Any) -> bool:
+def _is_true(solve: _Solve, border: csr_array) -> bool:
     """Return whether known weights of 1 everywhere yield 1 everywhere, as they should."""
     ones = solve(-np.asarray(border.sum(axis=1)).reshape(-1, 1))
     return bool(np.isfinite(ones).all() and np.abs(ones - 1.0).max() <= _TRUE)
 
 
-def _shifted(matrix: Any) -> Any:
+def _shifted(matrix: csr_array) -> csr_array:
     from scipy import sparse
 
     shift = _SHIFT * float(matrix.diagonal().mean())
     return matrix + sparse.diags_array(np.full(matrix.shape[0], shift))
 
 
-def _factorised(matrix: Any) -> _Solve | None:
+def _factorised(matrix: csr_array) -> _Solve | None:
     """Return a solver by sparse factorisation, or None if that fails."""
     from scipy.sparse import linalg as linear
 
@@ -305,7 +313,7 @@ def _factorised(matrix: Any) -> _Solve | None:
     return lambda right: factors.solve(right)
 
 
-def _iterative(matrix: Any) -> _Solve:
+def _iterative(matrix: csr_array) -> _Solve:
     """Return a solver by conjugate gradients for all columns, with diagonal preconditioner."""
     diagonal = matrix.diagonal()
     scale = np.divide(1.0, diagonal, out=np.ones_like(diagonal), where=diagonal > 0.0)[:, None]
@@ -335,7 +343,7 @@ def _ratio(a: Floats, b: Floats) -> Floats:
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)
 
 
-def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) -> Any:
+def smooth(weights: csr_array, triangles: Ints, active: Bools, rounds: int = _ROUNDS) -> csr_array:
     """Blend active rows with their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours)."""
     from scipy import sparse
 
@@ -378,7 +386,7 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
     return np.isfinite(distances)
 
 
-def weight_matrix(skin: Skin, triangles: Ints) -> Any:
+def weight_matrix(skin: Skin, triangles: Ints) -> csr_array:
     """Return a skin's weights as a sparse (V, J) matrix whose rows sum to 1.
 
     Repeated weights for a joint are added, negative ones set to 0. Vertices without triangles may
@@ -401,14 +409,14 @@ def weight_matrix(skin: Skin, triangles: Ints) -> Any:
     return scaled_rows(matrix, np.divide(1.0, sums, out=np.zeros_like(sums), where=sums > _NO_SUM))
 
 
-def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) -> Skin:
+def skin_of(rows: csr_array, inverse_bind: Floats, max_influences: int | None = None) -> Skin:
     """Return sparse rows (V, J) as a skin, by default with all influences; rows still sum to 1."""
     rows.sort_indices()
     skin = Skin(rows.indptr, rows.indices, rows.data, inverse_bind)
     return skin if max_influences is None else limit_influences(skin, max_influences)
 
 
-def scaled_rows(matrix: Any, factors: Floats) -> Any:
+def scaled_rows(matrix: csr_array, factors: Floats) -> csr_array:
     """Return a sparse (V, J) matrix with its rows multiplied by (V,); 0 leaves an empty row."""
     from scipy import sparse
 
@@ -417,7 +425,7 @@ def scaled_rows(matrix: Any, factors: Floats) -> Any:
     return scaled
 
 
-def put_rows(rows: Any, where: Any, values: Any) -> Any:
+def put_rows(rows: csr_array, where: NDArray[np.integer], values: csr_array) -> csr_array:
     """Return sparse rows; the rows at the unique indices ``where`` are replaced by ``values``."""
     from scipy import sparse
 
@@ -430,7 +438,7 @@ def put_rows(rows: Any, where: Any, values: Any) -> Any:
     return sparse.csr_array(scaled_rows(rows, kept) + lift @ values)
 
 
-def _matrix(skin: Skin) -> Any:
+def _matrix(skin: Skin) -> csr_array:
     from scipy import sparse
 
     shape = (skin.n_vertices, skin.n_joints)

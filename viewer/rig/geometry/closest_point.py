@@ -10,14 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain, pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, freeze_fields, frozen
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+Indices = NDArray[np.intp]
 _PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
 _LONG = 3.0  # multiple of the median radius above which pieces are split
 # Pieces in the first query; if more pieces may lie within the bound, a second query finds all of
@@ -132,7 +137,13 @@ class Surface:
             )
 
     def _keep_nearer(
-        self, level: _Level, points: Floats, rows: Any, pieces: Any, best: Ints, nearest: Floats
+        self,
+        level: _Level,
+        points: Floats,
+        rows: Indices,
+        pieces: Indices,
+        best: Ints,
+        nearest: Floats,
     ) -> None:
         """Update best and nearest with the closest of pieces, each tested for a row of points."""
         offsets = points[rows] - level.centers[pieces]
@@ -174,7 +185,7 @@ def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
 class _Level:
     """Pieces of similar size: k-d tree of their centroids, normals, radii and triangles."""
 
-    tree: Any
+    tree: cKDTree
     centers: Floats
     normals: Floats
     radii: Floats
@@ -250,7 +261,7 @@ def _normals(pieces: Floats) -> Floats:
 
 
 def _may_be_nearer(
-    level: _Level, pieces: Any, offsets: Floats, apart: Floats, nearest: Floats
+    level: _Level, pieces: Indices, offsets: Floats, apart: Floats, nearest: Floats
 ) -> Bools:
     """Return a conservative mask of the pieces that may be closer than the closest found so far."""
     # A piece lies in a disc of radius r around its centroid. With the height h of the point above
