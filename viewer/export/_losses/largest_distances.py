@@ -2,6 +2,8 @@
 
 Joints are compared in all of them. Skinning every vertex in every pose would take longer than the
 export itself, so all vertices are compared in evenly spaced poses, and in those that look worst.
+Distances of joints are thus the largest there are; those of vertices exist, and the largest may be
+missed only where neither joints nor vertices that are far apart elsewhere show it.
 """
 
 from __future__ import annotations
@@ -27,14 +29,18 @@ from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
 _BLOCK = 512  # poses per block
-_SKINNED = 16  # poses per block in which all vertices are compared, to limit memory
+_SKINNED = 16  # poses per block of all vertices: 38 MB of positions for 100,000 vertices
 REGULAR = 64  # evenly spaced poses in which all vertices are compared, with linear skinning
-_MOST = 512  # the same, with nonlinear skinning
+_MOST = 512  # the same with nonlinear skinning, where few vertices cannot be followed alone
 _WORST = 16  # further poses in which all vertices are compared, for joints and vertices each
-_ROUNDING = 2e-6  # fraction of the size: rounding in single precision along a chain of joints
-_EPSILON = 2.0**-22  # two steps of single precision, relative to a coordinate
+# Numbers of single precision are rounded by 2^-24 = 6e-8 of their value. Along a chain of joints
+# down to the fingers some thirty roundings add up to this fraction of the figure's size.
+_ROUNDING = 2e-6
+# Neighbouring numbers of single precision differ by up to 2^-23 of their value. Far from the
+# origin, where this exceeds the above, two of them count, up to a factor: a figure a thousand
+# times its size away is spoiled by rounding, and its errors must be reported.
+_EPSILON, _FAR = 2.0**-22, 5.0
 _SIZED = 256  # frames used to measure the distance of a motion from the origin
-_FAR = 5.0  # maximum factor on the tolerance far from the origin
 _NO_REASONS: dict[str, object] = {
     "causes": Shown("", []),
     "estimate": "",
@@ -102,7 +108,9 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     chosen = evenly(len(rows), REGULAR if is_linear else _MOST)
     found = _vertices(first, second, rows, others, chosen)
     # The vertices that are farthest apart in some of these poses are followed through all others.
-    # Their distances, and those of the joints, show where other vertices may be farther apart.
+    # Their distances, and those of the joints, show where other vertices may be farther apart: a
+    # wrong rotation moves all vertices of its limb, most those at its end, and a wrong weight or
+    # shape the same vertices in every pose.
     followed = np.unique(found[:, 1]) if is_linear and len(chosen) < len(rows) else None
     far = heights(first, second, rows, others, followed)
     if followed is not None:
