@@ -115,7 +115,11 @@ def _fill(
     figure = animation.figure
     above = {bone: _parent(bone, bones) for bone in bones}
     order = sorted(bones, key=lambda bone: _depth(bone, above))
-    places, rotations = _rest(figure, bones)
+    # The bones are those of a T-pose in VRM's axes, on the ground.
+    still, _ = in_t_pose(standing(figure, figure_pose(figure), bones), bones)
+    world = world_matrices(still.require_skeleton(), figure_pose(still))
+    places = {bone: world[joint, :3, 3] for bone, joint in bones.items()}
+    rotations = {bone: unit_rotation(world[joint]) for bone, joint in bones.items()}
     nodes: dict[str, int] = {}
     for bone in order:
         start = places[above[bone]] if above[bone] else np.zeros(3)
@@ -162,14 +166,6 @@ def _parent(bone: str, bones: dict[str, int]) -> str:
 
 def _depth(bone: str, above: dict[str, str]) -> int:
     return 0 if not above[bone] else 1 + _depth(above[bone], above)
-
-
-def _rest(figure: Figure, bones: dict[str, int]) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Return positions and rotations of the bones in a T-pose, in VRM's axes, on the ground."""
-    still, _ = in_t_pose(standing(figure, figure_pose(figure), bones), bones)
-    world = world_matrices(still.require_skeleton(), figure_pose(still))
-    places = {bone: world[joint, :3, 3] for bone, joint in bones.items()}
-    return places, {bone: unit_rotation(world[joint]) for bone, joint in bones.items()}
 
 
 def _moved(

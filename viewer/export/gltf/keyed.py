@@ -134,41 +134,34 @@ def _joined_weights(
     if len(own) == 1 and np.array_equal(_shapes(own[0]), rows):
         return own[0]
     if len(own) == 1:
-        return _widened(own[0], rows, weights)
-    return _merged(own, rows, weights)
-
-
-def _widened(channel: TransformChannel, rows: _Targets, weights: Floats) -> TransformChannel:
-    """Return a channel extended to more blend shapes, which keep their weights."""
-    place = {int(shape): column for column, shape in enumerate(_shapes(channel))}
-    columns = np.array([place.get(int(row), -1) for row in rows])
-    values = np.where(columns >= 0, channel.values[:, columns], weights[rows])
-    tangents = channel.tangents
-    if tangents is not None:
-        tangents = np.where(columns >= 0, tangents[..., columns], 0.0)
-    return replace(channel, values=values, tangents=tangents, shapes=rows.astype(np.int32))
+        # The other blend shapes of the mesh keep their weights.
+        channel = own[0]
+        place = {int(shape): column for column, shape in enumerate(_shapes(channel))}
+        columns = np.array([place.get(int(row), -1) for row in rows])
+        values = np.where(columns >= 0, channel.values[:, columns], weights[rows])
+        tangents = channel.tangents
+        if tangents is not None:
+            tangents = np.where(columns >= 0, tangents[..., columns], 0.0)
+        return replace(channel, values=values, tangents=tangents, shapes=rows.astype(np.int32))
+    # One channel with the keys of all is exact only if all are linear or all are steps.
+    times = np.unique(np.concatenate([channel.times for channel in own]))
+    modes = {channel.interpolation for channel in own}
+    is_exact = modes in ({"linear"}, {"step"})
+    if not is_exact:
+        count = int((times[-1] - times[0]) * _RATE)
+        times = np.union1d(times, times[0] + np.arange(count + 1) / _RATE)
+    found = sample_transforms(TransformClip("", tuple(own), 0.0, 0.0), times)
+    values = np.tile(weights, (len(times), 1))
+    values[:, found.weighted] = found.shape_weights
+    mode: Interpolation = "step" if modes == {"step"} else "linear"
+    shapes = rows.astype(np.int32)
+    return TransformChannel(-1, "weights", times, values[:, rows], mode, shapes=shapes)
 
 
 def _shapes(channel: TransformChannel) -> Ints:
     """Return the blend shapes of a channel of weights."""
     assert channel.shapes is not None
     return channel.shapes
-
-
-def _merged(channels: list[TransformChannel], rows: _Targets, weights: Floats) -> TransformChannel:
-    """Merge channels into one at all of their times; only linear ones or only steps stay exact."""
-    times = np.unique(np.concatenate([channel.times for channel in channels]))
-    modes = {channel.interpolation for channel in channels}
-    is_exact = modes in ({"linear"}, {"step"})
-    if not is_exact:
-        count = int((times[-1] - times[0]) * _RATE)
-        times = np.union1d(times, times[0] + np.arange(count + 1) / _RATE)
-    found = sample_transforms(TransformClip("", tuple(channels), 0.0, 0.0), times)
-    values = np.tile(weights, (len(times), 1))
-    values[:, found.weighted] = found.shape_weights
-    mode: Interpolation = "step" if modes == {"step"} else "linear"
-    shapes = rows.astype(np.int32)
-    return TransformChannel(-1, "weights", times, values[:, rows], mode, shapes=shapes)
 
 
 def moving(skeleton: Skeleton, frames: Frames) -> Bools:

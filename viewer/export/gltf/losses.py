@@ -139,7 +139,14 @@ def sides(
     columns = changing(frames, still)
     expected = figure_side(figure, frames, how.unreduced(), still)
     if written.meshes:
-        expected = _split(expected, written.sources)
+        # Vertices are duplicated as in the file.
+        sources, whole = written.sources, expected.exact
+        assert expected.body is not None  # there are meshes
+        expected = replace(
+            expected,
+            body=body_rows(expected.body, sources),
+            exact=None if whole is None else lambda row: whole(row)[sources],
+        )
     else:
         expected = replace(expected, body=None, exact=None)
     targets = np.flatnonzero(np.isin(shape.targets, columns))
@@ -229,7 +236,14 @@ def _body(
     """Return all meshes in the shape of the first frame, and the weights that change it: (F, M)."""
     found = [_one_body(file, placed, keys, bound, sets) for placed in meshes]
     positions = np.concatenate([each.positions for each in found])
-    skin = _joined([each.skin for each in found], bound)
+    skins = [each.skin for each in found]
+    counts = np.concatenate([influence_counts(skin) for skin in skins])
+    skin = Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.concatenate([skin.joints for skin in skins]),
+        weights=np.concatenate([skin.weights for skin in skins]),
+        inverse_bind=bound,
+    )
     count = max((len(each.weights) for each in found), default=1)
     weights = np.zeros((count, len(changing)))
     shapes = np.zeros((len(changing), len(positions), 3))
@@ -285,27 +299,6 @@ def _one_body(
         followed = np.full(count, joint if joint >= 0 else len(bound) - 1)
     skin = skin_from_entries(count, rows.astype(np.int32), followed.astype(np.int32), values, bound)
     return _OneBody(positions, skin, directions, weights)
-
-
-def _joined(skins: list[Skin], bound: Floats) -> Skin:
-    """Return one skin with the concatenated vertices of several."""
-    counts = np.concatenate([influence_counts(skin) for skin in skins])
-    return Skin(
-        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
-        joints=np.concatenate([skin.joints for skin in skins]),
-        weights=np.concatenate([skin.weights for skin in skins]),
-        inverse_bind=bound,
-    )
-
-
-def _split(side: Side, sources: Ints) -> Side:
-    """Return a posed figure with its vertices duplicated as in the file."""
-    whole = side.exact
-    assert side.body is not None  # the caller has checked that there is a mesh
-    body = body_rows(side.body, sources)
-    return replace(
-        side, body=body, exact=None if whole is None else lambda row: whole(row)[sources]
-    )
 
 
 def first_set_note(

@@ -144,10 +144,6 @@ def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[i
 
 def _put(node: dict[str, Any], name: str, values: Floats, default: float | Floats) -> None:
     if (values != default).any():
-        node[name] = _finite(values)
-
-
-def _finite(values: Floats) -> list[float]:
-    if not np.isfinite(values).all():
-        raise RigError("expected finite numbers in the pose, which glTF needs")
-    return [float(value) for value in values]
+        if not np.isfinite(values).all():
+            raise RigError("expected finite numbers in the pose, which glTF needs")
+        node[name] = [float(value) for value in values]

@@ -64,15 +64,6 @@ def sampled_of(
     animation: SampledAnimation, options: ExportOptions, color: Color | None = None
 ) -> Sampled:
     """Return a motion in the form that glTF can store."""
-    _check(options)
-    frames = filled(animation.frames, options.closing == "interpolate")
-    reference = int(animation.frames.present.argmax())
-    shape = shape_of(animation.figure, frames.shape_weights, reference)
-    body = body_of(animation.figure, shape, options.skinning)
-    return Sampled(animation, frames, body, options.world_up, color)
-
-
-def _check(options: ExportOptions) -> None:
     for what, value, known in (
         ("unit", options.unit, ("", "m")),
         ("up axis", options.up, ("", "y")),
@@ -83,6 +74,11 @@ def _check(options: ExportOptions) -> None:
             listed = ", ".join(filter(None, known))
             one = "one of " * (len(list(filter(None, known))) > 1)
             raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
+    frames = filled(animation.frames, options.closing == "interpolate")
+    reference = int(animation.frames.present.argmax())
+    shape = shape_of(animation.figure, frames.shape_weights, reference)
+    body = body_of(animation.figure, shape, options.skinning)
+    return Sampled(animation, frames, body, options.world_up, color)
 
 
 def add_sampled(

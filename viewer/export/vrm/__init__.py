@@ -77,7 +77,12 @@ def export(selection: Selection, path: Path, options: ExportOptions) -> list[Dia
                     values={"names": listed(names), "n": len(names)},
                 )
             )
-        _require_meta(record, given, figure.name)
+        told = record.extensions["VRMC_vrm"].get("meta")
+        authors, licence = part(told, "authors"), part(told, "licenseUrl")
+        if not (authors and licence):
+            authors = given.authors or tuple(authors or ())
+            licence = given.licence or licence or ""
+            checked_meta(replace(given, authors=authors, licence=licence), figure.name)
     if record is not None and record.old_members is not None:
         figure, record = _facing_front(figure, record, bones)
         still = replace(still, figure=figure, pose=figure_pose(figure))
@@ -225,17 +230,6 @@ def _extended(figure: Figure, tails: Mapping[int, Floats]) -> Figure:
     return replace(figure, skeleton=more, skin=skin)
 
 
-def _require_meta(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
-    """Raise RigError if neither the file nor the options have the meta data that VRM needs."""
-    told = record.extensions["VRMC_vrm"].get("meta")
-    if not (part(told, "authors") and part(told, "licenseUrl")):
-        authors = meta.authors or tuple(part(told, "authors") or ())
-        checked_meta(
-            replace(meta, authors=authors, licence=meta.licence or part(told, "licenseUrl") or ""),
-            figure,
-        )
-
-
 def _unit_notes(figure: Figure) -> list[Diagnostic]:
     """Return a note about lengths that are converted, or whose unit is unknown."""
     if figure.unit not in METRES:
@@ -334,8 +328,11 @@ def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, 
     document.root["extensions"] = dict(extensions)
     _declare(document, *extensions)
     skeleton = body.figure.require_skeleton()
-    for node, item in _constraint_items(skeleton.constraints, built.tree.joints).items():
-        document.root["nodes"][node].setdefault("extensions", {})[_CONSTRAINT] = item
+    joints = built.tree.joints
+    for each in skeleton.constraints:
+        item = {"specVersion": "1.0", "constraint": {each.kind: _item(each, joints)}}
+        extended = document.root["nodes"][joints[each.joint]].setdefault("extensions", {})
+        extended[_CONSTRAINT] = item
         _declare(document, _CONSTRAINT)
 
 
@@ -392,16 +389,6 @@ def _lost(lost: Counter[str]) -> list[Diagnostic]:
         if parts
         else []
     )
-
-
-def _constraint_items(
-    constraints: tuple[Constraint, ...], joints: list[int]
-) -> dict[int, dict[str, Any]]:
-    """Return the extension of each constrained node; ``joints`` (J,) are those of the joints."""
-    return {
-        joints[each.joint]: {"specVersion": "1.0", "constraint": {each.kind: _item(each, joints)}}
-        for each in constraints
-    }
 
 
 def _item(each: Constraint, joints: list[int]) -> dict[str, Any]:

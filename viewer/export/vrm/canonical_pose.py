@@ -46,7 +46,11 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
     matrix[:3, :3] = scale * turn
     # A VRM character keeps its height above the ground.
     if figure.record is None or figure.record.vrm is None:
-        matrix[1, 3] = _lift(figure, joints, scale * turn[1])
+        up = scale * turn[1]
+        points = joints if figure.mesh is None else np.concatenate([joints, figure.mesh.positions])
+        heights = points @ up
+        low = float(heights.min())
+        matrix[1, 3] = -low if abs(low) > _NEAR * float(np.ptp(heights)) else 0.0
     return _transformed(figure, shapes, pose, local, matrix, scale, bones)
 
 
@@ -119,14 +123,6 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
     return np.stack([left, up, np.cross(left, up)])
 
 
-def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
-    """Return the height by which a figure is raised onto the ground; 0 if it is nearly there."""
-    points = joints if figure.mesh is None else np.concatenate([joints, figure.mesh.positions])
-    heights = points @ up
-    low = float(heights.min())
-    return -low if abs(low) > _NEAR * float(np.ptp(heights)) else 0.0
-
-
 def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
     """Return a figure with its mesh and bindings transformed as its joints already are."""
     mesh, skin = figure.mesh, figure.skin
@@ -150,7 +146,8 @@ def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
     for bone, sign in ((b, s) for s in (1.0, -1.0) for b in _BELOW):
         side = "left" if sign > 0.0 else "right"
         joint, below = bones[f"{side}{bone}"], bones[f"{side}{_BELOW[bone]}"]
-        world = _worlds(skeleton, rotations)
+        linear = quaternion_to_matrix(rotations) * skeleton.rest_scales[:, None, :]
+        world = joint_worlds(skeleton.parents, linear, skeleton.rest_translations)
         away = unit(world[below, :3, 3] - world[joint, :3, 3])
         wanted = np.array(_TARGETS[bone[-3:]]) * (sign if bone.endswith("Arm") else 1.0)
         angle = float(np.arccos(np.clip(away @ wanted, -1.0, 1.0)))
@@ -172,8 +169,3 @@ def unit_rotation(matrix: Floats) -> Floats:
     # A scale of 0 flattens or hides what is below a joint.
     found: Floats = linear / lengths if lengths.all() else nearest_rotations(linear)[0]
     return found
-
-
-def _worlds(skeleton: Skeleton, rotations: Floats) -> Floats:
-    linear = quaternion_to_matrix(rotations) * skeleton.rest_scales[:, None, :]
-    return joint_worlds(skeleton.parents, linear, skeleton.rest_translations)

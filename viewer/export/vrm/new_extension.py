@@ -37,24 +37,21 @@ def made_character(
             }
         },
     }
-    expressions = _expressions(built)
+    expressions: dict[str, Any] = {}
+    for placed in built.meshes:
+        for index, name in enumerate(placed.part.target_names):
+            preset = _BY_NAME.get(name.lower())
+            if preset is not None:
+                bind = {"node": placed.node, "index": index, "weight": 1.0}
+                expressions.setdefault(preset, {"morphTargetBinds": []})["morphTargetBinds"].append(
+                    bind
+                )
     if expressions:
         data["expressions"] = {"preset": expressions}
     views = [] if body.figure.mesh is None else _views(body.figure.mesh, built)
     if views:
         data["firstPerson"] = {"meshAnnotations": views}
     return data
-
-
-def _expressions(built: Built) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for placed in built.meshes:
-        for index, name in enumerate(placed.part.target_names):
-            preset = _BY_NAME.get(name.lower())
-            if preset is not None:
-                bind = {"node": placed.node, "index": index, "weight": 1.0}
-                found.setdefault(preset, {"morphTargetBinds": []})["morphTargetBinds"].append(bind)
-    return found
 
 
 def _views(mesh: Mesh, built: Built) -> list[Any]:

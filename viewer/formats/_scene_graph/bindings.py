@@ -167,7 +167,11 @@ def _bound_ancestors(bindings: Bindings) -> list[int]:
 
 def inverse_binds(bindings: Bindings) -> Floats:
     """Return every inverse bind matrix (J, 4, 4); joints without influence are bound at rest."""
-    worlds = _all_worlds(bindings)
+    # Auxiliary joints coincide with their parents.
+    parents = list(range(len(bindings.worlds)))
+    for parent in bindings.joints.parents[len(parents) :]:
+        parents.append(parents[parent])
+    worlds = bindings.worlds[parents]
     above = np.array(_bound_ancestors(bindings))
     result = np.tile(np.eye(4), (len(worlds), 1, 1))
     for joint, matrix in bindings.matrices.items():
@@ -179,14 +183,6 @@ def inverse_binds(bindings: Bindings) -> Floats:
     free &= _is_regular(worlds)
     result[free] = _inverse(worlds[free]) @ spaces[free]
     return result
-
-
-def _all_worlds(bindings: Bindings) -> Floats:
-    """Return the rest transforms of all joints; auxiliary joints coincide with their parents."""
-    parents = list(range(len(bindings.worlds)))
-    for parent in bindings.joints.parents[len(parents) :]:
-        parents.append(parents[parent])
-    return bindings.worlds[parents]
 
 
 def _agree(one: Floats, other: Floats, reach: float) -> bool:

@@ -68,7 +68,16 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
         raise source.fault(
             "F002.no-figure: expected meshes, skins or a hierarchy of nodes, found nothing to show"
         )
-    _check_vertices(file, groups, source)
+    # Refuse a file whose meshes, repeated at many nodes, would exhaust the memory.
+    sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
+    meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
+    count = sum(sizes[mesh] for mesh in meshes)
+    if count > _MOST_VERTICES:
+        raise source.fault(
+            "F002.many-vertices: expected at most {most} vertices, found {found} over all nodes",
+            most=_MOST_VERTICES,
+            found=count,
+        )
     readers = read_once(file.animations)
     order = scene_order(file) if file.cameras else []
     cameras = moved_cameras(file, groups, order)
@@ -97,19 +106,6 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
             names=listed(left_out),
         )
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
-
-
-def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Refuse a file whose meshes, repeated at many nodes, would exhaust the memory."""
-    sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
-    meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
-    count = sum(sizes[mesh] for mesh in meshes)
-    if count > _MOST_VERTICES:
-        raise source.fault(
-            "F002.many-vertices: expected at most {most} vertices, found {found} over all nodes",
-            most=_MOST_VERTICES,
-            found=count,
-        )
 
 
 def _above(file: NodeFile, cameras: set[int]) -> set[int]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._scene_graph.content import NodeFile, NodeMesh, NodeTree
-from viewer.rig.arrays import Bools
 from viewer.rig.hierarchy import roots_of, with_ancestors
 
 _MOST_TREES = 16  # maximum number of separate figures made from root trees of rigid meshes
@@ -63,12 +62,21 @@ class _Grouping:
         self.parents: list[int] = file.tree.parents.tolist()
         self.meshes: list[int] = file.tree.meshes.tolist()
         self.roots = roots_of(file.tree.parents)
-        self.is_identity = _identities(file.tree)
+        tree = self.tree
+        moved = np.concatenate(
+            [tree.translations, tree.rotations[:, :3], tree.scales - 1.0], axis=1
+        )
+        self.is_identity = np.array(~moved.any(axis=1))
+        self.is_identity[list(tree.matrices)] = False
         self.moved = set(file.humanoid.values()) | file.named_nodes
         self.moved.update(*(animation.nodes for animation in file.animations))
         for constraint in file.constraints:
             self.moved.update((constraint.joint, constraint.source))
-        self.drawn = _drawn_meshes(file)
+        self.drawn = {
+            index
+            for index, mesh in enumerate(file.meshes)
+            if any(len(primitive.triangles) for primitive in mesh.primitives)
+        }
         self.order = self._order()
         self.place = {node: place for place, node in enumerate(self.order)}
         self.mesh_nodes = [n for n in self.order if self.meshes[n] in self.drawn]
@@ -241,23 +249,6 @@ class _Grouping:
             skins = (self.file.skins[number] for number in figure.skins)
             of_skins = (skin.name for skin in skins if skin.name and top in skin.joints)
             figure.name = next(of_skins, self.tree.names[top] if top >= 0 else "")
-
-
-def _identities(tree: NodeTree) -> Bools:
-    """Return which nodes have the identity as their transform: (N,)."""
-    moved = np.concatenate([tree.translations, tree.rotations[:, :3], tree.scales - 1.0], axis=1)
-    same = np.array(~moved.any(axis=1))
-    same[list(tree.matrices)] = False
-    return same
-
-
-def _drawn_meshes(file: NodeFile) -> set[int]:
-    """Return the meshes with triangles."""
-    return {
-        index
-        for index, mesh in enumerate(file.meshes)
-        if any(len(primitive.triangles) for primitive in mesh.primitives)
-    }
 
 
 def _preorder(tree: NodeTree, tops: Iterable[int]) -> list[int]:

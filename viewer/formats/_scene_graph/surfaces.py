@@ -95,7 +95,9 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
                 influences = _divided(primitive, bindings.slots[skin])
             else:
                 joint, baked = bindings.rigid[node]
-                influences = _on_joint(len(primitive.positions), joint)
+                n_vertices = len(primitive.positions)
+                counts, joints = np.ones(n_vertices, np.int32), np.full(n_vertices, joint, np.int32)
+                influences = Influences(counts, joints, np.ones(n_vertices))
             if id(primitive) not in shadings:
                 shadings[id(primitive)] = _shading(primitive)
             sources, triangles, normals, is_flat = shadings[id(primitive)]
@@ -111,12 +113,6 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
                 Piece(node, part, primitive, baked, influences, sources, triangles, normals, kind)
             )
     return pieces
-
-
-def _on_joint(n_vertices: int, joint: int) -> Influences:
-    """Return the influences of vertices that follow one joint rigidly."""
-    counts, joints = np.ones(n_vertices, np.int32), np.full(n_vertices, joint, np.int32)
-    return Influences(counts, joints, np.ones(n_vertices))
 
 
 def _divided(primitive: Primitive, slots: Ints) -> Influences:
@@ -191,7 +187,13 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     counts = [len(piece.triangles) for piece in pieces]
     used = used_materials(pieces)
     slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
-    uvs = _uv_sets(pieces)
+    count = max(len(piece.primitive.uvs) for piece in pieces)
+
+    def of(index: int) -> Callable[[Primitive], Floats | None]:
+        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
+
+    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
+    uvs = tuple(values for values in sets if values is not None)
     return Mesh(
         positions=np.concatenate([_positions(piece) for piece in pieces]),
         normals=np.concatenate(
@@ -265,17 +267,6 @@ def _tangents(piece: Piece) -> Floats | None:
     # Tangents refer to the normals of the file.
     stored = None if read is None or piece.shading != "file" else read()
     return None if stored is None else moved_tangents(stored[piece.sources], piece.baked[:3, :3])
-
-
-def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
-    """Return every set of texture coordinates that a primitive has: (V, 2) each."""
-    count = max(len(piece.primitive.uvs) for piece in pieces)
-
-    def of(index: int) -> Callable[[Primitive], Floats | None]:
-        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
-
-    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
-    return tuple(values for values in sets if values is not None)
 
 
 def _filled(

@@ -164,7 +164,10 @@ def _chain(
     nodes = [part(each, "node") for each in joints]
     if not all(is_index(node, tree.n_nodes + len(ends)) for node in nodes):
         return None
-    obstacles = _obstacles_of(spring, groups)
+    # Each push is followed by restoring the length, which may move the point back into the
+    # collider, so a second push by the same collider moves it further.
+    chosen = [g for g in list_in(spring, "colliderGroups") if is_index(g, len(groups))]
+    obstacles = tuple(index for group in chosen for index in groups[group])
     center = part(spring, "center")
     chain = []
     for told, node, following in zip(joints, nodes, nodes[1:], strict=False):
@@ -186,14 +189,6 @@ def _chain(
                 _SpringJoint(node, tail, stiffness, drag, power * down, radius, at, obstacles)
             )
     return chain
-
-
-def _obstacles_of(spring: Any, groups: _Groups) -> tuple[int, ...]:
-    """Return the colliders of a chain's groups in order, and twice if two groups have one."""
-    # Each push is followed by restoring the length, which may move the point back into the
-    # collider, so a second push by the same collider moves it further.
-    chosen = [g for g in list_in(spring, "colliderGroups") if is_index(g, len(groups))]
-    return tuple(index for group in chosen for index in groups[group])
 
 
 def _tail_between(tree: NodeTree, head: int, tail: int) -> Floats | None:

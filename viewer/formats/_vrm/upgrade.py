@@ -103,7 +103,10 @@ def upgrade(file: NodeFile, source: Source) -> Upgrade:
         "meta": _meta(part(data, "meta"), file.textures, lost),
         "humanoid": _humanoid(data, lost),
     }
-    views = _views(data, file)
+    views = []
+    for each in list_in(data, "firstPerson", "meshAnnotations"):
+        view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
+        views += [{"node": node, "type": view} for node in _with_mesh(file, part(each, "mesh"))]
     character |= {"firstPerson": {"meshAnnotations": views}} if views else {}
     character |= _gaze(data, lost)
     expressions = _expressions(data, file)
@@ -136,15 +139,6 @@ def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
         if isinstance(value, int | float) and not default - _SAME <= value <= default + _SAME:
             lost.append(f"humanoid.{name}")
     return {"humanBones": bones}
-
-
-def _views(data: Any, file: NodeFile) -> list[Any]:
-    """Return annotations of nodes, converted from annotations of meshes."""
-    found = []
-    for each in list_in(data, "firstPerson", "meshAnnotations"):
-        view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
-        found += [{"node": node, "type": view} for node in _with_mesh(file, part(each, "mesh"))]
-    return found
 
 
 def _with_mesh(file: NodeFile, mesh: Any) -> list[int]:

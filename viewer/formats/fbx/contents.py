@@ -136,7 +136,7 @@ def node_file(source: Source) -> NodeFile:
         cameras=cameras,
         animations=_animations(source, told),
         up=told["up"],
-        unit=_unit(told["unit"]),
+        unit=min(METRES, key=lambda name: abs(np.log(METRES[name] / told["unit"]))),
         # Unanimated joints of a skeleton, such as its ends, stay joints.
         named_nodes=frozenset(range(n_joints) if told["stacks"] else ()),
         asset={"generator": told["creator"], "version": f"{told['version'] / 1000:g}"},
@@ -362,10 +362,6 @@ def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera
     return tuple(made), np.array(of_node, dtype=np.int32)
 
 
-def _unit(metres: float) -> str:
-    return min(METRES, key=lambda name: abs(np.log(METRES[name] / metres)))
-
-
 def _animations(source: Source, told: dict[str, Any]) -> tuple[NodeAnimation, ...]:
     meshes: dict[int, int] = {}  # mesh of each blend channel
     for at, mesh in enumerate(told["meshes"]):
@@ -512,7 +508,12 @@ def _material(source: Source, told: dict[str, Any], texture: Any) -> Material:
             texture=quoted(cut.name),
         )
         cut = None
-    has_alpha = cut is not None and base is not None and _has_alpha(base.image)
+    has_alpha = (
+        cut is not None
+        and base is not None
+        and base.image is not None
+        and int(base.image[..., 3].min()) < _LEAST_ALPHA
+    )
     # In FBX, a texture replaces the value of its property; in a material, it multiplies the value.
     metallic, roughness = (
         texture(told["metalness"]["texture"]),
@@ -541,10 +542,6 @@ def _material(source: Source, told: dict[str, Any], texture: Any) -> Material:
 
 def _is_drawn(texture: Texture | None) -> bool:
     return texture is not None and texture.image is not None
-
-
-def _has_alpha(image: Bytes | None) -> bool:
-    return image is not None and int(image[..., 3].min()) < _LEAST_ALPHA
 
 
 def _picture_name(source: Source, names: list[str]) -> str:

@@ -51,8 +51,15 @@ def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
     if np.linalg.det(linear) < 0.0:
         wanted = wanted[:, ::-1]
     influences = _influences(arrays, placed)
-    names = _attributes(arrays, placed)
-    numbered = _numbered(get, names)
+    sets = range(len(placed.told["uv_sets"]))
+    names = ["normals", "colors", *(f"uvs{row}" for row in sets)]
+    names = [name for name in names if f"{placed.prefix}.{name}" in arrays]
+    # An index of the value of each attribute at every corner of the file: (C,) each.
+    numbered = []
+    for name in names:
+        # Equal values get one index, because exporters repeat values for every corner.
+        _, number = np.unique(get(name) + 0.0, axis=0, return_inverse=True)
+        numbered.append(number.reshape(-1)[get(f"{name}.corners")])
     shapes = placed.told["shapes"]
     primitives = []
     for slot in np.unique(slots).tolist():
@@ -93,23 +100,6 @@ def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
 
 def _getter(arrays: Arrays, prefix: str) -> Any:
     return lambda name: arrays[f"{prefix}.{name}"]
-
-
-def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
-    """Return the names of the attributes per corner that the mesh has."""
-    sets = range(len(placed.told["uv_sets"]))
-    names = ["normals", "colors", *(f"uvs{row}" for row in sets)]
-    return [name for name in names if f"{placed.prefix}.{name}" in arrays]
-
-
-def _numbered(get: Any, names: list[str]) -> list[NDArray[np.intp]]:
-    """Return an index of the value of each attribute at every corner of the file: (C,) each."""
-    found = []
-    for name in names:
-        # Equal values get one index, because exporters repeat values for every corner.
-        _, number = np.unique(get(name) + 0.0, axis=0, return_inverse=True)
-        found.append(number.reshape(-1)[get(f"{name}.corners")])
-    return found
 
 
 def _distinct(

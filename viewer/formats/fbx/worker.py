@@ -123,7 +123,11 @@ class _Scene:
         """Return options for the conversion of axes or units that a figure cannot have."""
         settings, wanted = self.get(self.scene, "settings"), {}
         right, up, front = (int(axis) for axis in self.get(settings, "axes"))
-        vectors = [_vector(axis) for axis in (right, up, front)]
+        # Axes of ufbx are +x, -x, +y and so on.
+        vectors = [
+            np.eye(3)[axis % 6 // 2] * (1.0 if axis % 2 == 0 else -1.0)
+            for axis in (right, up, front)
+        ]
         is_known = max(right, up, front) < 6
         is_right_handed = is_known and np.allclose(np.cross(vectors[0], vectors[1]), vectors[2])
         if is_known and not (is_right_handed and up in (2, 4)):
@@ -141,11 +145,6 @@ class _Scene:
             sampled = _Sampled(self, self.items(self.scene, "anim_stacks")[int(stack[0])])
             return self.arrays, sampled.result()
         return self.arrays, _contents_of(self)
-
-
-def _vector(axis: int) -> np.ndarray[Any, Any]:
-    """Return the direction of an axis of ufbx: +x, -x, +y and so on."""
-    return np.eye(3)[axis % 6 // 2] * (1.0 if axis % 2 == 0 else -1.0)
 
 
 def _contents_of(kept: _Scene) -> dict[str, Any]:
@@ -217,15 +216,11 @@ def _add_nodes(kept: _Scene, nodes: list[Any]) -> None:
     for index, node in enumerate(nodes):
         for child in kept.items(node, "children"):
             parents[child.typed_id] = index
-        local[index] = _transform(kept, kept.get(node, "local_transform"))
+        transform = kept.get(node, "local_transform")
+        parts = (kept.get(transform, name) for name in ("translation", "rotation", "scale"))
+        local[index] = [float(number) for part in parts for number in part]
         geometry[index] = _matrix(kept.get(node, "geometry_to_node"))
     kept.arrays |= {"parents": parents, "local": local, "geometry": geometry}
-
-
-def _transform(kept: _Scene, transform: Any) -> list[float]:
-    """Return a translation, a quaternion (x, y, z, w) and a scale: 10 numbers."""
-    parts = (kept.get(transform, name) for name in ("translation", "rotation", "scale"))
-    return [float(number) for part in parts for number in part]
 
 
 def _matrix(matrix: Any) -> NDArray[np.float64]:

@@ -331,19 +331,15 @@ def _channel(reading: _Reading, channel: Element, moved: _Moved, node: int) -> N
     keys = reading.keys.get((index, path, n_shapes))
     if keys is None:
         sampler = reading.samplers[index]
-        times = _times(reading, sampler)
+        accessor = sampler.index("input", len(reading.document.accessors), "accessors")
+        if accessor not in reading.times:
+            times = _read_times(reading.document, sampler)
+            reading.times[accessor] = times
+            reading.n_equal += int(np.count_nonzero(times[1:] == times[:-1]))
+        times = reading.times[accessor]
         keys = _read_keys(reading.document, sampler, times, path, n_shapes)
         reading.keys[index, path, n_shapes] = keys
     return NodeChannel(node, path, keys.times, keys.values, keys.interpolation, keys.tangents)
-
-
-def _times(reading: _Reading, sampler: Element) -> Floats:
-    accessor = sampler.index("input", len(reading.document.accessors), "accessors")
-    if accessor not in reading.times:
-        times = _read_times(reading.document, sampler)
-        reading.times[accessor] = times
-        reading.n_equal += int(np.count_nonzero(times[1:] == times[:-1]))
-    return reading.times[accessor]
 
 
 def _read_times(document: Document, sampler: Element) -> Floats:

@@ -76,7 +76,11 @@ def check_document(
             _check_animation(document, animations[index])
         except FormatError:  # the error was reported when the item was read
             continue
-    report = _reporter(document)
+    root = Element(document.source, {})
+
+    def report(key: str, wanted: str, found: object, path: Sequence[str | int]) -> None:
+        document.source.warn(key, root.at(*path), wanted=wanted, found=str(found))
+
     _check_storage(document.root.values, report)
     _check_primitives(document, report)
     _check_structure(document.root.values, tree, skins, report)
@@ -301,16 +305,6 @@ def _check_rotations(document: Document, sampler: Element) -> None:
         )
 
 
-def _reporter(document: Document) -> _Report:
-    """Return a function that records a warning in the source of a document."""
-    root = Element(document.source, {})
-
-    def report(key: str, wanted: str, found: object, path: Sequence[str | int]) -> None:
-        document.source.warn(key, root.at(*path), wanted=wanted, found=str(found))
-
-    return report
-
-
 def _items_of(told: Any, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the objects in a list that is a member of an object, with their indices."""
     found = told.get(name) if isinstance(told, dict) else None
@@ -322,26 +316,22 @@ def _items_of(told: Any, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
 def _check_storage(root: dict[str, Any], report: _Report) -> None:
     """Check all accessors and buffer views."""
     for index, accessor in _items_of(root, "accessors"):
-        _check_accessor(accessor, index, report)
+        path, kind = ("accessors", index), accessor.get("componentType")
+        if accessor.get("normalized") is True and kind in _UNNORMALIZED:
+            wanted = "integers of 8 or 16 bits"
+            report(wording.STORAGE, wanted, f"component type {kind}", (*path, "normalized"))
+        if "byteOffset" in accessor and "bufferView" not in accessor:
+            report(wording.STORAGE, "a bufferView", "none", (*path, "byteOffset"))
+        for name in ("min", "max"):
+            bounds = accessor.get(name)
+            if isinstance(bounds, list) and not all(map(_is_number, bounds)):
+                report(wording.STORAGE, "numbers", "other values", (*path, name))
+            elif isinstance(bounds, list) and any(abs(each) > _LARGEST for each in bounds):
+                found = max(bounds, key=abs)
+                report(wording.STORAGE, "numbers in single precision", found, (*path, name))
     for index, view in _items_of(root, "bufferViews"):
         _check_view(root, view, index, report)
     _check_uses(root, report)
-
-
-def _check_accessor(accessor: dict[str, Any], index: int, report: _Report) -> None:
-    path, kind = ("accessors", index), accessor.get("componentType")
-    if accessor.get("normalized") is True and kind in _UNNORMALIZED:
-        wanted = "integers of 8 or 16 bits"
-        report(wording.STORAGE, wanted, f"component type {kind}", (*path, "normalized"))
-    if "byteOffset" in accessor and "bufferView" not in accessor:
-        report(wording.STORAGE, "a bufferView", "none", (*path, "byteOffset"))
-    for name in ("min", "max"):
-        bounds = accessor.get(name)
-        if isinstance(bounds, list) and not all(map(_is_number, bounds)):
-            report(wording.STORAGE, "numbers", "other values", (*path, name))
-        elif isinstance(bounds, list) and any(abs(each) > _LARGEST for each in bounds):
-            found = max(bounds, key=abs)
-            report(wording.STORAGE, "numbers in single precision", found, (*path, name))
 
 
 def _is_number(value: Any) -> bool:

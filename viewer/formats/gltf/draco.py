@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -43,22 +42,17 @@ def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitiv
             "F002.gltf-draco: compressed with Draco, which requires DracoPy: pip install DracoPy"
         ) from None
     view = extension.required_index("bufferView", document.buffers.n_views, "bufferViews")
-    mesh = _decoded(library, extension, document.buffers.view(view).data.tobytes())
-    arrays = {int(item["unique_id"]): np.asarray(item["data"]) for item in mesh.attributes}
-    n_bytes = sum(array.size for array in arrays.values()) * 8
-    document.spend(n_bytes, extension.pointer)
-    return DecodedPrimitive(_named(extension, arrays), np.asarray(mesh.faces, dtype=np.int64))
-
-
-def _decoded(library: ModuleType, extension: Element, data: bytes) -> Any:
-    """Return the mesh in compressed data."""
+    data = document.buffers.view(view).data.tobytes()
     try:
         mesh = library.decode(data)
     except (library.FileTypeException, MemoryError, RuntimeError, ValueError):
         raise extension.fault(wording.GLTF_COMPRESSED) from None
     if not isinstance(mesh, library.DracoMesh):
         raise extension.fault(wording.GLTF_COMPRESSED)
-    return mesh
+    arrays = {int(item["unique_id"]): np.asarray(item["data"]) for item in mesh.attributes}
+    n_bytes = sum(array.size for array in arrays.values()) * 8
+    document.spend(n_bytes, extension.pointer)
+    return DecodedPrimitive(_named(extension, arrays), np.asarray(mesh.faces, dtype=np.int64))
 
 
 def _named(extension: Element, arrays: dict[int, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -60,7 +60,7 @@ _READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\
 def check_extensions(document: Document) -> None:
     """Refuse a document that needs an unknown extension; report other unknown ones once."""
     required = [name for name in _names(document, "extensionsRequired") if name not in _KNOWN]
-    unknown = [name for name in required if not _changes_only_look(name)]
+    unknown = [name for name in required if not (name in _LOOKS or _LOOK.match(name) is not None)]
     pointer = document.root.at("extensionsRequired")
     if unknown:
         document.source.refuse(
@@ -93,10 +93,6 @@ def check_extensions(document: Document) -> None:
             "extensions",
             n=counted(len(lights.table("lights")), "light"),
         )
-
-
-def _changes_only_look(name: str) -> bool:
-    return name in _LOOKS or _LOOK.match(name) is not None
 
 
 def _names(document: Document, member: str) -> list[str]:

@@ -136,7 +136,14 @@ def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
     if surface is None:
         # In files with both models, the core one has the same content and takes precedence.
         extension = lenient(source, lambda: element.extension(_GLOSSINESS), None)
-        glossiness = None if extension is None else _read_glossiness(document, extension)
+        if extension is not None:
+            glossiness = Glossiness(
+                bounded_rows(extension, "diffuseFactor", (1.0, 1.0, 1.0, 1.0)),
+                bounded_rows(extension, "specularFactor", (1.0, 1.0, 1.0)),
+                bounded(extension, "glossinessFactor", 1.0),
+                read_slot(document, extension, "diffuseTexture"),
+                read_slot(document, extension, "specularGlossinessTexture"),
+            )
         surface = Element(source, {}, element.at("pbrMetallicRoughness"))
     values = {
         "name": lenient(source, lambda: element.text("name"), ""),
@@ -235,17 +242,6 @@ def _is_neutral(name: str, values: Any) -> bool:
     if name not in _NEUTRAL or type(values) is not dict:
         return False
     return all(values.get(key, value) == value for key, value in _NEUTRAL[name].items())
-
-
-def _read_glossiness(document: Document, element: Element) -> Glossiness:
-    """Return the factors and textures of the extension."""
-    return Glossiness(
-        bounded_rows(element, "diffuseFactor", (1.0, 1.0, 1.0, 1.0)),
-        bounded_rows(element, "specularFactor", (1.0, 1.0, 1.0)),
-        bounded(element, "glossinessFactor", 1.0),
-        read_slot(document, element, "diffuseTexture"),
-        read_slot(document, element, "specularGlossinessTexture"),
-    )
 
 
 def from_glossiness(stated: Glossiness, images: dict[int, DecodedImage]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from functools import partial
 from typing import Any, TypeVar
@@ -81,12 +81,22 @@ def _mesh(reading: _Reading, mesh: Element) -> NodeMesh:
     if not len(primitives):
         mesh.warn("G002.no-primitives: mesh without primitives")
     read = (_primitive(reading, primitives[place]) for place in range(len(primitives)))
-    return _mesh_of(mesh, [primitive for primitive in read if primitive is not None])
+    return _mesh_of(mesh, (primitive for primitive in read if primitive is not None))
 
 
-def _mesh_of(mesh: Element, read: list[Primitive]) -> NodeMesh:
+def _mesh_of(mesh: Element, read: Iterable[Primitive]) -> NodeMesh:
     primitives = mesh.table("primitives")
-    count = _n_targets(primitives)
+    # All primitives must have the same number of morph targets.
+    counts = [len(primitives[place].table("targets")) for place in range(len(primitives))]
+    for place, found in enumerate(counts):
+        if found != counts[0]:
+            raise primitives[place].fault(
+                "F002.gltf-targets: expected {expected} as in the first primitive, found {found}",
+                "targets",
+                expected=counted(counts[0], "morph target"),
+                found=found,
+            )
+    count = counts[0] if counts else 0
     return NodeMesh(
         mesh.text("name"),
         tuple(read),
@@ -465,20 +475,6 @@ def _finite_weights(attributes: _Attributes, number: int, weights: Floats) -> Fl
         )
         weights = np.where(bad, 0.0, weights)
     return weights
-
-
-def _n_targets(primitives: Table) -> int:
-    """Return the number of morph targets of a mesh, which all its primitives must have."""
-    counts = [len(primitives[place].table("targets")) for place in range(len(primitives))]
-    for place, found in enumerate(counts):
-        if found != counts[0]:
-            raise primitives[place].fault(
-                "F002.gltf-targets: expected {expected} as in the first primitive, found {found}",
-                "targets",
-                expected=counted(counts[0], "morph target"),
-                found=found,
-            )
-    return counts[0] if counts else 0
 
 
 def _read_targets(

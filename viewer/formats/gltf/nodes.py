@@ -199,7 +199,13 @@ def _put_matrices(table: Table, result: _Transforms) -> None:
         return
     _check_mixture(table, places)
     matrices = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
-    _check_affine(table, places, matrices)
+    odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _LAST_ROW).any(axis=1)
+    if odd.any():
+        first = int(odd.argmax())
+        row = " ".join(f"{value:g}" for value in matrices[first, 3])
+        raise table[int(places[first])].fault(
+            "F002.gltf-affine: expected 0 0 0 1 as the last row, found {found}", "matrix", found=row
+        )
     rotations, scales, is_exact = _decomposed(matrices[:, :3, :3])
     exact = places[is_exact]
     result.translations[exact] = matrices[is_exact, :3, 3]
@@ -220,16 +226,6 @@ def _check_mixture(table: Table, places: Ints) -> None:
                 "matrix",
                 names=listed(sorted(others)),
             )
-
-
-def _check_affine(table: Table, places: Ints, matrices: Floats) -> None:
-    odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _LAST_ROW).any(axis=1)
-    if odd.any():
-        first = int(odd.argmax())
-        row = " ".join(f"{value:g}" for value in matrices[first, 3])
-        raise table[int(places[first])].fault(
-            "F002.gltf-affine: expected 0 0 0 1 as the last row, found {found}", "matrix", found=row
-        )
 
 
 def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
@@ -254,7 +250,17 @@ def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
     if not len(scenes):
         return every
     scene = scenes[max(default, 0)]
-    roots = _roots(scene, tree)
+    nodes = scene.indices("nodes", tree.n_nodes, "nodes")
+    children = [node for node in nodes if tree.parents[node] >= 0]
+    if children:
+        scene.warn(
+            "G003.scene-child: {n} not a root (first: node {found}): shown from the root",
+            "nodes",
+            n=counted(len(children), "node", "is", "are"),
+            found=children[0],
+        )
+    # Transforms of the ancestors apply, so the tree is shown from its root.
+    roots = tuple(dict.fromkeys(roots_of(tree.parents)[nodes].tolist()))
     if len(scenes) > 1 and roots:
         name = scene.text("name") or str(max(default, 0))
         document.root.warn(
@@ -276,20 +282,6 @@ def shown_scene(document: Document) -> dict[str, Any]:
     scene = scenes[max(document.root.index("scene", len(scenes), "scenes"), 0)]
     name, extras = scene.text("name"), scene.values.get("extras")
     return ({"name": name} if name else {}) | ({} if extras is None else {"extras": extras})
-
-
-def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
-    nodes = scene.indices("nodes", tree.n_nodes, "nodes")
-    children = [node for node in nodes if tree.parents[node] >= 0]
-    if children:
-        scene.warn(
-            "G003.scene-child: {n} not a root (first: node {found}): shown from the root",
-            "nodes",
-            n=counted(len(children), "node", "is", "are"),
-            found=children[0],
-        )
-    # Transforms of the ancestors apply, so the tree is shown from its root.
-    return tuple(dict.fromkeys(roots_of(tree.parents)[nodes].tolist()))
 
 
 def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
