@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from viewer.formats import Source, read, save_bytes
 from viewer.phrases import agree, counted, file_size
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.file_record import Json
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rig.kinematics import world_matrices
@@ -110,7 +110,7 @@ def _fill(
     frames: Frames,
     world_up: str,
     bones: dict[str, int],
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, Json]:
     """Add nodes, keys and the extension; return the expressions."""
     figure = animation.figure
     above = {bone: _parent(bone, bones) for bone in bones}
@@ -139,7 +139,7 @@ def _fill(
         align_signs(quaternions)
         keys.add(nodes[bone], "rotation", quaternions, "VEC4")
     keys.add(nodes["hips"], "translation", hips, "VEC3")
-    extension: dict[str, Any] = {
+    extension: Json = {
         "specVersion": "1.0",
         "humanoid": {"humanBones": {bone: {"node": nodes[bone]} for bone in order}},
     }
@@ -222,10 +222,10 @@ def _losses(
 
 def _add_expressions(
     document: Document, keys: _Keys, figure: Figure, frames: Frames
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, Json]:
     """Add a node for each expression that is used; return the members of the extension."""
     shapes, weights = figure.blend_shapes, frames.shape_weights
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, Json] = {}
     rules = None if shapes is None else shapes.rules
     # Expressions of VRM 0.x have names of their own.
     pairs = () if rules is None else zip(rules.rows.tolist(), rules.presets, strict=False)
@@ -252,8 +252,8 @@ class _Keys:
     def __init__(self, document: Document, times: Floats) -> None:
         self._document = document
         self._times = document.array(times, "SCALAR", bounds=True)
-        self._samplers: list[dict[str, Any]] = []
-        self._channels: list[dict[str, Any]] = []
+        self._samplers: list[Json] = []
+        self._channels: list[Json] = []
 
     def add(self, node: int, path: str, values: Floats, kind: str) -> None:
         """Add one property of a node."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field
-from typing import Any
+from typing import Any, TypeAlias
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
+
+Json: TypeAlias = dict[str, Any]
+"""A JSON object that was parsed, or will be written."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -46,6 +45,7 @@ from viewer.rig.captures.cameras import CameraPath, CameraView
 from viewer.rig.captures.carried_view import carrier_of, moving_alone, played_with, view_in
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
+from viewer.rig.file_record import Json
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
 from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.motion.transform_clip import TransformClip
@@ -117,7 +117,7 @@ def _written(
 ) -> Diagnostic:
     """Return the note about a written file."""
     animations = {index for each in added for index in each.kept}
-    values: dict[str, Any] = {"size": file_size(size), "n": counted(len(animations), "animation")}
+    values: Json = {"size": file_size(size), "n": counted(len(animations), "animation")}
     cameras = [Phrase("{n}", n=counted(n_views, "camera"))] if n_views else []
     if len(actors) > 1:
         values |= {
@@ -392,7 +392,7 @@ def _add_cameras(
     keyed = dict(zip([actor for actor, _ in written], clips, strict=False))
     built, actors = dict(written), [actor for actor, _ in written]
     for view in views:
-        camera: dict[str, Any] = {"name": text_of(view.name)} if view.name else {}
+        camera: Json = {"name": text_of(view.name)} if view.name else {}
         focal_x, focal_y = float(view.intrinsic[0, 0]), float(view.intrinsic[1, 1])
         width, height = _size(view)
         angle = 2.0 * math.atan(0.5 * height / focal_y)
@@ -462,14 +462,14 @@ def _is_kept(path: CameraPath, clips: Sequence[TransformClip]) -> bool:
 def _add_path(
     document: Document,
     path: CameraPath,
-    item: dict[str, Any],
+    item: Json,
     together: Clips,
     clips: Sequence[TransformClip],
 ) -> int:
     """Add the nodes above a camera and their keys in some clips; return the topmost node."""
     rest, made = path.nodes, list[int]()
     for joint, parent in enumerate(rest.parents.tolist()):
-        node: dict[str, Any] = {"name": text_of(rest.names[joint])} if rest.names[joint] else {}
+        node: Json = {"name": text_of(rest.names[joint])} if rest.names[joint] else {}
         node |= item if joint == rest.n_joints - 1 else {}
         node["translation"] = rest.rest_translations[joint].tolist()
         node["rotation"] = rest.rest_rotations[joint].tolist()

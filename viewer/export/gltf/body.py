@@ -18,7 +18,7 @@ from viewer.export.gltf.skin import Influences, Shape, influences_of, inverse_bi
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.file_record import FileRecord
+from viewer.rig.file_record import FileRecord, Json
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import Skinning, skin_used
 
@@ -129,7 +129,7 @@ def _add_meshes(
             node = tree.joints[part.joint]
             document.root["nodes"][node]["mesh"] = mesh
         else:
-            item: dict[str, Any] = {"name": text_of(part.name)} if part.name else {}
+            item: Json = {"name": text_of(part.name)} if part.name else {}
             if record is not None and part.index in record.part_extras:
                 item["extras"] = record.part_extras[part.index]
             node = document.add("nodes", {**item, "mesh": mesh})
@@ -185,7 +185,7 @@ def _add_record(document: Document, record: FileRecord, joints: list[int], name:
         document.root["nodes"][joints[joint]]["extras"] = extras
 
 
-def _scene_members(record: FileRecord | None) -> dict[str, Any]:
+def _scene_members(record: FileRecord | None) -> Json:
     """Return the name and application data of the scene of a figure's file."""
     scene = {} if record is None else record.scene
     return {name: text_of(value) if name == "name" else value for name, value in scene.items()}
@@ -198,7 +198,7 @@ def _merged_extras(given: list[tuple[str, Any]]) -> Any:
     [{'figures': ['a', 'c'], 'extras': 1}, {'figures': ['b'], 'extras': 2}]
     """
     owners: dict[str, list[str]] = {}
-    values: dict[str, Any] = {}
+    values: Json = {}
     for name, extras in given:
         key = json.dumps(extras, sort_keys=True)
         values[key] = extras
@@ -213,7 +213,7 @@ def _merged_extras(given: list[tuple[str, Any]]) -> Any:
     return {_SOURCES: merged}
 
 
-def _listed(extras: Any) -> list[Any]:
+def _listed(extras: object) -> list[Any]:
     """Return the entries of application data that was already merged; empty for other data."""
     entries = extras.get(_SOURCES) if isinstance(extras, dict) and len(extras) == 1 else None
     is_ours = isinstance(entries, list) and all(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.errors import RigError
+from viewer.rig.file_record import Json
 
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 _TYPES = {
@@ -34,7 +35,7 @@ class Document:
     """Contents of a file; all objects are referred to by index."""
 
     def __init__(self, name: str) -> None:
-        self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "viewer"}}
+        self.root: Json = {"asset": {"version": "2.0", "generator": "viewer"}}
         self.extras: list[tuple[str, Any]] = []
         """Name and application data of each figure whose file has some."""
         self.n_omitted = 0
@@ -45,18 +46,20 @@ class Document:
         self._pictures: dict[bytes, int] = {}
         self._arrays: dict[tuple[object, ...], list[int]] = {}
 
-    def add(self, kind: str, item: dict[str, Any]) -> int:
+    def add(self, kind: str, item: Json) -> int:
         """Append an item to ``nodes``, ``meshes`` … and return its index."""
-        items: list[dict[str, Any]] = self.root.setdefault(kind, [])
+        items: list[Json] = self.root.setdefault(kind, [])
         items.append(item)
         return len(items) - 1
 
-    def array(self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False) -> int:
+    def array(
+        self, values: NDArray[np.number], kind: str, target: int = 0, bounds: bool = False
+    ) -> int:
         """Add values (N, ...), N > 0, of which floats become float32; return the accessor."""
         return self.arrays(values[None], kind, target, bounds)[0]
 
     def arrays(
-        self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False
+        self, values: NDArray[np.number], kind: str, target: int = 0, bounds: bool = False
     ) -> list[int]:
         """Add arrays (A, N, ...) as ``array`` does, equal ones once; return their accessors."""
         stored = self._stored(values)
@@ -95,7 +98,7 @@ class Document:
             return self._arrays[known][0]
         view = self._view(data, VERTICES)
         self.root["bufferViews"][view]["byteStride"] = stride
-        accessor: dict[str, Any] = {
+        accessor: Json = {
             "bufferView": view,
             "byteOffset": 0,
             "componentType": _TYPES[stored.dtype],
@@ -134,7 +137,7 @@ class Document:
         uri = quote(buffer_name.encode("utf-8", "surrogateescape"), safe="")
         return self._json({"uri": uri, "byteLength": self._size}), b"".join(self._parts)
 
-    def _json(self, buffer: dict[str, Any]) -> bytes:
+    def _json(self, buffer: Json) -> bytes:
         whole = {**self.root, "buffers": [buffer]} if self._parts else self.root
         try:
             return _text(whole)
@@ -151,7 +154,7 @@ class Document:
         self._size += len(padded)
         return self.add("bufferViews", view)
 
-    def _stored(self, values: NDArray[Any]) -> NDArray[Any]:
+    def _stored(self, values: NDArray[np.number]) -> NDArray[np.number]:
         if values.dtype.kind != "f":
             return np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
         with np.errstate(over="ignore"):
@@ -164,13 +167,13 @@ class Document:
         return single
 
 
-def _text(value: Any) -> bytes:
+def _text(value: object) -> bytes:
     """Return JSON, with ``?`` for half a surrogate; infinite and NaN numbers raise ValueError."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", "replace")
 
 
-def _finite(value: Any) -> tuple[Any, int]:
+def _finite(value: object) -> tuple[Any, int]:
     """Return a value without infinite and NaN members, which are 0 in lists, and their number."""
     if isinstance(value, dict):
         found = {key: _finite(each) for key, each in value.items() if not _is_odd(each)}
@@ -183,7 +186,7 @@ def _finite(value: Any) -> tuple[Any, int]:
     return value, 0
 
 
-def _is_odd(value: Any) -> bool:
+def _is_odd(value: object) -> bool:
     return isinstance(value, float) and not math.isfinite(value)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from viewer.formats._scene_graph.content import NodeChannel
 from viewer.phrases import agree, counted, listed, optional
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.file_record import Json
 from viewer.rig.motion.evaluation import Frames, frames_of, still_frames, still_pose
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, sample_transforms
 from viewer.rig.pose import Pose
@@ -106,7 +106,7 @@ def place_figures(
             continue
         # Nodes of skinned meshes stay roots, because their transforms have no effect.
         moved = [root for root in each.roots if "skin" not in document.root["nodes"][root]]
-        item: dict[str, Any] = {"name": text_of(actor.name), "children": moved}
+        item: Json = {"name": text_of(actor.name), "children": moved}
         node = document.add("nodes", item)
         roots[:] = [root for root in roots if root not in moved] + [node]
         if not stays:

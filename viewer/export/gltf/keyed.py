@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from viewer.export.gltf.document import Document, text_of
 from viewer.export.gltf.mesh import Placed
 from viewer.export.gltf.nodes import Locals, Tree
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.file_record import Json
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.transform_clip import (
@@ -66,7 +67,7 @@ class Clips:
             name = (clip.name, clip.number, clip.start, clip.end, first_time(clip))
             known = self._known.setdefault(name, [])
             common = next((index for index in known if index not in added), -1)
-            item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
+            item: Json = {"name": text_of(clip.name)} if clip.name else {}
             item |= {} if clip.extras is None else {"extras": clip.extras}
             index = _put_animation(self._document, item, keys.samplers, keys.channels, common)
             if common < 0:
@@ -86,8 +87,8 @@ class _Keys:
 
     def __init__(self, document: Document, times: dict[bytes, int], first: float) -> None:
         self._document, self._times, self._first = document, times, first
-        self.samplers: list[dict[str, Any]] = []
-        self.channels: list[dict[str, Any]] = []
+        self.samplers: list[Json] = []
+        self.channels: list[Json] = []
 
     def add(self, node: int, channel: TransformChannel) -> None:
         """Add the keys of a joint or mesh."""
@@ -225,9 +226,9 @@ def add_animation(
 
 def _put_animation(
     document: Document,
-    item: dict[str, Any],
-    samplers: list[dict[str, Any]],
-    channels: list[dict[str, Any]],
+    item: Json,
+    samplers: list[Json],
+    channels: list[Json],
     into: int = -1,
 ) -> int:
     """Add samplers and their channels to an animation, -1 for a new one; return its index."""
@@ -247,8 +248,8 @@ class _AnimationParts:
 
     def __init__(self, document: Document, times: int) -> None:
         self.document, self.times = document, times
-        self.samplers: list[dict[str, Any]] = []
-        self.channels: list[dict[str, Any]] = []
+        self.samplers: list[Json] = []
+        self.channels: list[Json] = []
 
     def add(self, node: int, path: str, output: int) -> None:
         target = {"node": node, "path": path}

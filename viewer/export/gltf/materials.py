@@ -12,6 +12,7 @@ from viewer.export.gltf.document import Document, text_of
 from viewer.media.png import encode_png
 from viewer.phrases import brief
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.file_record import Json
 from viewer.rig.material import MINIFICATIONS, Texture
 from viewer.rig.mesh import Mesh
 
@@ -65,7 +66,7 @@ class Materials:
             for kind, texture in (material.textures if has_uvs else {}).items()
             if texture.image is not None
         }
-        surface: dict[str, Any] = {}
+        surface: Json = {}
         if material.base_color is not None:
             surface["baseColorFactor"] = list(material.base_color)
         elif "base_texture" not in shown:
@@ -81,9 +82,9 @@ class Materials:
             packed = _packed(shown.get("metallic_texture"), shown.get("roughness_texture"))
             surface["metallicRoughnessTexture"] = self._reference(packed, name)
         title = material.name if self._is_own else name
-        rest: dict[str, Any] = {"doubleSided": material.double_sided}
+        rest: Json = {"doubleSided": material.double_sided}
         rest |= {} if material.extras is None else {"extras": material.extras}
-        extensions: dict[str, Any] = {}
+        extensions: Json = {}
         if "normal_texture" in shown:
             normal = self._reference(shown["normal_texture"], name)
             rest["normalTexture"] = {**normal, "scale": material.normal_scale}
@@ -108,13 +109,13 @@ class Materials:
             self._declare(*extensions)
         return self._add(title, surface, rest)
 
-    def _add(self, name: str, surface: dict[str, Any], rest: dict[str, Any] | None = None) -> int:
+    def _add(self, name: str, surface: Json, rest: Json | None = None) -> int:
         # Triangles may be wound either way unless the file states that they are single-sided.
         rest = {"doubleSided": True} if rest is None else rest
         item = {"name": text_of(name)} if name else {}
         return self._document.add("materials", {**item, "pbrMetallicRoughness": surface, **rest})
 
-    def _reference(self, texture: Texture, name: str) -> dict[str, Any]:
+    def _reference(self, texture: Texture, name: str) -> Json:
         """Return a texture's index with its transform; each image is written once."""
         assert texture.image is not None  # checked by the caller
         image = texture.image
@@ -130,7 +131,7 @@ class Materials:
             self._textures[pair] = self._document.add(
                 "textures", {"sampler": sampler, "source": source}
             )
-        reference: dict[str, Any] = {"index": self._textures[pair]}
+        reference: Json = {"index": self._textures[pair]}
         if texture.uv_set:
             reference["texCoord"] = texture.uv_set
         if not texture.is_placed_plainly:
@@ -183,7 +184,7 @@ def _same_place(one: Texture, other: Texture) -> bool:
     return same and (one.wrap, one.is_smooth) == (other.wrap, other.is_smooth)
 
 
-def _placement(matrix: Floats) -> tuple[dict[str, Any], float]:
+def _placement(matrix: Floats) -> tuple[Json, float]:
     """Return the members of KHR_texture_transform for a transform (2, 3), and the omitted shear."""
     # In glTF, v = 0 at the first image row, so v is flipped before and after the extension's
     # T(offset) R(-rotation) S(scale).

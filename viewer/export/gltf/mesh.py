@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from viewer.export.gltf.materials import Materials
 from viewer.export.gltf.skin import Influences, Shape, influence_sets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.file_record import Json
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import moved_tangents, unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
@@ -59,8 +59,8 @@ def add_mesh(
         sets = [*influence_sets(influences, part.sources)]
         for number, (joints, weights) in enumerate(encoding.influences(sets)):
             attributes |= {f"JOINTS_{number}": joints, f"WEIGHTS_{number}": weights}
-    item: dict[str, Any] = {"name": text_of(part.mesh_name)} if part.mesh_name else {}
-    shared: dict[str, Any] = {"attributes": attributes}
+    item: Json = {"name": text_of(part.mesh_name)} if part.mesh_name else {}
+    shared: Json = {"attributes": attributes}
     record = shape.figure.record
     extras = None if record is None else record.mesh_extras.get(part.index)
     shapes = shape.figure.blend_shapes
@@ -128,8 +128,8 @@ def _primitives(
     materials: Materials,
     part: Part,
     surface: _Surface,
-    shared: dict[str, Any],
-) -> list[dict[str, Any]]:
+    shared: Json,
+) -> list[Json]:
     triangles, n_vertices = part.triangles, len(part.sources)
     if len(triangles) == 0:
         return [{**shared, "mode": _POINTS, "material": materials.plain()}]

@@ -15,8 +15,6 @@ or converted.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -24,6 +22,7 @@ from viewer.errors import RigError
 from viewer.export.gltf.document import Document, text_of
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.evaluation import constrained
+from viewer.rig.file_record import Json
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.skeleton import Skeleton
@@ -83,7 +82,7 @@ def add_nodes(
         if np.sum(skeleton.parents < 0) == 1 and not moved and not _above(up, unit):
             own = _add_joints(document, skeleton, still)
             return Tree(own[0], -1, own, [])
-    top: dict[str, Any] = {"name": text_of(name)}
+    top: Json = {"name": text_of(name)}
     place = root = document.add("nodes", top)
     above = _above(up, unit)
     if above:
@@ -104,7 +103,7 @@ def add_nodes(
     return Tree(root, place, joints, fixed)
 
 
-def _above(up: str, unit: str) -> dict[str, Any]:
+def _above(up: str, unit: str) -> Json:
     """Return the properties and name of the node above the whole figure; may be empty."""
     names, node = [], {}
     if up == "z":
@@ -131,7 +130,7 @@ def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[i
         if parent >= 0:
             below[parent].append(first + joint)
     for joint, name in enumerate(skeleton.names):
-        node: dict[str, Any] = {"name": text_of(name)} if name else {}
+        node: Json = {"name": text_of(name)} if name else {}
         _put(node, "translation", still.translations[joint], 0.0)
         rotation = still.rotations[joint]
         _put(node, "rotation", rotation / np.linalg.norm(rotation), _NO_ROTATION)
@@ -142,7 +141,7 @@ def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[i
     return list(range(first, first + skeleton.n_joints))
 
 
-def _put(node: dict[str, Any], name: str, values: Floats, default: float | Floats) -> None:
+def _put(node: Json, name: str, values: Floats, default: float | Floats) -> None:
     if (values != default).any():
         if not np.isfinite(values).all():
             raise RigError("expected finite numbers in the pose, which glTF needs")

@@ -37,7 +37,7 @@ from viewer.phrases import agree, all_of, counted, listed, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
-from viewer.rig.file_record import VrmRecord
+from viewer.rig.file_record import Json, VrmRecord
 from viewer.rig.humanoid import REQUIRED_BONES
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, figure_pose
@@ -137,10 +137,10 @@ def _repaired(record: VrmRecord, bones: Mapping[str, int]) -> tuple[VrmRecord, l
     return replace(record, extensions={**record.extensions, "VRMC_vrm": told}), names
 
 
-def _remove_bones(told: Any, bones: Mapping[str, int]) -> list[str]:
+def _remove_bones(told: Json, bones: Mapping[str, int]) -> list[str]:
     """Remove the bones that are unknown, misplaced, or have the node of an earlier one."""
     removed: list[str] = []
-    nodes: list[Any] = []
+    nodes: list[object] = []
     # Required bones come first, so that they keep a node that an optional bone also uses.
     rows = sorted(given_bones(told, 1), key=lambda row: row[1] not in REQUIRED_BONES)
     for _, bone, node in rows:
@@ -152,7 +152,7 @@ def _remove_bones(told: Any, bones: Mapping[str, int]) -> list[str]:
     return removed
 
 
-def _limit_weights(told: Any) -> list[str]:
+def _limit_weights(told: object) -> list[str]:
     """Limit the weights of expressions; return the names of those that were changed."""
     changed = []
     for bind, _, name in weighted_binds(told, 1):
@@ -306,7 +306,7 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
 
 
 def _add_made(
-    bones: Mapping[str, int], meta: dict[str, Any], document: Document, body: Body, built: Built
+    bones: Mapping[str, int], meta: Json, document: Document, body: Body, built: Built
 ) -> list[Diagnostic]:
     """Add the extension of a figure from another format."""
     extensions = {"VRMC_vrm": made_character(body, built, bones, meta)}
@@ -354,7 +354,7 @@ def _written(data: Mapping[str, Any], extensions: Mapping[str, Any]) -> Diagnost
     return Diagnostic("X001.vrm: VRM 1.0: {parts}", values={"parts": all_of(parts)})
 
 
-def _size(data: Any) -> int:
+def _size(data: object) -> int:
     """Return the number of members of parsed JSON; 0 if it is neither a list nor an object."""
     return len(data) if isinstance(data, list | dict) else 0
 
@@ -391,8 +391,8 @@ def _lost(lost: Counter[str]) -> list[Diagnostic]:
     )
 
 
-def _item(each: Constraint, joints: list[int]) -> dict[str, Any]:
-    item: dict[str, Any] = {"source": joints[each.source], "weight": each.weight}
+def _item(each: Constraint, joints: list[int]) -> Json:
+    item: Json = {"source": joints[each.source], "weight": each.weight}
     axis = max(range(3), key=lambda index: abs(each.axis[index]))
     if each.kind == "roll":
         item["rollAxis"] = _AXES[axis]

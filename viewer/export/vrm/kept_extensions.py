@@ -12,7 +12,7 @@ from typing import Any
 from viewer.export.gltf.body import Built
 from viewer.export.gltf.document import Document
 from viewer.formats._vrm.parts import is_index, list_in, part
-from viewer.rig.file_record import VrmRecord
+from viewer.rig.file_record import Json, VrmRecord
 
 _SPRINGS = "VRMC_springBone"
 _BINDS = {
@@ -24,7 +24,7 @@ _BINDS = {
 _KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # image formats that VRM allows
 
 
-def kept_extensions(maps: Maps) -> dict[str, Any]:
+def kept_extensions(maps: Maps) -> Json:
     """Return the root extensions ``VRMC_vrm`` and ``VRMC_springBone`` of a character."""
     data = maps.record.extensions
     found = {"VRMC_vrm": _character(data["VRMC_vrm"], maps)}
@@ -33,7 +33,7 @@ def kept_extensions(maps: Maps) -> dict[str, Any]:
     return found
 
 
-def _character(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+def _character(data: Json, maps: Maps) -> Json:
     result = dict(data)
     bones = part(data, "humanoid", "humanBones")
     given = bones.items() if isinstance(bones, dict) else ()
@@ -67,7 +67,7 @@ def _character(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
     return result
 
 
-def _rows(data: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
+def _rows(data: object, name: str, found: Callable[[Any], int | None]) -> list[Any]:
     """Return the objects of a list with translated indices, except those whose index is lost."""
     rows = data if isinstance(data, list) else []
     return [
@@ -77,7 +77,7 @@ def _rows(data: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]
     ]
 
 
-def _expression(data: Any, maps: Maps) -> Any:
+def _expression(data: object, maps: Maps) -> Any:
     if not isinstance(data, dict):
         return data
     result = dict(data)
@@ -88,7 +88,7 @@ def _expression(data: Any, maps: Maps) -> Any:
     return result
 
 
-def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+def _springs(data: Json, maps: Maps) -> Json:
     """Return the spring bones; chains with a lost joint are omitted as a whole."""
     result, places, colliders = dict(data), dict[int, int](), list[Any]()
     for index, each in enumerate(list_in(data, "colliders")):
@@ -119,7 +119,7 @@ def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
     return {**result, "springs": springs}
 
 
-def _spring(data: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, Any]:
+def _spring(data: Json, maps: Maps, has_colliders: bool) -> Json:
     """Return one chain; an empty one if a joint is lost."""
     listed = data.get("joints")
     joints = _rows(listed, "node", lambda node: maps.joint(node, "spring-joints"))
@@ -134,7 +134,7 @@ def _spring(data: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, 
     return result
 
 
-def kept_toon(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+def kept_toon(data: Json, maps: Maps) -> Json:
     """Return the toon shading of a material; textures that cannot be read are omitted."""
     result = {}
     for name, each in data.items():
@@ -162,15 +162,15 @@ class Maps:
         }
         self.lost: Counter[str] = Counter()
 
-    def joint(self, node: Any, kind: str) -> int | None:
+    def joint(self, node: object, kind: str) -> int | None:
         """Return the written node of a joint; None, counted as lost, if there is none."""
         return self._found(self._joints, node, kind)
 
-    def drawn(self, node: Any, kind: str) -> int | None:
+    def drawn(self, node: object, kind: str) -> int | None:
         """Return the written node of a mesh; None, counted as lost, if there is none."""
         return self._found(self._drawn, node, kind)
 
-    def material(self, index: Any, kind: str) -> int | None:
+    def material(self, index: object, kind: str) -> int | None:
         """Return a written material; None, counted as lost, if there is none."""
         return self._found(self._materials, index, kind)
 
@@ -179,7 +179,7 @@ class Maps:
         """Written materials, by material of the original file; only those in use."""
         return self._materials
 
-    def image(self, index: Any, kind: str) -> int | None:
+    def image(self, index: object, kind: str) -> int | None:
         """Return a written image; None, counted as lost, if it cannot be read."""
         stored = self.record.textures
         image = stored.image(index) if stored is not None and type(index) is int else None
@@ -188,7 +188,7 @@ class Maps:
             return None
         return self._document.picture(image.data, image.name or "image")
 
-    def texture(self, index: Any, kind: str) -> int | None:
+    def texture(self, index: object, kind: str) -> int | None:
         """Return a written texture; None, counted as lost, if its image cannot be read."""
         stored = self.record.textures
         listed = () if stored is None else stored.textures
@@ -205,12 +205,12 @@ class Maps:
             item = {"sampler": self._same("samplers", samplers[sampler]), **item}
         return self._same("textures", item)
 
-    def _same(self, kind: str, item: Any) -> int:
+    def _same(self, kind: str, item: Json) -> int:
         """Return the index of an equal item, which is added if there is none."""
         items = self._document.root.get(kind, [])
         return items.index(item) if item in items else self._document.add(kind, item)
 
-    def _found(self, places: dict[int, int], index: Any, kind: str) -> int | None:
+    def _found(self, places: dict[int, int], index: object, kind: str) -> int | None:
         found = places.get(index) if type(index) is int else None
         if found is None:
             self.lost[kind] += 1

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._options import VrmMeta
 from viewer.export.gltf.document import text_of
 from viewer.formats._vrm.upgrade import LICENCE
 from viewer.phrases import Remedy
+from viewer.rig.file_record import Json
 
 
-def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
+def checked_meta(meta: VrmMeta, figure: str) -> Json:
     """Return meta data for a new VRM 1.0; without authors or a licence it raises RigError."""
     if not any(meta.authors) or not meta.licence:
         raise RigError(
@@ -37,7 +36,7 @@ def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
     }
 
 
-def changed_meta(data: dict[str, Any], meta: VrmMeta) -> dict[str, Any]:
+def changed_meta(data: Json, meta: VrmMeta) -> Json:
     """Return a file's meta data with the requested changes; empty ones keep those of the file."""
     changed = dict(data)
     if meta.name:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from viewer.export.gltf.body import Body, Built
+from viewer.rig.file_record import Json
 from viewer.rig.mesh import Mesh, PartView
 
 PRESETS = (
@@ -24,11 +25,9 @@ _VIEWS: dict[PartView, str] = {
 }
 
 
-def made_character(
-    body: Body, built: Built, bones: Mapping[str, int], meta: dict[str, Any]
-) -> dict[str, Any]:
+def made_character(body: Body, built: Built, bones: Mapping[str, int], meta: Json) -> Json:
     """Return the extension: human bones, meta data, views of parts, and preset expressions."""
-    data: dict[str, Any] = {
+    data: Json = {
         "specVersion": "1.0",
         "meta": meta,
         "humanoid": {
@@ -37,7 +36,7 @@ def made_character(
             }
         },
     }
-    expressions: dict[str, Any] = {}
+    expressions: Json = {}
     for placed in built.meshes:
         for index, name in enumerate(placed.part.target_names):
             preset = _BY_NAME.get(name.lower())

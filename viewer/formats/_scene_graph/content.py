@@ -186,11 +186,11 @@ class MorphTargets:
     def __init__(
         self,
         n_vertices: int,
-        offsets: Iterable[NDArray[Any] | None],
+        offsets: Iterable[NDArray[np.number] | None],
         rows: NDArray[np.integer] | None = None,
     ) -> None:
         self.n_vertices, self._rows = n_vertices, rows
-        self._parts: list[NDArray[Any] | Moved | None] = [*offsets]
+        self._parts: list[NDArray[np.number] | Moved | None] = [*offsets]
 
     def __len__(self) -> int:
         return len(self._parts)
@@ -202,7 +202,7 @@ class MorphTargets:
             self._parts[target] = part = self._compressed(part)
         return part
 
-    def _compressed(self, offsets: NDArray[Any] | None) -> Moved:
+    def _compressed(self, offsets: NDArray[np.number] | None) -> Moved:
         if offsets is None:
             return np.zeros(0, dtype=np.intp), np.zeros((0, 3))
         offsets = offsets if self._rows is None else offsets[self._rows]

@@ -15,7 +15,7 @@ _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbPro
 
 
 def read_humanoid(
-    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+    source: Source, file: NodeFile, told: Mapping[str, object], version: int, pointer: str
 ) -> dict[str, int]:
     """Return the node of each human bone, by its name in VRM 1.0; invalid bones are reported."""
     found: dict[str, int] = {}
@@ -39,7 +39,7 @@ def read_humanoid(
     return found
 
 
-def given_bones(told: Mapping[str, Any], version: int) -> list[tuple[str, str, Any]]:
+def given_bones(told: object, version: int) -> list[tuple[str, str, Any]]:
     """Return the place of each stated human bone in its list, its name in VRM 1.0, and its node."""
     bones = part(told, "humanoid", "humanBones")
     if version == 0 and isinstance(bones, list):

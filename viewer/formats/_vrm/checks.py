@@ -6,13 +6,13 @@ Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_v
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from viewer.diagnostics import wording
 from viewer.formats._source import Source
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.parts import list_in, part
 from viewer.phrases import counted, listed, quoted
+from viewer.rig.file_record import Json
 from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 
 _MODERN = "1.0"
@@ -21,7 +21,7 @@ MOST_WEIGHT = {0: 100.0, 1: 1.0}
 _REQUIRED_META = ("name", "authors", "licenseUrl")
 
 
-def check_character(source: Source, extensions: Mapping[str, Any], version: int) -> None:
+def check_character(source: Source, extensions: Mapping[str, object], version: int) -> None:
     """Report what a VRM character lacks or states twice; each place has a JSON pointer."""
     key = "VRMC_vrm" if version == 1 else "VRM"
     told, at = extensions[key], f"/extensions/{key}"
@@ -31,7 +31,7 @@ def check_character(source: Source, extensions: Mapping[str, Any], version: int)
             "/extensions/VRM",
         )
     if version == 1:
-        stated = told.get("specVersion")
+        stated = part(told, "specVersion")
         if stated is None:
             source.warn('G008.no-version: expected specVersion "1.0", found none', at)
         elif stated != _MODERN:
@@ -40,7 +40,7 @@ def check_character(source: Source, extensions: Mapping[str, Any], version: int)
                 f"{at}/specVersion",
                 found=quoted(str(stated)),
             )
-    meta = told.get("meta")
+    meta = part(told, "meta")
     if not isinstance(meta, dict):
         source.warn("G008.no-meta: expected meta data with authors and licence, found none", at)
     elif version == 1 and (missing := [name for name in _REQUIRED_META if not meta.get(name)]):
@@ -62,7 +62,7 @@ def check_character(source: Source, extensions: Mapping[str, Any], version: int)
             )
 
 
-def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str) -> None:
+def _check_bones(source: Source, told: object, version: int, at: str) -> None:
     """Check that all required bones occur, each once and with its own node."""
     given = given_bones(told, version)
     if missing := [bone for bone in REQUIRED_BONES if bone not in {bone for _, bone, _ in given}]:
@@ -72,7 +72,7 @@ def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str)
             n=counted(len(missing), "required human bone"),
             names=listed(missing),
         )
-    owners: dict[Any, str] = {}
+    owners: dict[object, str] = {}
     seen: set[str] = set()
     for place, bone, node in given:
         if bone in seen:
@@ -97,15 +97,14 @@ def _check_bones(source: Source, told: Mapping[str, Any], version: int, at: str)
                     source.warn(wording.BONE_TWICE, f"{at}/{bone}", bone=quoted(bone))
 
 
-def is_weight(weight: Any, version: int) -> bool:
+def is_weight(weight: object, version: int) -> bool:
     """Return whether the weight of a morph target in an expression is within its limits."""
-    is_number = isinstance(weight, int | float) and not isinstance(weight, bool)
-    return is_number and 0.0 <= weight <= MOST_WEIGHT[version]
+    if not isinstance(weight, int | float) or isinstance(weight, bool):
+        return False
+    return 0.0 <= weight <= MOST_WEIGHT[version]
 
 
-def weighted_binds(
-    told: Mapping[str, Any], version: int
-) -> Iterator[tuple[dict[str, Any], str, str]]:
+def weighted_binds(told: object, version: int) -> Iterator[tuple[Json, str, str]]:
     """Yield the binds of morph targets, the place of each weight, and its expression's name."""
     if version == 0:
         for index, each in enumerate(list_in(told, "blendShapeMaster", "blendShapeGroups")):

@@ -10,8 +10,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from viewer.formats._scene_graph.content import NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.parts import is_index, part, value_of
@@ -54,7 +52,7 @@ def _pointer(node: int) -> str:
     return f"/nodes/{node}/extensions/{_EXTENSION}"
 
 
-def _constraint(tree: NodeTree, node: int, told: Any) -> Constraint | str:
+def _constraint(tree: NodeTree, node: int, told: object) -> Constraint | str:
     """Return the constraint of a node, or a description of the expected value."""
     kinds = [kind for kind in _KINDS if part(told, kind) is not None]
     if len(kinds) != 1:

@@ -31,6 +31,7 @@ import numpy as np
 from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
 from viewer.rig.arrays import Floats
 from viewer.rig.expressions import COLOR_KINDS, TRANSFORM
+from viewer.rig.file_record import Json
 from viewer.rig.srgb import decode_srgb
 
 _Bind = tuple[int, str, Floats]
@@ -88,9 +89,9 @@ _OUTLINE_WIDTHS = (0.0, 0.01, 0.005)
 _WRITES_DEPTH = 3  # value of _BlendMode
 
 
-def upgraded_binds(told: Any, materials: list[Any]) -> tuple[dict[str, list[Any]], list[str]]:
+def upgraded_binds(told: object, materials: list[Any]) -> tuple[dict[str, list[Any]], list[str]]:
     """Return an expression's changes in the terms of 1.0, and labels of those without effect."""
-    colors: list[dict[str, Any]] = []
+    colors: list[Json] = []
     moves: dict[int, Floats] = {}
     lost: list[str] = []
     for each in list_in(told, "materialValues"):
@@ -125,14 +126,14 @@ def _linear(name: str, value: Floats) -> Floats:
     return np.append(decode_srgb(value[:3].clip(0.0, 1.0)), value[3])
 
 
-def _main_transform(told: Any) -> Floats:
+def _main_transform(told: object) -> Floats:
     """Return scale and offset of the texture coordinates of a material, origin at the top: (4,)."""
     value = rows_of(part(told, "vectorProperties", "_MainTex"), (0.0, 0.0, 1.0, 1.0))
     x, y, width, height = (0.0, 0.0, 1.0, 1.0) if value is None else value.tolist()
     return np.array([width, height, x, 1.0 - y - height])
 
 
-def modern_binds(told: Any, n_materials: int) -> tuple[list[_Bind], list[str]]:
+def modern_binds(told: object, n_materials: int) -> tuple[list[_Bind], list[str]]:
     """Return the changes by an expression of version 1.0, and labels of changes without effect."""
     found: list[_Bind] = []
     lost: list[str] = []
@@ -154,14 +155,14 @@ def modern_binds(told: Any, n_materials: int) -> tuple[list[_Bind], list[str]]:
     return found, lost
 
 
-def _color(told: Any) -> Floats | None:
+def _color(told: object) -> Floats | None:
     """Return a colour of three or four numbers with its opacity; None if it is invalid."""
     if isinstance(told, list) and len(told) == 3:
         told = [*told, 1.0]
     return None if told is None else rows_of(told, (0.0,) * 4)
 
 
-def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
+def overridden(core: Mapping[str, object], told: object) -> Json:
     """Return a core material's members with those that its ``materialProperties`` replaces."""
     found = _opacity(told) | dict(core)
     surface = found.get(_SURFACE)
@@ -185,9 +186,9 @@ def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
     return found | _emission(told, found.get("extensions"))
 
 
-def _opacity(told: Any) -> dict[str, Any]:
+def _opacity(told: object) -> Json:
     """Return opacity and culling."""
-    found: dict[str, Any] = {}
+    found: Json = {}
     shader, keywords = str(part(told, "shader")), part(told, "keywordMap")
     if part(keywords, "_ALPHABLEND_ON") is True or "Transparent" in shader:
         found["alphaMode"] = "BLEND"
@@ -200,13 +201,13 @@ def _opacity(told: Any) -> dict[str, Any]:
     return found
 
 
-def _vector(told: Any, name: str) -> Floats | None:
+def _vector(told: object, name: str) -> Floats | None:
     """Return four numbers; None if they are missing or invalid."""
     value = part(told, "vectorProperties", name)
     return None if value is None else rows_of(value, (0.0,) * 4)
 
 
-def _placement(told: Any) -> dict[str, Any]:
+def _placement(told: object) -> Json:
     """Return the extensions of textures that are placed like the main texture."""
     values = _main_transform(told).tolist()
     if values == [1.0, 1.0, 0.0, 0.0]:
@@ -214,13 +215,13 @@ def _placement(told: Any) -> dict[str, Any]:
     return {"extensions": {_TEXTURE_TRANSFORM: {"scale": values[:2], "offset": values[2:]}}}
 
 
-def _scale(told: Any, name: str) -> dict[str, float]:
+def _scale(told: object, name: str) -> dict[str, float]:
     """Return the scale of a texture of normals."""
     scale = value_of(part(told, "floatProperties", "_BumpScale"), 1.0)
     return {} if name != "_BumpMap" or scale is None else {"scale": scale}
 
 
-def _emission(told: Any, extensions: Any) -> dict[str, Any]:
+def _emission(told: object, extensions: object) -> Json:
     """Return the emitted light: factors up to 1, and the strength in an extension."""
     color = _vector(told, "_EmissionColor")
     if color is None:
@@ -232,7 +233,7 @@ def _emission(told: Any, extensions: Any) -> dict[str, Any]:
     return {"emissiveFactor": (light / strength).tolist(), "extensions": {**given, **strengths}}
 
 
-def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
+def modern_toon(told: object) -> tuple[Json, list[str]]:
     """Return the members of ``VRMC_materials_mtoon``, and the properties without a counterpart."""
 
     def number(name: str, default: float) -> float:
@@ -242,7 +243,7 @@ def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
     toony, shift = _modern_ramp(number("_ShadeToony", 0.9), number("_ShadeShift", 0.0))
     mode = int(number("_OutlineWidthMode", 0.0)) % len(_OUTLINE_MODES)
     mixes = number("_OutlineColorMode", 0.0) == 1.0
-    toon: dict[str, Any] = {
+    toon: Json = {
         "specVersion": "1.0",
         "transparentWithZWrite": number("_BlendMode", 0.0) == _WRITES_DEPTH,
         "shadingToonyFactor": min(max(toony, 0.0), 1.0),
@@ -276,7 +277,7 @@ def _modern_ramp(toony: float, shift: float) -> tuple[float, float]:
     return toony, -shift - (1.0 - toony)
 
 
-def _placed_textures(told: Any) -> dict[str, Any]:
+def _placed_textures(told: object) -> Json:
     """Return the textures, placed like the main texture, except for the sphere map."""
     found, placed = dict[str, Any](), _placement(told)
     for old, new in _TOON_TEXTURES.items():

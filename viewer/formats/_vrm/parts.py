@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from viewer.rig.arrays import Floats
 
 
-def part(told: Any, *names: str) -> Any:
+def part(told: object, *names: str) -> Any:
     """Return a nested property; None if it is missing or an outer value is not an object."""
     value = told
     for name in names:
@@ -17,13 +17,13 @@ def part(told: Any, *names: str) -> Any:
     return value
 
 
-def list_in(told: Any, *names: str) -> list[Any]:
+def list_in(told: object, *names: str) -> list[Any]:
     """Return a nested list; an empty one if it is missing or not a list."""
     found = part(told, *names)
     return found if isinstance(found, list) else []
 
 
-def is_index(value: Any, count: int) -> bool:
+def is_index(value: object, count: int) -> TypeGuard[int]:
     """Return whether a value is an integer from 0 to ``count - 1``."""
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < count
 
@@ -31,16 +31,17 @@ def is_index(value: Any, count: int) -> bool:
 _LARGEST = 1e6
 
 
-def value_of(told: Any, default: float) -> float | None:
+def value_of(told: object, default: float) -> float | None:
     """Return a number; the default if it is missing, None if it is not finite or no number."""
     if told is None:
         return default
-    is_number = isinstance(told, int | float) and not isinstance(told, bool)
+    if not isinstance(told, int | float) or isinstance(told, bool):
+        return None
     # Numbers far outside a plausible range would overflow in products.
-    return float(told) if is_number and abs(told) < _LARGEST else None
+    return float(told) if abs(told) < _LARGEST else None
 
 
-def rows_of(told: Any, default: tuple[float, ...]) -> Floats | None:
+def rows_of(told: object, default: tuple[float, ...]) -> Floats | None:
     """Return a vector with as many numbers as the default; None if it is invalid."""
     if told is None:
         return np.array(default)

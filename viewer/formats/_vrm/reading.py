@@ -103,7 +103,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     return replace(file, facts=(*_facts(told), *_contents(file)))
 
 
-def _named_nodes(extensions: Mapping[str, Any], n_nodes: int) -> frozenset[int]:
+def _named_nodes(extensions: Mapping[str, object], n_nodes: int) -> frozenset[int]:
     """Return all nodes that ``VRM``, ``VRMC_vrm`` and ``VRMC_springBone`` of the root name."""
     found: set[int] = set()
     stack: list[Any] = [extensions.get(name) for name in ("VRM", "VRMC_vrm", "VRMC_springBone")]
@@ -142,7 +142,7 @@ def _expressions(
 
 
 def _binds(
-    source: Source, file: NodeFile, told: Mapping[str, Any], pointer: str
+    source: Source, file: NodeFile, told: Mapping[str, object], pointer: str
 ) -> tuple[tuple[int, int, float], ...]:
     """Return node, morph target and weight of each bind of an expression."""
     binds: list[tuple[int, int, float]] = []
@@ -161,7 +161,7 @@ def _binds(
     return tuple(binds)
 
 
-def _has_target(file: NodeFile, node: int, index: Any) -> bool:
+def _has_target(file: NodeFile, node: int, index: object) -> bool:
     mesh = int(file.tree.meshes[node])
     return mesh >= 0 and is_index(index, len(file.meshes[mesh].target_names))
 
@@ -185,7 +185,7 @@ def _expression(
 
 
 def _read_part_views(
-    file: NodeFile, told: Mapping[str, Any], version: int, pointer: str, source: Source
+    file: NodeFile, told: Mapping[str, object], version: int, pointer: str, source: Source
 ) -> dict[int, PartView]:
     """Return the view in which each annotated mesh is drawn; invalid ones are reported."""
     # Version 0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), version 1 nodes.
@@ -208,7 +208,7 @@ def _read_part_views(
     return found
 
 
-def _annotated_nodes(file: NodeFile, each: Any, version: int) -> list[int]:
+def _annotated_nodes(file: NodeFile, each: object, version: int) -> list[int]:
     """Return the nodes whose mesh is annotated."""
     if version == 0:
         mesh = part(each, "mesh")
@@ -219,7 +219,7 @@ def _annotated_nodes(file: NodeFile, each: Any, version: int) -> list[int]:
     return [node] if has_node else []
 
 
-def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+def _facts(told: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
     """Return the properties of the model for ``viewer info``, each a heading and a text."""
     meta = told.get("meta")
     facts = [("VRM", _shortened(str(told.get("specVersion") or "0.x")))]

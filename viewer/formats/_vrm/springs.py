@@ -19,7 +19,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -101,7 +101,7 @@ def read_springs(file: NodeFile, source: Source, ends: Mapping[int, Floats]) -> 
     )
 
 
-def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _Groups]:
+def _shapes(file: NodeFile, told: object, source: Source) -> tuple[list[_Shape], _Groups]:
     """Return the colliders, and the colliders of each group."""
     places: dict[int, int] = {}
     shapes: list[_Shape] = []
@@ -126,7 +126,7 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[_Shape], _G
     ]
 
 
-def _shape(node: Any, told: Any, n_nodes: int) -> _Shape | None:
+def _shape(node: object, told: object, n_nodes: int) -> _Shape | None:
     """Return a collider, possibly an extended one; None if it is invalid."""
     kinds = [kind for kind in ("sphere", "capsule", "plane") if isinstance(part(told, kind), dict)]
     if not is_index(node, n_nodes) or len(kinds) != 1:
@@ -146,7 +146,7 @@ def _shape(node: Any, told: Any, n_nodes: int) -> _Shape | None:
 
 
 def _chains(
-    file: NodeFile, told: Any, groups: _Groups, source: Source, ends: Mapping[int, Floats]
+    file: NodeFile, told: object, groups: _Groups, source: Source, ends: Mapping[int, Floats]
 ) -> Iterator[list[_SpringJoint]]:
     for index, spring in enumerate(list_in(told, "springs")):
         chain = _chain(file.tree, spring, groups, ends)
@@ -157,7 +157,7 @@ def _chains(
 
 
 def _chain(
-    tree: NodeTree, spring: Any, groups: _Groups, ends: Mapping[int, Floats]
+    tree: NodeTree, spring: object, groups: _Groups, ends: Mapping[int, Floats]
 ) -> list[_SpringJoint] | None:
     """Return the joints of a chain that point at the next one; None if it is invalid."""
     joints = list_in(spring, "joints")

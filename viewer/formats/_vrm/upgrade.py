@@ -21,7 +21,7 @@ from viewer.formats._vrm.parts import is_index, list_in, part, rows_of, value_of
 from viewer.formats._vrm.springs import end_below
 from viewer.rig.arrays import Floats
 from viewer.rig.expressions import OLD_PRESETS
-from viewer.rig.file_record import StoredTextures
+from viewer.rig.file_record import Json, StoredTextures
 
 LICENCE = "https://vrm.dev/licenses/1.0/"
 """The VRM Public Licence, the only one that VRM 1.0 accepts."""
@@ -73,7 +73,7 @@ class NamedExpression:
     """As the file states it."""
     preset: str
     """Its preset if an expression of version 0.x states one, as its name says it otherwise."""
-    told: dict[str, Any]
+    told: Json
     """As in ``VRMC_vrm``; a bind whose mesh or weight is invalid lacks its node or weight."""
     undrawn: list[str]
     """Labels of changes of materials that have no effect."""
@@ -83,7 +83,7 @@ class NamedExpression:
 class Upgrade:
     """A character of version 0.x in the terms of 1.0."""
 
-    extensions: dict[str, Any]
+    extensions: Json
     """``VRMC_vrm`` and, if there are chains, ``VRMC_springBone``."""
     expressions: list[NamedExpression]
     """In file order."""
@@ -123,9 +123,9 @@ def upgrade(file: NodeFile, source: Source) -> Upgrade:
     )
 
 
-def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
+def _humanoid(data: object, lost: list[str]) -> Json:
     """Return the human bones; Unity's muscle settings have no counterpart."""
-    bones: dict[str, Any] = {}
+    bones: Json = {}
     for place, bone, node in given_bones(data, 0):
         if bone in bones:
             lost.append(f"humanoid.humanBones[{place}]")
@@ -141,18 +141,18 @@ def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
     return {"humanBones": bones}
 
 
-def _with_mesh(file: NodeFile, mesh: Any) -> list[int]:
+def _with_mesh(file: NodeFile, mesh: object) -> list[int]:
     """Return the nodes that show a mesh; none if it is not an index."""
     return file.tree.with_mesh(mesh) if is_index(mesh, len(file.meshes)) else []
 
 
-def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
+def _gaze(data: object, lost: list[str]) -> Json:
     """Return the gaze; its ranges are linear in version 1.0."""
     first = part(data, "firstPerson")
     if not isinstance(first, dict):
         return {}
     is_bone = str(first.get("lookAtTypeName", "Bone")).lower() == "bone"
-    gaze: dict[str, Any] = {"type": "bone" if is_bone else "expression"}
+    gaze: Json = {"type": "bone" if is_bone else "expression"}
     offset = first.get("firstPersonBoneOffset")
     if isinstance(offset, dict):
         place = _vector(offset)
@@ -174,7 +174,7 @@ def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
     return {"lookAt": gaze}
 
 
-def _range(told: dict[str, Any], name: str, lost: list[str]) -> dict[str, float]:
+def _range(told: Json, name: str, lost: list[str]) -> dict[str, float]:
     """Return the range of a direction of the gaze; numbers that are missing keep their default."""
     found = {}
     for old, new in (("xRange", "inputMaxValue"), ("yRange", "outputScale")):
@@ -186,11 +186,11 @@ def _range(told: dict[str, Any], name: str, lost: list[str]) -> dict[str, float]
     return found
 
 
-def _meta(data: Any, textures: StoredTextures | None, lost: list[str]) -> dict[str, Any]:
+def _meta(data: object, textures: StoredTextures | None, lost: list[str]) -> Json:
     """Return the meta data; permissions that version 0.x does not have keep their defaults."""
     given = data if isinstance(data, dict) else {}
     texts = {key: value for key, value in given.items() if isinstance(value, str) and value.strip()}
-    meta: dict[str, Any] = {"name": texts.get("title", "")}
+    meta: Json = {"name": texts.get("title", "")}
     author = texts.get("author")
     meta |= {"authors": [author] if author else [], "licenseUrl": LICENCE}
     for old, new in (("version", "version"), ("contactInformation", "contactInformation")):
@@ -212,7 +212,7 @@ def _meta(data: Any, textures: StoredTextures | None, lost: list[str]) -> dict[s
     return meta
 
 
-def _licence(texts: dict[str, str]) -> dict[str, Any]:
+def _licence(texts: dict[str, str]) -> Json:
     """Return the permissions that the licence and the commercial use state."""
     licence, found = texts.get("licenseName", ""), dict[str, Any]()
     if "commercialUssageName" in texts:
@@ -234,14 +234,14 @@ def _licence(texts: dict[str, str]) -> dict[str, Any]:
     return found
 
 
-def _expressions(data: Any, file: NodeFile) -> list[NamedExpression]:
+def _expressions(data: object, file: NodeFile) -> list[NamedExpression]:
     """Return the expressions, whose binds name nodes instead of meshes."""
     found = []
     materials = list_in(data, "materialProperties")[: len(file.materials)]
     for each in list_in(data, "blendShapeMaster", "blendShapeGroups"):
         if not isinstance(each, dict):
             continue
-        told: dict[str, Any] = {"isBinary": each.get("isBinary") is True}
+        told: Json = {"isBinary": each.get("isBinary") is True}
         binds = [bind for bound in list_in(each, "binds") for bind in _binds(bound, file)]
         told |= {"morphTargetBinds": binds} if binds else {}
         changes, undrawn = upgraded_binds(each, materials)
@@ -251,18 +251,19 @@ def _expressions(data: Any, file: NodeFile) -> list[NamedExpression]:
     return found
 
 
-def _binds(told: Any, file: NodeFile) -> list[dict[str, Any]]:
+def _binds(told: object, file: NodeFile) -> list[Json]:
     """Return the binds of the nodes that show the mesh of a bind."""
-    weight = None if part(told, "weight") is None else value_of(told["weight"], 0.0)
+    given = part(told, "weight")
+    weight = None if given is None else value_of(given, 0.0)
     bind = {"index": part(told, "index")}
     bind |= {} if weight is None else {"weight": weight / _PERCENT}
     nodes = _with_mesh(file, part(told, "mesh"))
     return [{"node": node, **bind} for node in nodes] or [bind]
 
 
-def _named(expressions: list[NamedExpression]) -> dict[str, dict[str, Any]]:
+def _named(expressions: list[NamedExpression]) -> dict[str, Json]:
     """Return the preset and custom expressions; a further one of a preset becomes a custom one."""
-    found: dict[str, dict[str, Any]] = {"preset": {}, "custom": {}}
+    found: dict[str, Json] = {"preset": {}, "custom": {}}
     for each in expressions:
         binds = [
             b for b in list_in(each.told, "morphTargetBinds") if {"node", "weight"} <= b.keys()
@@ -277,7 +278,7 @@ def _named(expressions: list[NamedExpression]) -> dict[str, dict[str, Any]]:
     return {kind: listed for kind, listed in found.items() if listed}
 
 
-def _free(name: str, found: dict[str, dict[str, Any]]) -> str:
+def _free(name: str, found: dict[str, Json]) -> str:
     """Return a name that no expression has."""
     taken, number, free = {*found["preset"], *found["custom"]}, 1, name
     while free in taken:
@@ -287,8 +288,8 @@ def _free(name: str, found: dict[str, dict[str, Any]]) -> str:
 
 
 def _springs(
-    data: Any, file: NodeFile, source: Source, lost: list[str]
-) -> tuple[dict[str, Any], dict[int, Floats]]:
+    data: object, file: NodeFile, source: Source, lost: list[str]
+) -> tuple[Json, dict[int, Floats]]:
     """Return ``VRMC_springBone``, empty without springs, and the ends that chains get.
 
     In version 0.x all nodes below a bone swing, each towards its first child, and the last one
@@ -319,7 +320,7 @@ def _springs(
                 springs.append({**shared, "joints": [*joints, {"node": path[-1]}]})
     if not springs:
         return {}, {}
-    found: dict[str, Any] = {"specVersion": "1.0", "springs": springs}
+    found: Json = {"specVersion": "1.0", "springs": springs}
     found |= {"colliders": colliders, "colliderGroups": groups} if colliders else {}
     return found, ends
 
@@ -335,16 +336,16 @@ def _paths(start: int, children: Mapping[int, list[int]]) -> Iterator[list[int]]
         yield path
 
 
-def _shared(group: Any, places: Mapping[int, int], n_nodes: int) -> dict[str, Any]:
+def _shared(group: object, places: Mapping[int, int], n_nodes: int) -> Json:
     """Return the members that all chains of a group have in common."""
     comment, center = part(group, "comment"), part(group, "center")
-    found: dict[str, Any] = {"name": comment} if isinstance(comment, str) and comment else {}
+    found: Json = {"name": comment} if isinstance(comment, str) and comment else {}
     found |= {"center": center} if is_index(center, n_nodes) else {}
     used = [places[n] for n in list_in(group, "colliderGroups") if type(n) is int and n in places]
     return {**found, "colliderGroups": used} if used else found
 
 
-def _swing(group: Any) -> dict[str, Any] | None:
+def _swing(group: object) -> Json | None:
     """Return the parameters of a joint; None if a number is invalid."""
     given = part(group, "gravityDir")
     direction = [0.0, -1.0, 0.0] if given is None else _vector(given)
@@ -356,7 +357,7 @@ def _swing(group: Any) -> dict[str, Any] | None:
     return {**found, "gravityDir": direction}
 
 
-def _vector(told: Any) -> list[float] | None:
+def _vector(told: object) -> list[float] | None:
     """Return a vector in our axes, in which missing numbers are 0; None if one is invalid."""
     found = rows_of([part(told, axis) or 0.0 for axis in "xyz"], (0.0, 0.0, 0.0))
     # Adding 0 replaces -0 by 0.
@@ -364,7 +365,7 @@ def _vector(told: Any) -> list[float] | None:
 
 
 def _colliders(
-    data: Any, n_nodes: int, lost: list[str]
+    data: object, n_nodes: int, lost: list[str]
 ) -> tuple[list[Any], list[Any], dict[int, int]]:
     """Return the colliders, their groups, and the new place of each group that is not empty."""
     colliders, groups, places = list[Any](), list[Any](), dict[int, int]()

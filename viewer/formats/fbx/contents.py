@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 import numpy as np
 
@@ -43,6 +42,7 @@ from viewer.media.image import decode_picture
 from viewer.media.unfinished import new_prefix
 from viewer.phrases import agree, counted, listed, optional, quoted, rounded
 from viewer.rig.arrays import Bytes, Floats, Ints
+from viewer.rig.file_record import Json
 from viewer.rig.material import Material, Texture
 from viewer.rig.units import METRES, UNIT_NAMES
 
@@ -143,7 +143,7 @@ def node_file(source: Source) -> NodeFile:
     )
 
 
-def _run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]:
+def _run_worker(source: Source, *arguments: str) -> tuple[Arrays, Json]:
     """Run the worker on a file, and return its message."""
     if find_spec("ufbx") is None:
         raise source.fault(
@@ -160,7 +160,7 @@ def _run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]
     return _run(source, source.path.resolve(), arguments)
 
 
-def _run(source: Source, path: Path, arguments: Sequence[str]) -> tuple[Arrays, dict[str, Any]]:
+def _run(source: Source, path: Path, arguments: Sequence[str]) -> tuple[Arrays, Json]:
     size = path.stat().st_size
     seconds = _SECONDS + _SECONDS_PER_STEP * (size / _STEP)
     command = [sys.executable, "-m", _WORKER, str(path), *arguments]
@@ -248,7 +248,7 @@ def _check_arrays(source: Source, arrays: Arrays, place: Callable[[str, int], Ph
             raise source.fault(f"F003.{kind}", item=at, found=found, limit=rounded(REACH, 2), at="")
 
 
-def _check_values(source: Source, told: Any, path: str) -> None:
+def _check_values(source: Source, told: object, path: str) -> None:
     """Refuse such numbers in the JSON of a message."""
     if isinstance(told, float):
         _check_arrays(source, {path: np.array([told])}, lambda name, _: Phrase("{of}", of=name))
@@ -261,7 +261,7 @@ def _check_values(source: Source, told: Any, path: str) -> None:
             _check_values(source, value, path)
 
 
-def _check_indices(source: Source, arrays: Arrays, told: dict[str, Any]) -> None:
+def _check_indices(source: Source, arrays: Arrays, told: Json) -> None:
     """Refuse skins and blend shapes of vertices that their mesh does not have."""
     for name, array in arrays.items():
         if not name.endswith(".vertices") or array.dtype == np.float64:
@@ -274,7 +274,7 @@ def _check_indices(source: Source, arrays: Arrays, told: dict[str, Any]) -> None
             raise source.fault(wording.VERTEX_RANGE, item=place, last=last, found=found)
 
 
-def _place(told: dict[str, Any], name: str, row: int) -> Phrase:
+def _place(told: Json, name: str, row: int) -> Phrase:
     """Return where an array of the contents stands in the file."""
     if name in ("local", "geometry"):
         return Phrase("node {node} ({row}): transform", node=quoted(told["names"][row]), row=row)
@@ -288,7 +288,7 @@ def _place(told: dict[str, Any], name: str, row: int) -> Phrase:
     )
 
 
-def _place_of_keys(told: dict[str, Any], track: dict[str, Any]) -> Phrase:
+def _place_of_keys(told: Json, track: Json) -> Phrase:
     """Return which property has invalid keys."""
     if track["path"] != "weight":
         name = told["names"][track["node"]]
@@ -298,7 +298,7 @@ def _place_of_keys(told: dict[str, Any], track: dict[str, Any]) -> Phrase:
     return Phrase("keys of {node}: {path}", node=quoted(name), path=track["path"])
 
 
-def _say_unused(source: Source, told: dict[str, Any]) -> None:
+def _say_unused(source: Source, told: Json) -> None:
     """Report unused elements of the file, and converted axes or units."""
     if told["unused"]:
         items = [counted(n, word) for word, n in told["unused"].items()]
@@ -316,7 +316,7 @@ def _say_unused(source: Source, told: dict[str, Any]) -> None:
         )
 
 
-def _say_reduced(source: Source, mesh: dict[str, Any]) -> None:
+def _say_reduced(source: Source, mesh: Json) -> None:
     """Report the properties of a mesh that have no equivalent."""
     if mesh["color_sets"] > 1:
         source.warn(
@@ -336,7 +336,7 @@ def _say_reduced(source: Source, mesh: dict[str, Any]) -> None:
             )
 
 
-def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera, ...], Ints]:
+def _add_cameras(told: Json, arrays: Arrays) -> tuple[tuple[NodeCamera, ...], Ints]:
     """Return the cameras and each node's camera, after adding a node that turns -z to FBX's +x."""
     made, parents, of_node = [], [], [-1] * len(told["names"])
     for number, camera in enumerate(told["cameras"]):
@@ -362,7 +362,7 @@ def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera
     return tuple(made), np.array(of_node, dtype=np.int32)
 
 
-def _animations(source: Source, told: dict[str, Any]) -> tuple[NodeAnimation, ...]:
+def _animations(source: Source, told: Json) -> tuple[NodeAnimation, ...]:
     meshes: dict[int, int] = {}  # mesh of each blend channel
     for at, mesh in enumerate(told["meshes"]):
         meshes |= dict.fromkeys((shape["element"] for shape in mesh["shapes"]), at)
@@ -379,7 +379,7 @@ def _animations(source: Source, told: dict[str, Any]) -> tuple[NodeAnimation, ..
 
 
 def _channels(
-    source: Source, told: dict[str, Any], meshes: dict[int, int], stack: int
+    source: Source, told: Json, meshes: dict[int, int], stack: int
 ) -> tuple[NodeChannel, ...]:
     """Sample one animation stack in another child process."""
     arrays, keys = _run_worker(source, str(stack))
@@ -411,7 +411,7 @@ def _channels(
     return tuple(channels)
 
 
-def _joined(tables: dict[int, Floats], shapes: list[dict[str, Any]]) -> tuple[Floats, Floats]:
+def _joined(tables: dict[int, Floats], shapes: list[Json]) -> tuple[Floats, Floats]:
     """Return all key times of a mesh's shapes, (N,), and the weights at these times, (N, S)."""
     targets = {shape["element"]: shape["targets"] for shape in shapes}
     times = [_crossings(table, targets[element]) for element, table in tables.items()]
@@ -464,7 +464,7 @@ def _crossings(table: Floats, targets: list[float]) -> Floats:
     return np.concatenate(found)
 
 
-def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[Material, ...]:
+def materials_of(source: Source, arrays: Arrays, told: Json) -> tuple[Material, ...]:
     """Return all materials; pictures are embedded, at stated paths, or near the file."""
     pictures: dict[int, Bytes | None] = {}
     sets: list[str] = next((mesh["uv_sets"] for mesh in told["meshes"] if mesh["uv_sets"]), [])
@@ -489,7 +489,9 @@ def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[
     return tuple(_material(source, each, texture) for each in told["materials"])
 
 
-def _material(source: Source, told: dict[str, Any], texture: Any) -> Material:
+def _material(
+    source: Source, told: Json, texture: Callable[[int | None], Texture | None]
+) -> Material:
     def number(name: str, default: float) -> float:
         value = told[name]["value"]
         return default if value is None else value[0]

@@ -15,6 +15,7 @@ from viewer.formats._source import Source
 from viewer.formats.fbx.message import Arrays
 from viewer.phrases import agree, counted, quoted
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.file_record import Json
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class Placed:
 
     prefix: str
     """Prefix of the names of its arrays."""
-    told: dict[str, Any]
+    told: Json
     """Parsed JSON of the mesh."""
     materials: list[int]
     """Material of each slot, to which its faces refer."""
@@ -205,7 +206,7 @@ def on_nodes(arrays: Arrays, prefix: str, skin: NodeSkin, nodes: list[int]) -> l
     ]
 
 
-def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -> NodeSkin | None:
+def skin_of(source: Source, arrays: Arrays, prefix: str, told: Json) -> NodeSkin | None:
     """Return the skin of a mesh, and report which parts of it are not used."""
     if told["skin"] is None:
         return None

@@ -10,12 +10,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rig.file_record import Json
+
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 """Arrays by the names that the JSON uses for them."""
 _JSON = "json"
 
 
-def packed(arrays: Arrays, told: dict[str, Any]) -> bytes:
+def packed(arrays: Arrays, told: Json) -> bytes:
     """Return the bytes of a message."""
     text = np.frombuffer(json.dumps(told).encode(), dtype=np.uint8)
     stream = io.BytesIO()
@@ -23,7 +25,7 @@ def packed(arrays: Arrays, told: dict[str, Any]) -> bytes:
     return stream.getvalue()
 
 
-def unpacked(data: bytes) -> tuple[Arrays, dict[str, Any]] | None:
+def unpacked(data: bytes) -> tuple[Arrays, Json] | None:
     """Return the arrays and the JSON of a message; None if it is incomplete."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats.fbx.message import Arrays, packed
+from viewer.rig.file_record import Json
 
 _METRES = (1.0, 0.01, 0.001, 0.0254)  # metres per unit, for the units that figures can have
 _LIGHT = 1e-6  # relative rounding error of a unit stated by an exporter
@@ -108,7 +109,7 @@ class _Scene:
         found = self.get(item, *names)
         return [self.keep(found[index]) for index in range(len(found))]
 
-    def _options(self, wanted: dict[str, Any] | None) -> dict[str, Any]:
+    def _options(self, wanted: Json | None) -> Json:
         # Nodes that do not inherit their parent's scale get a helper node, which is exact.
         helpers = self.ufbx.InheritModeHandling.HELPER_NODES
         return {
@@ -119,7 +120,7 @@ class _Scene:
             **(wanted or {}),
         }
 
-    def _conversion(self) -> dict[str, Any]:
+    def _conversion(self) -> Json:
         """Return options for the conversion of axes or units that a figure cannot have."""
         settings, wanted = self.get(self.scene, "settings"), {}
         right, up, front = (int(axis) for axis in self.get(settings, "axes"))
@@ -139,7 +140,7 @@ class _Scene:
             wanted["space_conversion"] = self.ufbx.SpaceConversion.ADJUST_TRANSFORMS
         return wanted
 
-    def message(self, stack: list[str]) -> tuple[Arrays, dict[str, Any]]:
+    def message(self, stack: list[str]) -> tuple[Arrays, Json]:
         """Return everything except the keys, or the keys of one stack."""
         if stack:
             sampled = _Sampled(self, self.items(self.scene, "anim_stacks")[int(stack[0])])
@@ -147,7 +148,7 @@ class _Scene:
         return self.arrays, _contents_of(self)
 
 
-def _contents_of(kept: _Scene) -> dict[str, Any]:
+def _contents_of(kept: _Scene) -> Json:
     """Return the JSON, after adding its arrays to the scene's."""
     scene = kept.scene
     settings, metadata = kept.get(scene, "settings"), kept.get(scene, "metadata")
@@ -240,7 +241,7 @@ def _numbers(values: Any, width: int) -> NDArray[np.float64]:
     return np.array(memoryview(values), dtype=np.float64).reshape(-1, width)
 
 
-def _mesh(kept: _Scene, at: int, mesh: Any) -> dict[str, Any]:
+def _mesh(kept: _Scene, at: int, mesh: Any) -> Json:
     def put(name: str, values: NDArray[Any]) -> None:
         kept.arrays[f"mesh{at}.{name}"] = values
 
@@ -277,7 +278,7 @@ def _mesh(kept: _Scene, at: int, mesh: Any) -> dict[str, Any]:
     }
 
 
-def _skin(kept: _Scene, skin: Any, put: Any) -> dict[str, Any]:
+def _skin(kept: _Scene, skin: Any, put: Any) -> Json:
     clusters = kept.items(skin, "clusters")
     bones, matrices, vertices, weights = [], [], [], []
     for cluster in clusters:
@@ -299,9 +300,9 @@ def _skin(kept: _Scene, skin: Any, put: Any) -> dict[str, Any]:
     }
 
 
-def _shapes(kept: _Scene, mesh: Any, put: Any) -> list[dict[str, Any]]:
+def _shapes(kept: _Scene, mesh: Any, put: Any) -> list[Json]:
     """Return every target of the blend channels: the last of each channel, and in-between ones."""
-    told: list[dict[str, Any]] = []
+    told: list[Json] = []
     for deformer in kept.items(mesh, "blend_deformers"):
         for channel in kept.items(deformer, "channels"):
             targets = kept.items(channel, "keyframes")
@@ -331,7 +332,7 @@ def _shapes(kept: _Scene, mesh: Any, put: Any) -> list[dict[str, Any]]:
     return told
 
 
-def _camera(kept: _Scene, camera: Any) -> dict[str, Any]:
+def _camera(kept: _Scene, camera: Any) -> Json:
     is_parallel = int(kept.get(camera, "projection_mode")) == 1
     angle, height = kept.get(camera, "field_of_view_deg").y, kept.get(camera, "orthographic_size").y
     return {
@@ -345,9 +346,9 @@ def _camera(kept: _Scene, camera: Any) -> dict[str, Any]:
     }
 
 
-def _material(kept: _Scene, material: Any) -> dict[str, Any]:
+def _material(kept: _Scene, material: Any) -> Json:
     maps = kept.get(material, "pbr")
-    told: dict[str, Any] = {
+    told: Json = {
         "name": str(kept.get(material, "name")),
         "is_physical": int(kept.get(material, "shader_type")) in _PHYSICAL,
     }
@@ -365,7 +366,7 @@ def _material(kept: _Scene, material: Any) -> dict[str, Any]:
     return told
 
 
-def _texture(kept: _Scene, at: int, texture: Any) -> dict[str, Any]:
+def _texture(kept: _Scene, at: int, texture: Any) -> Json:
     content = kept.get(texture, "content")
     video = kept.get(texture, "video")
     if not content and video is not None:
@@ -390,7 +391,7 @@ class _Sampled:
         self.start, self.end = float(stack.time_begin), float(stack.time_end)
         rate = float(kept.get(kept.scene, "settings").frames_per_second)
         self.rate = rate if _RATES[0] <= rate <= _RATES[1] else _STANDARD_RATE
-        self.told: list[dict[str, Any]] = []
+        self.told: list[Json] = []
         self.cut = 0
         # The animated properties of each element: their names and values.
         self.animated: dict[int, list[tuple[str, Any]]] = {}
@@ -400,7 +401,7 @@ class _Sampled:
                 element = int(kept.get(each, "element").element_id)
                 self.animated.setdefault(element, []).append(row)
 
-    def result(self) -> dict[str, Any]:
+    def result(self) -> Json:
         """Return the channels, ``"keys"``, and the number of curves that end early, ``"cut"``."""
         # A channel states its node or element, its path, and the name of its array: times in
         # seconds and values, for linear interpolation, or slerp for rotations.
@@ -453,7 +454,7 @@ class _Sampled:
             found += self.animated.get(int(above.element_id), []) if above is not None else []
         return found
 
-    def _put(self, channel: dict[str, Any], table: NDArray[np.float64]) -> None:
+    def _put(self, channel: Json, table: NDArray[np.float64]) -> None:
         """Add a channel; if its value never changes, only the first key."""
         if not len(table):
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from viewer.formats.gltf.elements import Element, Table
 from viewer.phrases import counted, one_of
 from viewer.rig.arrays import Floats, Ints
 
-_COMPONENTS: dict[int, np.dtype[Any]] = {
+_COMPONENTS: dict[int, np.dtype[np.number]] = {
     5120: np.dtype("<i1"),
     5121: np.dtype("<u1"),
     5122: np.dtype("<i2"),
@@ -42,7 +41,7 @@ class _Layout:
 
     element: Element
     kind: str
-    dtype: np.dtype[Any]
+    dtype: np.dtype[np.number]
     count: int
     is_normalized: bool
 
@@ -99,7 +98,7 @@ class Accessors:
         kinds: Sequence[str],
         user: str,
         rows: Ints | None = None,
-        decoded: NDArray[Any] | None = None,
+        decoded: NDArray[np.number] | None = None,
     ) -> Floats:
         """Return an accessor as numbers (N, C), possibly infinite or NaN, or its ``rows`` (M, C).
 
@@ -111,11 +110,11 @@ class Accessors:
         values = self._picked(layout, rows, decoded)
         if layout.is_normalized and values.dtype.kind != "f":
             # The lowest signed integer is clamped to -1 (glTF 2.0, 3.6.2.2).
-            return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
+            return np.maximum(values / np.iinfo(values.dtype.str).max, -1.0)
         with np.errstate(invalid="ignore"):  # signalling NaNs
             return values.astype(np.float64)
 
-    def stored(self, index: int, kinds: Sequence[str], user: str) -> NDArray[Any] | None:
+    def stored(self, index: int, kinds: Sequence[str], user: str) -> NDArray[np.number] | None:
         """Return float32 numbers (N, C) as in the file, not copied; None for any other storage."""
         layout = self._layout(index, kinds, user)
         is_plain = layout.element.has("bufferView") and not layout.element.has("sparse")
@@ -127,7 +126,7 @@ class Accessors:
         kinds: Sequence[str],
         user: str,
         rows: Ints | None = None,
-        decoded: NDArray[Any] | None = None,
+        decoded: NDArray[np.number] | None = None,
     ) -> Floats:
         """Return an accessor like ``floats``; integers must be normalised, or cause a warning."""
         values = self.floats(index, kinds, user, rows, decoded)
@@ -138,7 +137,7 @@ class Accessors:
             "G002.normalized: expected normalised integers, found none marked as normalised: "
             "normalised"
         )
-        return np.maximum(values / np.iinfo(layout.dtype).max, -1.0)
+        return np.maximum(values / np.iinfo(layout.dtype.str).max, -1.0)
 
     def integers(
         self,
@@ -146,7 +145,7 @@ class Accessors:
         kinds: Sequence[str],
         user: str,
         rows: Ints | None = None,
-        decoded: NDArray[Any] | None = None,
+        decoded: NDArray[np.number] | None = None,
     ) -> NDArray[np.int64]:
         """Return an accessor like ``floats``, as whole numbers (N, C) or (M, C)."""
         layout = self._layout(index, kinds, user)
@@ -179,8 +178,8 @@ class Accessors:
         return np.ascontiguousarray(columns.transpose(0, 2, 1))
 
     def _picked(
-        self, layout: _Layout, rows: Ints | None, decoded: NDArray[Any] | None
-    ) -> NDArray[Any]:
+        self, layout: _Layout, rows: Ints | None, decoded: NDArray[np.number] | None
+    ) -> NDArray[np.number]:
         if decoded is None:
             values = self._values(layout)
         elif decoded.shape[1] == layout.width:
@@ -212,7 +211,7 @@ class Accessors:
         normalized = element.flag("normalized")
         return _Layout(element, kind, _COMPONENTS[code], element.whole("count"), normalized)
 
-    def _values(self, layout: _Layout) -> NDArray[Any]:
+    def _values(self, layout: _Layout) -> NDArray[np.number]:
         element = layout.element
         place = element.index("bufferView", self._buffers.n_views, "bufferViews")
         if place < 0:
@@ -224,7 +223,9 @@ class Accessors:
         sparse = element.part("sparse")
         return values if sparse is None else self._replaced(values, layout, sparse)
 
-    def _replaced(self, values: NDArray[Any], layout: _Layout, sparse: Element) -> NDArray[Any]:
+    def _replaced(
+        self, values: NDArray[np.number], layout: _Layout, sparse: Element
+    ) -> NDArray[np.number]:
         """Return values in which the elements listed by a sparse accessor are replaced."""
         count = sparse.whole("count")
         if count > layout.count:
@@ -266,7 +267,7 @@ class Accessors:
         return self._buffers.view(place)
 
 
-def _elements(view: View, layout: _Layout, element: Element, offset: int) -> NDArray[Any]:
+def _elements(view: View, layout: _Layout, element: Element, offset: int) -> NDArray[np.number]:
     """Return the elements in a buffer view, column by column: (N, C); a view if possible."""
     size = layout.size
     stride = view.stride or size

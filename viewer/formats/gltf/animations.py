@@ -73,7 +73,7 @@ class Targets:
         mesh = int(self._tree.meshes[node])
         return len(self._meshes[mesh].target_names) if mesh >= 0 else 0
 
-    def moves(self, node: Any, path: Any) -> bool:
+    def moves(self, node: object, path: object) -> bool:
         """Return whether a channel of this node and path, as in the file, has a visible effect."""
         if type(node) is not int or not 0 <= node < self._tree.n_nodes:
             return False

@@ -20,6 +20,7 @@ from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.phrases import agree, counted, listed, rounded
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.file_record import Json
 from viewer.rig.hierarchy import descendants, roots_of
 from viewer.rig.inspection.faults import UNIT_ROTATION
 
@@ -305,7 +306,7 @@ def _check_rotations(document: Document, sampler: Element) -> None:
         )
 
 
-def _items_of(told: Any, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
+def _items_of(told: object, name: str) -> Iterator[tuple[int, Json]]:
     """Yield the objects in a list that is a member of an object, with their indices."""
     found = told.get(name) if isinstance(told, dict) else None
     for index, item in enumerate(found if isinstance(found, list) else ()):
@@ -313,7 +314,7 @@ def _items_of(told: Any, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
             yield index, item
 
 
-def _check_storage(root: dict[str, Any], report: _Report) -> None:
+def _check_storage(root: Json, report: _Report) -> None:
     """Check all accessors and buffer views."""
     for index, accessor in _items_of(root, "accessors"):
         path, kind = ("accessors", index), accessor.get("componentType")
@@ -334,11 +335,11 @@ def _check_storage(root: dict[str, Any], report: _Report) -> None:
     _check_uses(root, report)
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: _Report) -> None:
+def _check_view(root: Json, view: Json, index: int, report: _Report) -> None:
     path, target, stride = ("bufferViews", index), view.get("target"), view.get("byteStride")
     if target is not None and target not in _TARGETS.values():
         report(wording.STORAGE, "34962 or 34963", target, (*path, "target"))
@@ -359,7 +360,7 @@ def _check_view(root: dict[str, Any], view: dict[str, Any], index: int, report: 
             report(wording.STORAGE, wanted, f"byte {start + length}", (*path, "byteLength"))
 
 
-def _check_uses(root: dict[str, Any], report: _Report) -> None:
+def _check_uses(root: Json, report: _Report) -> None:
     """Check that each view has one kind of content, and the target and stride of that kind."""
     accessors, views = dict(_items_of(root, "accessors")), dict(_items_of(root, "bufferViews"))
     first: dict[int, str] = {}
@@ -382,7 +383,7 @@ def _check_uses(root: dict[str, Any], report: _Report) -> None:
             report(wording.STORAGE, f"{kind} without a stride", found, path)
 
 
-def _uses(root: dict[str, Any]) -> Iterator[tuple[int, str, tuple[str | int, ...]]]:
+def _uses(root: Json) -> Iterator[tuple[int, str, tuple[str | int, ...]]]:
     """Yield the accessors that are used, the kind of content, and the path to the reference."""
     given: list[tuple[Any, str, tuple[str | int, ...]]] = []
     for m, mesh in _items_of(root, "meshes"):
@@ -430,7 +431,7 @@ def _check_primitives(document: Document, report: _Report) -> None:
             _check_texture_sets(materials, primitive, given, path, report)
 
 
-def _check_names(given: dict[str, Any], path: tuple[str | int, ...], report: _Report) -> None:
+def _check_names(given: Json, path: tuple[str | int, ...], report: _Report) -> None:
     for name in given:
         if not _KNOWN.fullmatch(name):
             wanted = "an attribute of the specification, or a name that begins with _"
@@ -443,7 +444,7 @@ def _check_names(given: dict[str, Any], path: tuple[str | int, ...], report: _Re
 
 
 def _check_types(
-    accessors: dict[int, Any], given: dict[str, Any], path: tuple[str | int, ...], report: _Report
+    accessors: dict[int, Any], given: Json, path: tuple[str | int, ...], report: _Report
 ) -> None:
     for name, index in given.items():
         accessor = accessors.get(index, {}) if isinstance(index, int) else {}
@@ -457,8 +458,8 @@ def _check_types(
 
 def _check_targets(
     accessors: dict[int, Any],
-    primitive: dict[str, Any],
-    given: dict[str, Any],
+    primitive: Json,
+    given: Json,
     path: tuple[str | int, ...],
     report: _Report,
 ) -> None:
@@ -477,7 +478,7 @@ def _check_targets(
 
 
 def _check_tangents(
-    document: Document, given: dict[str, Any], path: tuple[str | int, ...], report: _Report
+    document: Document, given: Json, path: tuple[str | int, ...], report: _Report
 ) -> None:
     index = given.get("TANGENT")
     if not isinstance(index, int) or not 0 <= index < len(document.accessors):
@@ -504,9 +505,9 @@ def _check_tangents(
 
 
 def _check_texture_sets(
-    materials: dict[int, dict[str, Any]],
-    primitive: dict[str, Any],
-    given: dict[str, Any],
+    materials: dict[int, Json],
+    primitive: Json,
+    given: Json,
     path: tuple[str | int, ...],
     report: _Report,
 ) -> None:
@@ -532,7 +533,7 @@ def _check_texture_sets(
 
 
 def _check_structure(
-    root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
+    root: Json, tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
 ) -> None:
     """Check members that depend on each other."""
     for name in _LISTS:
@@ -572,7 +573,7 @@ def _check_structure(
     _check_extensions(root, report)
 
 
-def _check_node(node: dict[str, Any], index: int, report: _Report) -> None:
+def _check_node(node: Json, index: int, report: _Report) -> None:
     path = ("nodes", index)
     if node.get("children") == []:
         report(wording.G003_STRUCTURE, "at least one child", "none", (*path, "children"))
@@ -596,7 +597,7 @@ def _is_sheared(matrix: list[Any]) -> bool:
 
 
 def _check_skinned(
-    root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
+    root: Json, tree: NodeTree, skins: tuple[NodeSkin, ...], report: _Report
 ) -> None:
     """Check that skinned meshes are roots, in a scene with their joints."""
     parents, tops = tree.parents.tolist(), roots_of(tree.parents)
@@ -626,7 +627,7 @@ def _check_skinned(
             )
 
 
-def _check_extensions(root: dict[str, Any], report: _Report) -> None:
+def _check_extensions(root: Json, report: _Report) -> None:
     """Check that all extensions are declared."""
     used = [name for name in list_in(root, "extensionsUsed") if isinstance(name, str)]
     for place, name in enumerate(list_in(root, "extensionsRequired")):

@@ -31,6 +31,7 @@ from viewer.formats.gltf.accessors import Accessors
 from viewer.formats.gltf.buffers import Buffers
 from viewer.formats.gltf.elements import Element, Table
 from viewer.phrases import agree, counted, printable, quoted
+from viewer.rig.file_record import Json
 
 _MAGIC = b"glTF"  # first bytes of a GLB
 _HEADER = struct.Struct("<4sII")
@@ -51,7 +52,7 @@ _Content = TypeVar("_Content")
 class Document:
     """An opened glTF file: its JSON, bytes and arrays; ``binary`` is the binary chunk."""
 
-    def __init__(self, source: Source, root: dict[str, Any], binary: memoryview | None) -> None:
+    def __init__(self, source: Source, root: Json, binary: memoryview | None) -> None:
         self.source = source
         self.root = Element(source, root)
         self._tables: dict[str, Table] = {}
@@ -115,7 +116,7 @@ def _check_version(root: Element) -> None:
         raise asset.fault(wording.GLTF_VERSION, "minVersion", found=asset.text("minVersion"))
 
 
-def _contents(source: Source) -> tuple[dict[str, Any], memoryview | None]:
+def _contents(source: Source) -> tuple[Json, memoryview | None]:
     """Return the JSON and the binary chunk of a file; None if it has none."""
     data = source.data
     if not data.startswith(_MAGIC):
@@ -211,7 +212,7 @@ def _title(kind: bytes) -> str:
     return kind.rstrip(b"\0 ").decode("ascii", "backslashreplace")
 
 
-def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
+def parsed_json(source: Source, data: bytes, has_lines: bool) -> Json:
     """Return the parsed root object."""
     if len(data) > _MOST_BYTES:
         raise source.fault(
@@ -235,7 +236,7 @@ def parsed_json(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
             overflows.append(word)
         return value
 
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    def unique(pairs: list[tuple[str, Any]]) -> Json:
         values = dict(pairs)
         if len(values) != len(pairs):
             counts = Counter(key for key, _ in pairs)
@@ -324,7 +325,7 @@ def _collection_suspended() -> Iterator[None]:
             gc.enable()
 
 
-def _remove_nulls(root: dict[str, Any]) -> int:
+def _remove_nulls(root: Json) -> int:
     """Remove null members outside of application data, which some exporters write; count them."""
     count = 0
     left: list[Any] = [root]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ _NAME = "KHR_draco_mesh_compression"
 class DecodedPrimitive:
     """Vertices and triangles of a compressed primitive."""
 
-    attributes: Mapping[str, NDArray[Any]]
+    attributes: Mapping[str, NDArray[np.number]]
     """Components by the name of their attribute: (V, C)."""
     triangles: NDArray[np.int64]
     """Vertex indices: (T, 3) int64."""
@@ -55,7 +54,9 @@ def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitiv
     return DecodedPrimitive(_named(extension, arrays), np.asarray(mesh.faces, dtype=np.int64))
 
 
-def _named(extension: Element, arrays: dict[int, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _named(
+    extension: Element, arrays: dict[int, NDArray[np.number]]
+) -> dict[str, NDArray[np.number]]:
     """Return the arrays by the names of their attributes."""
     names = extension.part("attributes")
     if names is None:

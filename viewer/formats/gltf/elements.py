@@ -15,6 +15,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import one_of, quoted
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.file_record import Json
 
 _Choice = TypeVar("_Choice", int, str)
 _ONE = {
@@ -40,7 +41,7 @@ class Element:
 
     __slots__ = ("pointer", "source", "values")
 
-    def __init__(self, source: Source, values: dict[str, Any], pointer: str = "") -> None:
+    def __init__(self, source: Source, values: Json, pointer: str = "") -> None:
         self.source, self.values, self.pointer = source, values, pointer
 
     def at(self, *keys: str | int) -> str:

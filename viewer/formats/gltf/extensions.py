@@ -14,6 +14,7 @@ from viewer.formats._scene_graph.content import NodeTree
 from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.materials import DRAWN_EXTENSIONS
 from viewer.phrases import agree, counted, listed
+from viewer.rig.file_record import Json
 from viewer.rig.hierarchy import descendants
 
 # Extensions of geometry and animation, and of characters; materials and textures list their own.
@@ -129,7 +130,7 @@ def hidden_nodes(document: Document, tree: NodeTree) -> list[int]:
     return drawn
 
 
-def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
+def unkept_members(root: Json) -> tuple[str, ...]:
     """Return the members that are not written back, each once, such as ``images.extras``.
 
     >>> images = [{"extras": 1}, {"extras": 2}]
@@ -166,7 +167,7 @@ def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:
                 yield from _members(name, value if isinstance(value, list) else [value], False)
 
 
-def _names_not_kept(kind: str, listed: list[Any], root: dict[str, Any]) -> Iterator[str]:
+def _names_not_kept(kind: str, listed: list[Any], root: Json) -> Iterator[str]:
     """Yield the name of a list whose items lose names."""
     named = {at: item["name"] for at, item in enumerate(_objects(listed)) if item.get("name")}
     if kind == "cameras":
@@ -181,13 +182,13 @@ def _names_not_kept(kind: str, listed: list[Any], root: dict[str, Any]) -> Itera
         yield f"{kind}.name"
 
 
-def _extensions(kind: str, told: Any) -> Iterator[str]:
+def _extensions(kind: str, told: object) -> Iterator[str]:
     for name in told if isinstance(told, dict) else ():
         if name not in _KEPT_EXTENSIONS:
             yield f"{kind}.{name}"
 
 
-def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
+def contents_of(root: Json) -> tuple[Phrase, ...]:
     """Return what a document holds, with numbers, as parts of a message."""
     counts: Counter[str] = Counter()
     for mesh in _objects(root.get("meshes")):
@@ -207,5 +208,5 @@ def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
     return tuple(Phrase(text, n=counted(n, noun)) for text, noun, n in parts if n)
 
 
-def _objects(listed: Any) -> list[dict[str, Any]]:
+def _objects(listed: object) -> list[Json]:
     return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []

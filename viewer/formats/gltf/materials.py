@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +34,7 @@ from viewer.formats.gltf.textures import (
 from viewer.formats.gltf.toon import MTOON, Toon, read_toon
 from viewer.phrases import counted
 from viewer.rig.arrays import Bytes
+from viewer.rig.file_record import Json
 from viewer.rig.material import ALPHA_MODES, Material
 from viewer.rig.srgb import decode_srgb, encode_srgb
 
@@ -52,7 +52,7 @@ _BRIGHTNESS = np.array([0.299, 0.587, 0.114], dtype=np.float32)
 _ROWS = 256  # number of rows of an image that are converted together
 _FACTORED = (("normalTexture", "normal_texture"), ("occlusionTexture", "occlusion_texture"))
 _MODES = {mode.upper(): mode for mode in ALPHA_MODES}
-_NEUTRAL: dict[str, dict[str, Any]] = {
+_NEUTRAL: dict[str, Json] = {
     "KHR_materials_anisotropy": {"anisotropyStrength": 0.0},
     "KHR_materials_clearcoat": {"clearcoatFactor": 0.0},
     "KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.0},
@@ -81,7 +81,7 @@ _Reals = NDArray[np.float32]
 class _Stated:
     """Properties of one material in a document: values, and textures by field of ``Material``."""
 
-    values: dict[str, Any]
+    values: Json
     slots: dict[str, Slot]
     glossiness: Glossiness | None
 
@@ -237,21 +237,21 @@ def _not_drawn(element: Element) -> list[str]:
     ]
 
 
-def _is_neutral(name: str, values: Any) -> bool:
+def _is_neutral(name: str, values: object) -> bool:
     """Return whether the values of an extension have no effect."""
     if name not in _NEUTRAL or type(values) is not dict:
         return False
     return all(values.get(key, value) == value for key, value in _NEUTRAL[name].items())
 
 
-def from_glossiness(stated: Glossiness, images: dict[int, DecodedImage]) -> dict[str, Any]:
+def from_glossiness(stated: Glossiness, images: dict[int, DecodedImage]) -> Json:
     """Return the fields of ``Material`` that describe the surface, with images by index."""
     specular = None if stated.specular_slot is None else stated.specular_slot.texture(images)
     diffuse = None if stated.diffuse_slot is None else stated.diffuse_slot.texture(images)
     if specular is None or specular.image is None:
         color = np.array(stated.diffuse[:3], dtype=np.float32)
         base, metallic = _metallic(color, np.array(stated.specular, dtype=np.float32))
-        found: dict[str, Any] = {
+        found: Json = {
             "base_color": (*base.tolist(), stated.diffuse[3]),
             "metallic": float(metallic),
             "roughness": 1.0 - stated.glossiness,

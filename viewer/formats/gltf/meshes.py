@@ -195,7 +195,7 @@ class _Attributes:
     """Number of elements that each accessor must have."""
     rows: Ints | None = None
     """Vertices to read, (V,), if other primitives use the remaining ones; None for all."""
-    decoded: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    decoded: Mapping[str, NDArray[np.number]] = field(default_factory=dict)
     """Components of the attributes that are compressed with Draco."""
 
     @property
@@ -225,7 +225,7 @@ class _Attributes:
         """Return an attribute, (V, C); None if it is missing; errors as of ``accessor``."""
         return self._values(self.document.accessors.floats, name, kinds)
 
-    def stored(self, name: str, *kinds: str) -> NDArray[Any] | None:
+    def stored(self, name: str, *kinds: str) -> NDArray[np.number] | None:
         """Return finite numbers as in the file, not copied; None if they need decoding."""
         index = self.accessor(name)
         if index < 0 or name in self.decoded:
@@ -414,7 +414,7 @@ def _read_colors(attributes: _Attributes) -> Floats | None:
     return np.column_stack([colors, np.ones(len(colors))])
 
 
-def _is_finite(values: NDArray[Any]) -> bool:
+def _is_finite(values: NDArray[np.number]) -> bool:
     """Return whether all numbers are finite and the sum of their squares does not overflow."""
     flat = values.ravel()
     with np.errstate(over="ignore", invalid="ignore"):
@@ -497,10 +497,10 @@ def _offsets(attributes: _Attributes, targets: Table, name: str) -> MorphTargets
     document, rows = attributes.document, attributes.rows
     # Limit the size as if all vertices moved: some uses need an offset for each vertex.
     document.spend(len(targets) * attributes.n_rows * 3 * 8, targets.pointer)
-    found: list[NDArray[Any] | None] = [None] * len(targets)
+    found: list[NDArray[np.number] | None] = [None] * len(targets)
     for place in used:
         target = _Attributes(document, targets[place], attributes.n_vertices)
-        values: NDArray[Any] | None = target.stored(name, "VEC3")
+        values: NDArray[np.number] | None = target.stored(name, "VEC3")
         if values is None:
             whole = target.floats(name, "VEC3")
             values = None if whole is None else target.finite(name, whole)
@@ -528,7 +528,7 @@ def _named(element: Element) -> list[Any]:
     return names if type(names) is list else []
 
 
-def _extra(values: Any, name: str) -> Any:
+def _extra(values: object, name: str) -> Any:
     """Return a member of an object's application data; None if it is missing."""
     extras = values.get("extras") if type(values) is dict else None
     return extras.get(name) if type(extras) is dict else None

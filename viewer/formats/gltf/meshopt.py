@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -246,7 +245,7 @@ def _unpacked(data: Bytes, starts: NDArray[np.int64], bits: int) -> Bytes:
     return deltas
 
 
-def _summed(deltas: Bytes, first: Bytes, mode: int) -> NDArray[Any] | None:
+def _summed(deltas: Bytes, first: Bytes, mode: int) -> NDArray[np.number] | None:
     """Return the values of 4 bytes of all elements, (N, 4); None if the mode is unknown."""
     kind, rotation = mode & 15, mode >> 4
     if kind > 2 or (rotation and kind != 2):

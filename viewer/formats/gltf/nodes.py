@@ -26,6 +26,7 @@ from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element, Table, member_indices, member_rows
 from viewer.phrases import counted, listed, quoted, rounded
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.file_record import Json
 from viewer.rig.geometry.rotation import (
     matrix_to_quaternion,
     nearest_rotations,
@@ -274,7 +275,7 @@ def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
     return roots or every
 
 
-def shown_scene(document: Document) -> dict[str, Any]:
+def shown_scene(document: Document) -> Json:
     """Return the name and the application data of the default scene or the first one."""
     scenes = document.table("scenes")
     if not len(scenes):

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from viewer.formats.gltf.elements import Element
 from viewer.media.image import decoding_pictures
 from viewer.phrases import one_of, quoted
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.file_record import Json
 from viewer.rig.material import MINIFICATIONS, Texture
 
 _WRAPS = {33071: "clamp", 10497: "repeat", 33648: "mirror"}
@@ -47,7 +48,7 @@ class Slot:
 
     image: int
     """Index of the image, -1 if there is none that can be read."""
-    placing: dict[str, Any]
+    placing: Json
     """Texture coordinate set, transform, wrap modes and filters, as in ``Texture``."""
 
     def texture(self, images: dict[int, DecodedImage]) -> Texture:
@@ -89,7 +90,7 @@ def _image(document: Document, texture: Element) -> int:
     return found
 
 
-def _sampled(document: Document, texture: Element) -> dict[str, Any]:
+def _sampled(document: Document, texture: Element) -> Json:
     """Return the wrap modes and filters of a texture; by default it repeats, filtered linearly."""
     source, table = document.source, document.table("samplers")
     index = lenient(source, lambda: texture.index("sampler", len(table), "samplers"), -1)
@@ -122,7 +123,7 @@ def _constant(sampler: Element, name: str, meanings: dict[int, str], default: st
     return default
 
 
-def _placed(info: Element) -> dict[str, Any]:
+def _placed(info: Element) -> Json:
     """Return the set of texture coordinates, and the transform of KHR_texture_transform."""
     source = info.source
     uv_set = lenient(source, lambda: info.whole("texCoord", 0), 0)

@@ -28,7 +28,7 @@ from viewer.formats.gltf.document import Document
 from viewer.formats.gltf.elements import Element
 from viewer.formats.gltf.textures import Slot, read_slot
 from viewer.phrases import Shown, counted, listed
-from viewer.rig.file_record import StoredImage, StoredTextures
+from viewer.rig.file_record import Json, StoredImage, StoredTextures
 from viewer.rig.material import Outline, Rim
 
 MTOON = "VRMC_materials_mtoon"
@@ -61,7 +61,7 @@ _NOT_DRAWN = {
 class Toon:
     """Shading of a material that VRM declares toon-shaded or unlit."""
 
-    values: dict[str, Any] = field(default_factory=dict)
+    values: Json = field(default_factory=dict)
     """Fields of ``Material``."""
     slots: Mapping[str, Slot] = field(default_factory=dict)
     """Textures by field of ``Material``, or by fields of its rim light and outline:
