@@ -28,6 +28,7 @@ from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.soles import soles_of
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform, mean_scale
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.inspection.faults import NO_INDICES, Fault, Invalid, valid
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
@@ -267,7 +268,7 @@ def _track(subject: Subject) -> Track | None:
         heel = apply_transform(actor.placement, heels[:, number])
         ankle = int(soles.ankles[number]) if soles is not None else foot
         # Without a hip, the body is assumed to stand.
-        hip = placed[:, hips[ankle]] if ankle in hips else heel + np.eye(3)["xyz".index(subject.up)]
+        hip = placed[:, hips[ankle]] if ankle in hips else heel + axis_vector(subject.up)
         paths.append(FootPath(placed[:, foot] if foot != ankle else heel, heel, hip))
     return Track(
         times=times + actor.offset,

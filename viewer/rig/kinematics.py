@@ -61,6 +61,11 @@ def joint_worlds(parents: Ints, linear: Floats, offsets: Floats) -> Floats:
     return np.swapaxes(forward_kinematics(parents, affine_matrices(linear, offsets)), 0, 1)
 
 
+def world_rotations(parents: Ints, local: Floats) -> Floats:
+    """Concatenate rotations (J, 3, 3) of one pose down the hierarchy."""
+    return forward_kinematics(parents, local[:, None])[:, 0]
+
+
 def _passes(parents: Ints) -> Iterator[tuple[Indices, Indices]]:
     """Yield the ancestors and joints whose matrices are multiplied in each pass."""
     ancestors = parents.astype(np.intp)

@@ -124,6 +124,13 @@ def rest_pose(skeleton: Skeleton) -> Pose:
     )
 
 
+def zero_pose(skeleton: Skeleton) -> Pose:
+    """Return the rest pose with all DOFs at 0."""
+    pose = rest_pose(skeleton)
+    pose.dofs[:] = 0.0
+    return pose
+
+
 def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     """Build L = T(rest + translation + DOFs) R(quaternion) R(DOFs) S(scale) of joints (J, 4, 4).
 

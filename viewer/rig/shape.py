@@ -13,7 +13,7 @@ from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.pose import Pose, joint_rotations, rest_pose
+from viewer.rig.pose import Pose, joint_rotations, zero_pose
 from viewer.rig.skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
     """Return rest translations (..., J, 3) for joints at new positions with the same axes."""
-    linear = world_matrices(skeleton, _zero_pose(skeleton))[:, :3, :3]
+    linear = world_matrices(skeleton, zero_pose(skeleton))[:, :3, :3]
     parents = skeleton.parents
     has_parent = parents >= 0
     above = parents[has_parent]
@@ -139,13 +139,6 @@ def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
 
 def _moved_skin(skin: Skin, shifts: Floats) -> Skin:
     return replace(skin, inverse_bind=skin.inverse_bind @ translation_matrix(-shifts))
-
-
-def _zero_pose(skeleton: Skeleton) -> Pose:
-    """Return the rest pose with all DOFs at 0."""
-    pose = rest_pose(skeleton)
-    pose.dofs[:] = 0.0
-    return pose
 
 
 def joint_shifts(figure: Figure, weights: Floats) -> Floats:
@@ -167,7 +160,7 @@ def joint_shifts(figure: Figure, weights: Floats) -> Floats:
 def rest_joints(figure: Figure) -> Floats:
     """Return the joint positions with all DOFs at 0: (J, 3), figure units."""
     skeleton = figure.require_skeleton()
-    return world_matrices(skeleton, _zero_pose(skeleton))[:, :3, 3]
+    return world_matrices(skeleton, zero_pose(skeleton))[:, :3, 3]
 
 
 _directions: Memo[Figure, Floats] = Memo()

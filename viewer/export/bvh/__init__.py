@@ -27,7 +27,8 @@ from viewer.progress import report, silent
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.geometry.rotation import up_rotation
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
@@ -102,14 +103,7 @@ def _space_of(figure: Figure, options: ExportOptions) -> Space:
     factor = 1.0
     if figure.unit in METRES:
         factor = METRES[figure.unit] / METRES[options.unit or _DEFAULT_UNIT]
-    return Space(_up_rotation(figure.up, up), _up_rotation(options.world_up, up), factor)
-
-
-def _up_rotation(start: str, end: str) -> Floats:
-    """Return the exact 90-degree rotation about x that maps one up axis to the other."""
-    if start == end:
-        return np.eye(3)
-    return np.round(axis_rotations(0, np.asarray(np.pi / 2 if end == "z" else -np.pi / 2)))
+    return Space(up_rotation(figure.up, up), up_rotation(options.world_up, up), factor)
 
 
 def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
@@ -443,7 +437,7 @@ def _end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
         bone = _last_bone(skeleton.parents, rest, int(leaf))
         length = float(np.linalg.norm(bone)) or size or _bare_end(figure.unit)
         if not bone.any():
-            bone = np.eye(3)["xyz".index(figure.up)] * length
+            bone = axis_vector(figure.up) * length
         ends[row] = _HALF * bone
         known = _by_vertices(figure, rest, int(leaf), bone)
         if known is None and skeleton.boxes is not None:

@@ -23,7 +23,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.motion.evaluation import Frames, rest_translations_of, world_frames
-from viewer.rig.pose import rest_pose
+from viewer.rig.pose import zero_pose
 from viewer.rig.skeleton import Skeleton
 
 BLOCK = 128  # frames per block, whose matrices fit into the processor's cache
@@ -45,9 +45,7 @@ class Space:
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
     """Return joint-to-figure matrices (J, 4, 4) with all DOFs at 0 and without constraints."""
     skeleton = replace(figure.require_skeleton(), rest_translations=offsets, constraints=())
-    pose = rest_pose(skeleton)
-    pose.dofs[:] = 0.0
-    return world_matrices(skeleton, pose)
+    return world_matrices(skeleton, zero_pose(skeleton))
 
 
 class Conversion:

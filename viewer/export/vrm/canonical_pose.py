@@ -17,7 +17,7 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
 )
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import axis_vector, unit
 from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import joint_worlds, world_matrices
 from viewer.rig.pose import Pose, joint_rotations, local_matrices, rest_pose
@@ -114,8 +114,7 @@ def vrm_axes(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Floats:
 
 def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
     """Return the rotation that turns the figure's left side to +x and its top to +y: (3, 3)."""
-    up = np.zeros(3)
-    up["xyz".index(figure.up)] = 1.0
+    up = axis_vector(figure.up)
     across = sum(places[bones[f"left{name}"]] - places[bones[f"right{name}"]] for name in _PAIRS)
     left = unit(np.asarray(across) - up * float(np.dot(across, up)))
     if not left.any():

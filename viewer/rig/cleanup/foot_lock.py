@@ -12,6 +12,7 @@ from viewer.rig.feet.body import body_legs
 from viewer.rig.feet.legs import legs_of
 from viewer.rig.feet.planting import PlantedFeet, plant
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 
 
@@ -21,7 +22,7 @@ def lock_feet(
     """Hold feet still while they stand, as far as legs reach; ``way``: -1 if ``up`` points down."""
     clip = cast("SampledClip", in_frame_order(clip))
     legs = legs_of(figure.require_skeleton())
-    rest_up = np.eye(3)["xyz".index(figure.up)]
+    rest_up = axis_vector(figure.up)
     body = body_legs(figure, clip, legs, rest_up) if legs and clip.n_rows else None
     if body is None or body.size <= 0.0:
         return clip, PlantedFeet()

@@ -13,7 +13,7 @@ from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.hierarchy import descendants
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh
-from viewer.rig.pose import rest_pose
+from viewer.rig.pose import zero_pose
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import rest_joints
 from viewer.rig.skin import Skin, owners
@@ -106,9 +106,7 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
     every, movers, places, above = (np.concatenate(column) for column in zip(*parts, strict=True))
     nearest = np.array([found[0] for found in feet], dtype=np.int32)
     ankles = np.array([found[-1] for found in feet], dtype=np.int32)
-    pose = rest_pose(skeleton)
-    pose.dofs[:] = 0.0
-    rest = world_matrices(skeleton, pose)[ankles]
+    rest = world_matrices(skeleton, zero_pose(skeleton))[ankles]
     below = rest[:, :, 3].copy()
     below[:, _axis(figure)] = sole
     # The pseudoinverse also exists for joints with a scale of 0.

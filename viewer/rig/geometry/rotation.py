@@ -127,3 +127,12 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
     rotations = (left * signs[..., None, :]) @ right
     return rotations, np.swapaxes(rotations, -1, -2) @ matrices
+
+
+def up_rotation(source: str, target: str) -> Floats:
+    """Return the rotation (3, 3) about x from one up axis to another, "y" or "z"; exact."""
+    if source == target:
+        return np.eye(3)
+    # Adding 0 replaces -0 by 0.
+    quarter = np.asarray(np.pi / 2 if target == "z" else -np.pi / 2)
+    return np.round(axis_rotations(0, quarter)) + 0.0

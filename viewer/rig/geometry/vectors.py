@@ -16,6 +16,11 @@ def unit(vectors: Floats) -> Floats:
     return vectors / np.where(lengths == 0.0, 1.0, lengths)
 
 
+def axis_vector(name: str) -> Floats:
+    """Return the unit vector of an axis, "x", "y" or "z"."""
+    return np.eye(3)["xyz".index(name)]
+
+
 def moved_tangents(tangents: Floats, linear: Floats) -> Floats:
     """Return tangents (N, 4) moved by A (3, 3), t' = A t / |A t|; reflections change signs.
 

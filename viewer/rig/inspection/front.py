@@ -15,6 +15,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.scene import Actor, Scene
@@ -67,8 +68,7 @@ def guess_front(scene: Scene) -> Front:
     direction of its motion, or by the shape of its feet if it has neither joints nor captured
     points. The votes of actors that face opposite directions cancel out.
     """
-    up = np.zeros(3)
-    up["xyz".index(scene.up)] = 1.0
+    up = axis_vector(scene.up)
     drawn = [actor for actor in scene.actors if actor.is_drawn][:_MOST_ACTORS]
     votes = [vote for actor in drawn if (vote := _vote(actor, up)).any()]
     return _nearest(sum(votes, np.zeros(3)) / max(len(votes), 1), scene.up)

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import affine_matrices
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import axis_vector, unit
 from viewer.rig.motion.evaluation import (
     JointMotion,
     frames_of,
@@ -73,8 +73,7 @@ class SpringMotion:
 
     def skeleton_of(self, figure: Figure) -> Skeleton:
         """Return the skeleton with gravity in the world of the clip."""
-        skeleton, own = figure.require_skeleton(), np.zeros(3)
-        own["xyz".index(figure.up)] = 1.0
+        skeleton, own = figure.require_skeleton(), axis_vector(figure.up)
         if self._up is None or skeleton.springs is None or np.allclose(own, self._up):
             return skeleton
         middle = unit(own + self._up)
@@ -93,9 +92,7 @@ def springs_for(actor: Actor, up: str) -> SpringMotion | None:
     """Return an actor's simulation in a scene whose up axis is ``up``; None without springs."""
     if not has_springs(actor):
         return None
-    above = np.zeros(3)
-    above["xyz".index(up)] = 1.0
-    return SpringMotion(unit(actor.placement[:3, :3].T @ above))
+    return SpringMotion(unit(actor.placement[:3, :3].T @ axis_vector(up)))
 
 
 def has_springs(actor: Actor) -> bool:

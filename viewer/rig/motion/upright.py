@@ -15,6 +15,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
@@ -33,9 +34,7 @@ _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
     """Return the actor's axis that placement maps to the scene's up, and whether it points down."""
-    along = np.zeros(3)
-    along["xyz".index(scene.up)] = 1.0
-    own = np.linalg.solve(actor.placement[:3, :3], along)
+    own = np.linalg.solve(actor.placement[:3, :3], axis_vector(scene.up))
     axis = int(np.abs(own).argmax())
     if axis == 0:
         return scene.up, False

@@ -23,7 +23,7 @@ from viewer.rig.geometry.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import axis_vector, unit
 from viewer.rig.hierarchy import path_to_root, with_ancestors
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_names import joint_meanings
@@ -133,7 +133,7 @@ def _postures(skeleton: Skeleton, up: str, rows: Ints, local: Floats) -> Posture
             above, offset = rotations[:, parent], skeleton.rest_translations[joint]
             points[:, joint] = points[:, parent] + above @ offset
             rotations[:, joint] = above @ rotations[:, joint]
-    found = Postures(rows, rotations, points, joints, np.eye(3)["xyz".index(up)])
+    found = Postures(rows, rotations, points, joints, axis_vector(up))
     is_over = float(np.median(found.trunk() @ found.up)) < 0.0
     return replace(found, up=-found.up) if is_over else found
 

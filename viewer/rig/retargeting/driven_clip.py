@@ -10,13 +10,14 @@ from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
-from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.rotation import quaternion_to_matrix, up_rotation
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.feet import feet_notes, plant_feet
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
-from viewer.rig.retargeting.rest_alignment import rest_of, up_rotation
+from viewer.rig.retargeting.rest_alignment import rest_of
 from viewer.rig.retargeting.retarget import retargeted
 from viewer.rig.retargeting.source_rest import with_source_rest, with_upright_rest
 
@@ -65,7 +66,7 @@ def aligned_rests(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
 
 def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Floats:
     """Return left, up and forward of a body as rows (3, 3); left is x without known joints."""
-    upward = np.eye(3)["xyz".index(up)]
+    upward = axis_vector(up)
     joints = dict(zip(matches.names, range(len(matches.names)), strict=True))
     short = _SHORT * (float(np.ptp(points, axis=0).max()) or 1.0)
     for side in _SIDES:

@@ -21,6 +21,7 @@ from viewer.rig.feet.contacts import FootPath
 from viewer.rig.feet.legs import Leg, animal_legs, legs_of
 from viewer.rig.feet.planting import STEPS, PlantedFeet, plant
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.rest_alignment import rest_of
 from viewer.rig.retargeting.retarget import Retargeted
@@ -36,7 +37,7 @@ def plant_feet(
 ) -> tuple[SampledClip, PlantedFeet | None]:
     """Plant a driven figure's feet; no changes without legs or if proportions are the source's."""
     pairs = _leg_pairs(found, figure)
-    rest_up = np.eye(3)["xyz".index(figure.up)]
+    rest_up = axis_vector(figure.up)
     up = -rest_up if hangs else rest_up
     clip = cast("SampledClip", in_frame_order(found.clip))
     body = body_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
@@ -69,7 +70,7 @@ class _LegPair:
 def _leg_pairs(found: Retargeted, figure: Figure) -> list[_LegPair]:
     """Return the legs of the figure whose hips and ankles are driven, left before right."""
     source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
-    partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
+    partners, up = found.matches.partners, axis_vector(figure.up)
     animal = animal_legs(skeleton.parents, rest_of(skeleton, np.eye(3), figure.up).points, up)
     toes = {leg.ankle: leg.toe for leg in legs_of(source)}
     pairs = []

@@ -10,8 +10,9 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_rotations
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.pose import Pose, joint_rotations, rest_pose
+from viewer.rig.pose import Pose, joint_rotations, zero_pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.shape import rest_joints
@@ -151,11 +152,9 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     partners = np.where(is_alone, np.arange(skeleton.n_joints), partners)
     flip = np.ones(3)
     flip[mirror_axis(figure)] = -1.0
-    zero = rest_pose(skeleton)
-    zero.dofs[:] = 0.0
-    rest = _world_rotations(skeleton.parents, joint_rotations(skeleton, zero))
+    rest = world_rotations(skeleton.parents, joint_rotations(skeleton, zero_pose(skeleton)))
     present = joint_rotations(skeleton, pose)
-    posed = _world_rotations(skeleton.parents, present)
+    posed = world_rotations(skeleton.parents, present)
     # F D F with F = diag(flip) is a proper rotation again: the two reflections cancel out.
     deltas = posed @ np.swapaxes(rest, 1, 2)
     wanted = (flip[:, None] * deltas[partners] * flip) @ rest
@@ -188,11 +187,3 @@ def _mirror_moves(
     moves[joints, kinds] = pose.dofs[rows]
     mirrored.dofs[rows] = np.einsum("jab,jb->ja", carry, moves[partners])[joints, kinds]
     mirrored.dofs[:] = clamp_dofs(skeleton, mirrored.dofs)
-
-
-def _world_rotations(parents: Ints, local: Floats) -> Floats:
-    world = local.copy()
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            world[joint] = world[parent] @ world[joint]
-    return world

@@ -31,9 +31,11 @@ from viewer.rig.geometry.rotation import (
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
+    up_rotation,
 )
-from viewer.rig.kinematics import world_matrices
-from viewer.rig.pose import Pose, joint_rotations, rest_pose
+from viewer.rig.geometry.vectors import axis_vector
+from viewer.rig.kinematics import world_matrices, world_rotations
+from viewer.rig.pose import Pose, joint_rotations, zero_pose
 from viewer.rig.posing.joint_rotation import nearest_dofs
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton
@@ -73,8 +75,8 @@ class JointRotations:
 def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
     """Return the joint rotations of a posed figure."""
     skeleton = figure.require_skeleton()
-    relative = _figure_rotations(skeleton, pose) @ np.swapaxes(
-        _figure_rotations(skeleton, _with_zero_dofs(skeleton)), 1, 2
+    relative = world_rotations(skeleton.parents, joint_rotations(skeleton, pose)) @ np.swapaxes(
+        world_rotations(skeleton.parents, joint_rotations(skeleton, zero_pose(skeleton))), 1, 2
     )
     return JointRotations(
         figure.name,
@@ -171,12 +173,12 @@ def rotate_joints(
                 values=values,
             )
         )
-    to_target = _up_rotation(source.up, target.up)
+    to_target = up_rotation(source.up, target.up)
     if source.meanings or other.humanoid is not None:
-        up = np.eye(3)["xyz".index(target.up)]
+        up = axis_vector(target.up)
         to_target = _arc(to_target @ source.left, left_of(target), up) @ to_target
     deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
-    rest = _figure_rotations(other, _with_zero_dofs(other))
+    rest = world_rotations(other.parents, joint_rotations(other, zero_pose(other)))
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
     moved, missed = start.copy(), []
     world = np.empty((other.n_joints, 3, 3))
@@ -207,7 +209,7 @@ def left_of(figure: Figure) -> Floats:
     ]
     if not pairs:
         return usual
-    points = world_matrices(skeleton, _with_zero_dofs(skeleton))[:, :3, 3]
+    points = world_matrices(skeleton, zero_pose(skeleton))[:, :3, 3]
     sides = sum((points[left] - points[right] for left, right in pairs), np.zeros(3))
     sides["xyz".index(figure.up)] = 0.0
     largest = int(np.abs(sides).argmax())
@@ -253,26 +255,3 @@ def _notes(
             )
         )
     return notes
-
-
-def _with_zero_dofs(skeleton: Skeleton) -> Pose:
-    pose = rest_pose(skeleton)
-    pose.dofs[:] = 0.0
-    return pose
-
-
-def _figure_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return every joint's rotation in the figure's axes: (J, 3, 3)."""
-    world = joint_rotations(skeleton, pose)
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            world[joint] = world[parent] @ world[joint]
-    return world
-
-
-def _up_rotation(source: str, target: str) -> Floats:
-    """Return the rotation from one figure's axes to the other's: y up to z up is (x, -z, y)."""
-    to_z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    if source == target:
-        return np.eye(3)
-    return to_z if target == "z" else to_z.T

@@ -8,12 +8,12 @@ from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import (
-    axis_rotations,
     nearest_rotations,
     quaternion_to_matrix,
 )
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.kinematics import joint_worlds, world_matrices
-from viewer.rig.pose import rest_pose
+from viewer.rig.pose import zero_pose
 from viewer.rig.retargeting.joint_matches import Matches
 from viewer.rig.skeleton import Skeleton
 
@@ -46,20 +46,11 @@ class RestPose:
     """(3,). The up axis in the common axes."""
 
 
-def up_rotation(source: str, target: str) -> Floats:
-    """Return the rotation from one up axis to another, ``"y"`` or ``"z"``: (3, 3)."""
-    if source == target:
-        return np.eye(3)
-    return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
-
-
 def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
     """Return a skeleton's rest pose, DOFs at 0, rotated ``to_common`` (3, 3) axes."""
-    pose = rest_pose(skeleton)
-    pose.dofs[:] = 0.0
-    points = world_matrices(skeleton, pose)[:, :3, 3]
+    points = world_matrices(skeleton, zero_pose(skeleton))[:, :3, 3]
     local = quaternion_to_matrix(skeleton.rest_rotations)
-    axis = np.eye(3)["xyz".index(up)]
+    axis = axis_vector(up)
     worlds = joint_worlds(skeleton.parents, local, np.zeros(3))[:, :3, :3]
     return RestPose(points @ to_common.T, worlds, axis)
 

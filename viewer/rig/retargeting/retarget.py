@@ -26,7 +26,7 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs, conjugate, multiply
-from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix, up_rotation
 from viewer.rig.hierarchy import path_to_root
 from viewer.rig.kinematics import joint_worlds
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -39,7 +39,6 @@ from viewer.rig.retargeting.rest_alignment import (
     alignment,
     is_same_rest,
     rest_of,
-    up_rotation,
 )
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
 from viewer.rig.scene import figure_pose

@@ -18,6 +18,7 @@ from viewer.phrases import Remedy, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.anatomical_rest import (
     SIDES,
@@ -105,7 +106,7 @@ def with_upright_rest(motion: SkeletonMotion) -> SkeletonMotion:
     """Return a motion whose rest pose stands along the up axis."""
     # Some programs rotate the root of a skeleton with y up into a world with z up, in which its
     # rest pose lies. Skeletons whose legs are along no axis, or have no known names, stay.
-    skeleton, up = motion.figure.skeleton, np.eye(3)["xyz".index(motion.figure.up)]
+    skeleton, up = motion.figure.skeleton, axis_vector(motion.figure.up)
     still = None if skeleton is None else rest_posture(skeleton, motion.figure.up)
     if skeleton is None or still is None:
         return motion
