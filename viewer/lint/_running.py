@@ -43,7 +43,7 @@ CHECKS = {
     "people": Check("people", of_motion=True),
     "jitter": Check("jitter", of_motion=True),
 }
-"""Modules in this folder with a function ``check(subject)``, in order of execution."""
+"""Modules in this folder with a function ``check(subject)``, which yields findings, in order."""
 
 
 def lint_scene(

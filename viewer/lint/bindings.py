@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from viewer.lint._finding import Finding
@@ -19,21 +21,21 @@ from viewer.rig.skeleton import joint_labels
 _ELSEWHERE = 0.01
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Check the inverse bind matrices of a figure with a skin."""
     figure = subject.actor.figure
     if figure.skin is None or figure.skin.n_joints == 0:
-        return []
-    findings = subject.faults(bind_faults(figure, subject.invalid))
+        return
+    yield from subject.faults(bind_faults(figure, subject.invalid))
     usable = subject.valid("bindings", figure.skin.n_joints) & are_usable(figure.skin)
-    return findings + _elsewhere(subject, figure, usable)
+    yield from _elsewhere(subject, figure, usable)
 
 
-def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]:
+def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> Iterator[Finding]:
     """Compare the joints' bind positions with those of the skeleton."""
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
-        return []
+        return
     # If the position of a joint is unknown, so are the positions of the joints below it.
     known = subject.valid("joints", skeleton.n_joints)
     for joint, parent in enumerate(skeleton.parents.tolist()):
@@ -46,19 +48,17 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     distances = min((np.where(known, part, 0.0) for part in both), key=np.max)
     away = np.flatnonzero(distances > _ELSEWHERE * subject.size())
     if len(away) == 0:
-        return []
+        return
     away = away[np.argsort(-distances[away], kind="stable")]
     first = int(away[0])
-    return [
-        subject.found(
-            "B004.joints: {n} from the rest pose (worst: {joint} by {distance}): the mesh is "
-            "deformed at rest",
-            n=counted(
-                len(away), "joint", "has a bind pose that differs", "have bind poses that differ"
-            ),
-            joint=joint_labels(skeleton)[first],
-            distance=subject.length(float(distances[first])),
-            joints=away,
-            at=("bindings", first),
-        )
-    ]
+    yield subject.found(
+        "B004.joints: {n} from the rest pose (worst: {joint} by {distance}): the mesh is "
+        "deformed at rest",
+        n=counted(
+            len(away), "joint", "has a bind pose that differs", "have bind poses that differ"
+        ),
+        joint=joint_labels(skeleton)[first],
+        distance=subject.length(float(distances[first])),
+        joints=away,
+        at=("bindings", first),
+    )

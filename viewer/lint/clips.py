@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -25,80 +26,74 @@ _ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Check the clip of an actor with a skeleton."""
     clip, skeleton = subject.actor.joint_motion, subject.actor.figure.skeleton
     if clip is None or skeleton is None:
-        return []
-    findings = []
+        return
     if clip.timing is not None:
-        findings += missing_frames(subject, clip.timing)
+        yield from missing_frames(subject, clip.timing)
     elif clip.kind == "curves":
-        findings += _keys(subject, clip)
-        findings += _outside(subject, clip, skeleton)
+        yield from _keys(subject, clip)
+        yield from _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:
-        return [
-            *findings,
-            subject.found(
-                "C010.one-time: starts and ends at {time:zg} s", time=float(clip.start), part="clip"
-            ),
-        ]
+        yield subject.found(
+            "C010.one-time: starts and ends at {time:zg} s", time=float(clip.start), part="clip"
+        )
+        return
     track = track_of(subject)
     assert track is not None  # the actor has a clip and a skeleton
-    return findings + _jumps(subject, track, skeleton) + _fast_rotations(subject, track, skeleton)
+    yield from _jumps(subject, track, skeleton)
+    yield from _fast_rotations(subject, track, skeleton)
 
 
-def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
+def missing_frames(subject: Subject, timing: Timing) -> Iterator[Finding]:
     """Report gaps between the first and the last frame in which the person is present."""
     present = timing.present
     there = np.flatnonzero(present)
     if len(there) == 0:
-        return []
+        return
     # People may appear later or leave earlier than others.
     gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
     if len(gaps) == 0:
-        return []
+        return
     runs = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
     first = timing.first_frame
     times = timing.start + gaps / timing.frame_rate + subject.actor.offset
-    return [
-        subject.found(
-            "C005.gaps: {n} missing in {n_gaps}: {gaps}",
-            n=counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1),
-            all=int(there[-1] - there[0]) + 1,
-            n_gaps=counted(len(runs), "gap"),
-            gaps=listed([frame_range(int(run[0]) + first, int(run[-1]) + first) for run in runs]),
-            part="clip",
-            frames=gaps + first,
-            times=times,
-            # In the gap itself the person is not visible.
-            seek=float(times[0]) - 1.0 / timing.frame_rate,
-        )
-    ]
+    yield subject.found(
+        "C005.gaps: {n} missing in {n_gaps}: {gaps}",
+        n=counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1),
+        all=int(there[-1] - there[0]) + 1,
+        n_gaps=counted(len(runs), "gap"),
+        gaps=listed([frame_range(int(run[0]) + first, int(run[-1]) + first) for run in runs]),
+        part="clip",
+        frames=gaps + first,
+        times=times,
+        # In the gap itself the person is not visible.
+        seek=float(times[0]) - 1.0 / timing.frame_rate,
+    )
 
 
-def _keys(subject: Subject, clip: Clip) -> list[Finding]:
+def _keys(subject: Subject, clip: Clip) -> Iterator[Finding]:
     """Report keys at the same time as the previous one."""
     times = [channel.times[1:][np.diff(channel.times) <= SHORTEST] for channel in clip.channels]
     count = sum(map(len, times))
     if count == 0:
-        return []
+        return
     channel = next(index for index, found in enumerate(times) if len(found))
-    return [
-        subject.found(
-            "C002.keys: {n} the same time as the previous key (first: channel {channel} at "
-            "{time:zg} s)",
-            n=counted(count, "key", "has", "have"),
-            channel=channel,
-            time=float(times[channel][0]),
-            part="clip",
-            times=np.unique(np.concatenate(times)) + subject.actor.offset,
-            at=("channels", channel),
-        )
-    ]
+    yield subject.found(
+        "C002.keys: {n} the same time as the previous key (first: channel {channel} at "
+        "{time:zg} s)",
+        n=counted(count, "key", "has", "have"),
+        channel=channel,
+        time=float(times[channel][0]),
+        part="clip",
+        times=np.unique(np.concatenate(times)) + subject.actor.offset,
+        at=("channels", channel),
+    )
 
 
-def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
+def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> Iterator[Finding]:
     """Report curves that exceed the limits, to which they are clamped during playback."""
     times = np.append(key_times(subject, clip)[:_MOST], clip.end)
     targets, values = evaluate_all(clip, times)
@@ -106,7 +101,7 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
     beyond = np.maximum(low - values, values - high)
     outside = np.flatnonzero(beyond.max(axis=0) > _ROUNDING)
     if len(outside) == 0:
-        return []
+        return
     worst = int(outside[beyond[:, outside].max(axis=0).argmax()])
     row = int(beyond[:, worst].argmax())
     number = int(frame_numbers(subject, times[row : row + 1])[0])
@@ -116,25 +111,23 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
         time=float(times[row] + subject.actor.offset),
     )
     order = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
-    return [
-        subject.found(
-            "C006.curves: {n} limits: {dof}",
-            n=counted(len(outside), "curve", "exceeds its", "exceed their"),
-            dof=beyond_text(skeleton, int(targets[worst]), float(values[row, worst]), when),
-            part="clip",
-            joints=np.unique(skeleton.dof_joints[targets[outside]]),
-            times=times[order] + subject.actor.offset,
-            seek=float(times[row] + subject.actor.offset),
-            at=("channels", int(targets[worst])),
-        )
-    ]
+    yield subject.found(
+        "C006.curves: {n} limits: {dof}",
+        n=counted(len(outside), "curve", "exceeds its", "exceed their"),
+        dof=beyond_text(skeleton, int(targets[worst]), float(values[row, worst]), when),
+        part="clip",
+        joints=np.unique(skeleton.dof_joints[targets[outside]]),
+        times=times[order] + subject.actor.offset,
+        seek=float(times[row] + subject.actor.offset),
+        at=("channels", int(targets[worst])),
+    )
 
 
-def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
+def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
     given = subject.options.max_speed
     limit = _SIZES * track.size if given is None else given * track.scale
     if limit == 0.0:  # a single joint without a mesh has no size
-        return []
+        return
     speeds = np.zeros((len(track.times), skeleton.n_joints))
     steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=2)
     speeds[1:] = steps / np.diff(track.times)[:, None]
@@ -147,25 +140,22 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
         speeds[1:] = np.where(track.stepped[1:], 0.0, steps / np.diff(track.times)[:, None])
         fast = _too_fast(track, _leaps(speeds, skeleton.parents < 0), limit)
     if fast is None:
-        return []
-    return [
-        subject.found(
-            "C003.joint: {n}: {joint} moves at {speed} at frame {frame}, {time:z.3f} s (limit "
-            "{limit})",
-            n=counted(len(fast.rows), "frame", of=track.n_frames),
-            all=track.n_frames,
-            joint=joint_labels(skeleton)[fast.joints[0]],
-            speed=subject.speed(fast.rate / track.scale),
-            limit=subject.speed(limit / track.scale, is_limit=True),
-            frame=int(track.numbers[fast.worst]),
-            time=float(track.times[fast.worst]),
-            part="clip",
-            joints=fast.joints,
-            frames=track.numbers[fast.rows],
-            times=track.times[fast.rows],
-            at=("frames", fast.worst),
-        )
-    ]
+        return
+    yield subject.found(
+        "C003.joint: {n}: {joint} moves at {speed} at frame {frame}, {time:z.3f} s (limit {limit})",
+        n=counted(len(fast.rows), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=joint_labels(skeleton)[fast.joints[0]],
+        speed=subject.speed(fast.rate / track.scale),
+        limit=subject.speed(limit / track.scale, is_limit=True),
+        frame=int(track.numbers[fast.worst]),
+        time=float(track.times[fast.worst]),
+        part="clip",
+        joints=fast.joints,
+        frames=track.numbers[fast.rows],
+        times=track.times[fast.rows],
+        at=("frames", fast.worst),
+    )
 
 
 def _leaps(speeds: Floats, is_root: Bools) -> Floats:
@@ -178,32 +168,30 @@ def _leaps(speeds: Floats, is_root: Bools) -> Floats:
     return np.pad(np.where(alone, steps, 0.0), ((1, 0), (0, 0)))
 
 
-def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
+def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> Iterator[Finding]:
     rates = np.zeros((len(track.times), skeleton.n_joints))
     cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
     rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
     rates[track.stepped] = 0.0
     fast = _too_fast(track, rates, subject.options.max_rotation)
     if fast is None:
-        return []
-    return [
-        subject.found(
-            "C004.joint: {n}: {joint} rotates at {rate:.0f} degrees per second at frame "
-            "{frame}, {time:z.3f} s (limit {limit:.0f})",
-            n=counted(len(fast.rows), "frame", of=track.n_frames),
-            all=track.n_frames,
-            joint=joint_labels(skeleton)[fast.joints[0]],
-            rate=math.degrees(fast.rate),
-            limit=math.degrees(subject.options.max_rotation),
-            frame=int(track.numbers[fast.worst]),
-            time=float(track.times[fast.worst]),
-            part="clip",
-            joints=fast.joints,
-            frames=track.numbers[fast.rows],
-            times=track.times[fast.rows],
-            at=("frames", fast.worst),
-        )
-    ]
+        return
+    yield subject.found(
+        "C004.joint: {n}: {joint} rotates at {rate:.0f} degrees per second at frame "
+        "{frame}, {time:z.3f} s (limit {limit:.0f})",
+        n=counted(len(fast.rows), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=joint_labels(skeleton)[fast.joints[0]],
+        rate=math.degrees(fast.rate),
+        limit=math.degrees(subject.options.max_rotation),
+        frame=int(track.numbers[fast.worst]),
+        time=float(track.times[fast.worst]),
+        part="clip",
+        joints=fast.joints,
+        frames=track.numbers[fast.rows],
+        times=track.times[fast.rows],
+        at=("frames", fast.worst),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

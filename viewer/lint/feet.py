@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from viewer.diagnostics import Phrase
@@ -24,15 +26,15 @@ from viewer.rig.figure import Figure
 from viewer.rig.skeleton import joint_labels
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Check the feet of a moving body: a skeleton whose joint names include two ankles."""
     figure = subject.actor.figure
     track = None if figure.skeleton is None else _moving(subject, figure)
     if track is None or figure.skeleton is None or subject.options.ground == "none":
-        return []
+        return
     feet = track.feet.tolist()
     if len(feet) < 2:
-        return []
+        return
     up = 2 if subject.up == "z" else 1
     height, heights = extent(figure)[1], track.soles
     given = subject.options.ground
@@ -43,14 +45,13 @@ def check(subject: Subject) -> list[Finding]:
         step = float(track.times[1] - track.times[0])
         found = ground_under(subject.actor, subject.up, heights, track.present, step)
         if found.height is None:
-            return [_unsure(subject, found, step)]
+            yield _unsure(subject, found, step)
+            return
         ground, sinks = found.height, limits.SINKS_OF_GUESS if found.is_guess else limits.SINKS
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
-    return [
-        *_sunk(subject, track, feet, labels, heights - ground, sinks * height),
-        *_floating(subject, track, feet, heights - ground, height, given == "auto"),
-        *_slipped(subject, track, feet, labels, heights - ground, up),
-    ]
+    yield from _sunk(subject, track, feet, labels, heights - ground, sinks * height)
+    yield from _floating(subject, track, feet, heights - ground, height, given == "auto")
+    yield from _slipped(subject, track, feet, labels, heights - ground, up)
 
 
 def _moving(subject: Subject, figure: Figure) -> Track | None:
@@ -88,7 +89,7 @@ def _sunk(
     labels: list[str],
     heights: Floats,
     limit: float,
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Report feet that sink deeper than a limit in figure units."""
     depths = np.where(track.present[:, None], -heights, 0.0)
     deepest = depths.max(axis=1)
@@ -97,25 +98,23 @@ def _sunk(
     lasts = is_deep[1:-1] & (is_deep[:-2] | is_deep[2:])
     frames = np.flatnonzero(lasts | (deepest > limits.FAR_TOO_DEEP * limit * track.scale))
     if len(frames) == 0:
-        return []
+        return
     frames = frames[np.argsort(-deepest[frames], kind="stable")]
     worst = int(depths[frames[0]].argmax())
     each = track.of_each(frames)
-    return [
-        subject.found(
-            "C008.foot: {n}: {joint} is {depth} below the ground at frame {frame}",
-            n=counted(len(each), "frame", of=track.n_frames),
-            all=track.n_frames,
-            joint=labels[worst],
-            depth=subject.length(float(deepest[frames[0]] / track.scale)),
-            frame=int(track.numbers[frames[0]]),
-            part="clip",
-            joints=[feet[worst]],
-            frames=track.numbers[each],
-            times=track.times[each],
-            at=("frames", int(frames[0])),
-        )
-    ]
+    yield subject.found(
+        "C008.foot: {n}: {joint} is {depth} below the ground at frame {frame}",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=labels[worst],
+        depth=subject.length(float(deepest[frames[0]] / track.scale)),
+        frame=int(track.numbers[frames[0]]),
+        part="clip",
+        joints=[feet[worst]],
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", int(frames[0])),
+    )
 
 
 def _floating(
@@ -125,7 +124,7 @@ def _floating(
     heights: Floats,
     height: float,
     may_step: bool,
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Report a body whose lower foot rests above the ground, or above a step."""
     lowest, size = heights.min(axis=1), track.scale * height
     step = float(track.times[1] - track.times[0])
@@ -133,24 +132,21 @@ def _floating(
     most = limits.STEPS * size if may_step else np.inf
     frames = np.flatnonzero(rests & (lowest > limits.FLOATS * size) & (lowest < most))
     if len(frames) == 0:
-        return []
+        return
     frames = frames[np.argsort(-lowest[frames], kind="stable")]
     each = track.of_each(frames)
-    return [
-        subject.found(
-            "C016.foot: {n}: both feet rest up to {height} above the ground, highest at frame "
-            "{frame}",
-            n=counted(len(each), "frame", of=track.n_frames),
-            all=track.n_frames,
-            height=subject.length(float(lowest[frames[0]] / track.scale)),
-            frame=int(track.numbers[frames[0]]),
-            part="clip",
-            joints=feet,
-            frames=track.numbers[each],
-            times=track.times[each],
-            at=("frames", int(frames[0])),
-        )
-    ]
+    yield subject.found(
+        "C016.foot: {n}: both feet rest up to {height} above the ground, highest at frame {frame}",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        height=subject.length(float(lowest[frames[0]] / track.scale)),
+        frame=int(track.numbers[frames[0]]),
+        part="clip",
+        joints=feet,
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", int(frames[0])),
+    )
 
 
 def _slipped(
@@ -160,10 +156,10 @@ def _slipped(
     labels: list[str],
     heights: Floats,
     up: int,
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Report a foot that slides along the ground, where feet do not stand."""
     if track.body <= 0.0:  # legs without a length
-        return []
+        return
     step = float(track.times[1] - track.times[0])
     paths, how = list(track.paths), (runs_of(track.present), 1.0 / step, track.body, np.eye(3)[up])
     velocity = ground_velocity(paths, *how)
@@ -186,27 +182,24 @@ def _slipped(
     both = slides[1:] & slides[:-1]
     distances = (both * 0.5 * (speeds[1:] + speeds[:-1])).sum(axis=0) * step
     if not (distances > limits.FAR * track.body).any():
-        return []
+        return
     worst = int(distances.argmax())
     fastest = int(np.where(slides[:, worst], speeds[:, worst], 0.0).argmax())
     each = track.of_each(np.concatenate([[fastest], np.flatnonzero(slides.any(axis=1))]))
-    return [
-        subject.found(
-            "C007.foot: {n}: {joint} slides by {distance} in total, at up to {speed} (frame "
-            "{frame})",
-            n=counted(len(each), "frame", of=track.n_frames),
-            all=track.n_frames,
-            joint=labels[worst],
-            distance=subject.length(float(distances[worst] / track.scale)),
-            speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
-            frame=int(track.numbers[fastest]),
-            part="clip",
-            joints=[feet[worst]],
-            frames=track.numbers[each],
-            times=track.times[each],
-            at=("frames", fastest),
-        )
-    ]
+    yield subject.found(
+        "C007.foot: {n}: {joint} slides by {distance} in total, at up to {speed} (frame {frame})",
+        n=counted(len(each), "frame", of=track.n_frames),
+        all=track.n_frames,
+        joint=labels[worst],
+        distance=subject.length(float(distances[worst] / track.scale)),
+        speed=subject.speed(float(speeds[fastest, worst] / track.scale)),
+        frame=int(track.numbers[fastest]),
+        part="clip",
+        joints=[feet[worst]],
+        frames=track.numbers[each],
+        times=track.times[each],
+        at=("frames", fastest),
+    )
 
 
 def _sliding(speeds: Floats, low: Bools, stands: Bools, step: float) -> Bools:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -31,17 +31,18 @@ _RMS = np.sqrt(3.0) / (np.sqrt(70.0) * 1.1932)
 _TOGETHER = 2000  # frames per batch
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Check the joints or points of a captured motion."""
     clip = subject.actor.captured
     if clip is not None and clip.points is not None:
-        return _points(subject, clip)
+        yield from _points(subject, clip)
+        return
     if clip is None or clip.frame_rate < _SLOWEST:
-        return []
+        return
     track = track_of(subject)
     skeleton = subject.actor.figure.skeleton
     if track is None or skeleton is None or not track.size > 0.0:
-        return []
+        return
     noise = noise_of(track.positions, track.present, _width(clip.timing.frame_rate))
     limit = _LIMIT * track.size
     labels, scale = [*joint_labels(skeleton)], track.scale
@@ -49,13 +50,13 @@ def check(subject: Subject) -> list[Finding]:
     def shown(length: float) -> str:
         return subject.length(length / scale)
 
-    return _found(subject, noise, limit, labels, shown, track.numbers, track.times)
+    yield from _found(subject, noise, limit, labels, shown, track.numbers, track.times)
 
 
-def _points(subject: Subject, clip: PointClip) -> list[Finding]:
+def _points(subject: Subject, clip: PointClip) -> Iterator[Finding]:
     timing, layout = clip.timing, subject.actor.figure.points
     if timing.frame_rate < _SLOWEST or layout is None or not timing.present.any():
-        return []
+        return
     rows = clip.points[np.maximum(timing.rows, 0)]
     seen = (rows[..., 3] > 0.0) & timing.present[:, None]
     limit = _POINT_LIMIT * _size(rows[..., :3], seen)
@@ -71,7 +72,7 @@ def _points(subject: Subject, clip: PointClip) -> list[Finding]:
     def shown(length: float) -> str:
         return f"{rounded(length)} units"
 
-    return _found(subject, noise, limit, names, shown, numbers, times)
+    yield from _found(subject, noise, limit, names, shown, numbers, times)
 
 
 def _found(
@@ -82,32 +83,30 @@ def _found(
     shown: Callable[[float], str],
     numbers: np.ndarray,
     times: Floats,
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Report the joints whose noise (F, J) exceeds a limit."""
     highest = noise.max(axis=1, initial=0.0)
     frames = np.flatnonzero(highest > limit)
     if limit <= 0.0 or len(frames) == 0:
-        return []
+        return
     frames = frames[np.argsort(-highest[frames], kind="stable")]
     order = np.argsort(-noise.max(axis=0), kind="stable")
     joints = order[noise[:, order].max(axis=0) > limit]
-    return [
-        subject.found(
-            "C014.jitter: {n}: {joint} jitters by {noise} from frame to frame, most around "
-            "frame {frame} (limit {limit})",
-            n=counted(len(frames), "frame", of=int((~np.isnan(highest)).sum())),
-            all=int((~np.isnan(highest)).sum()),
-            joint=labels[joints[0]],
-            noise=shown(float(noise.max())),
-            limit=shown(limit),
-            frame=int(numbers[frames[0]]),
-            part="clip",
-            joints=joints,
-            frames=numbers[frames],
-            times=times[frames],
-            at=("frames", int(frames[0])),
-        )
-    ]
+    yield subject.found(
+        "C014.jitter: {n}: {joint} jitters by {noise} from frame to frame, most around "
+        "frame {frame} (limit {limit})",
+        n=counted(len(frames), "frame", of=int((~np.isnan(highest)).sum())),
+        all=int((~np.isnan(highest)).sum()),
+        joint=labels[joints[0]],
+        noise=shown(float(noise.max())),
+        limit=shown(limit),
+        frame=int(numbers[frames[0]]),
+        part="clip",
+        joints=joints,
+        frames=numbers[frames],
+        times=times[frames],
+        at=("frames", int(frames[0])),
+    )
 
 
 def noise_of(positions: Floats, present: Bools, width: int) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -38,15 +40,14 @@ class _Path:
     """Size of the body, scene units."""
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Compare a captured person with the others in the recording."""
     actor = subject.actor
     if actor.person is None or not is_tracked(actor.person) or len(subject.people) < 2:
-        return []
+        return
     own = _path(actor)
     if own is None or not own.present.any():
-        return []
-    findings = []
+        return
     is_later = False
     for other in subject.people:
         if other is actor:
@@ -56,9 +57,8 @@ def check(subject: Subject) -> list[Finding]:
         if path is None or not path.present.any():
             continue
         if is_later:
-            findings += _exchanged(subject, other, own, path)
-        findings += _continued(subject, other, own, path)
-    return findings
+            yield from _exchanged(subject, other, own, path)
+        yield from _continued(subject, other, own, path)
 
 
 def _are_alike(one: Actor, other: Actor) -> bool:
@@ -76,11 +76,11 @@ def _are_alike(one: Actor, other: Actor) -> bool:
     )
 
 
-def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[Finding]:
+def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> Iterator[Finding]:
     """Report frames in which two people swap positions."""
     both = np.flatnonzero(one.present & two.present)
     if len(both) < 2:
-        return []
+        return
     before, after = both[:-1], both[1:]
     kept = np.maximum(
         _distance(one.places[after], one.places[before]),
@@ -97,50 +97,46 @@ def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[F
     near = after - before <= max(1.0, _LATER * one.timing.frame_rate)
     frames = after[near & (least > _JUMPS * one.size) & (swapped < _BETTER * kept)]
     if len(frames) == 0:
-        return []
+        return
     number = int(frames[0]) + one.timing.first_frame
-    return [
-        subject.found(
-            "C015.exchanged: swaps positions with {other}, {distance} away, in {n}: {frames_text}",
-            other=person_label(other.person or 0),
-            n=counted(len(frames), "frame"),
-            frames_text=listed([str(frame + one.timing.first_frame) for frame in frames.tolist()]),
-            distance=_length(subject, float(kept[np.searchsorted(after, frames[0])])),
-            frame=number,
-            part="clip",
-            frames=frames + one.timing.first_frame,
-            times=_times(subject, one, frames),
-        )
-    ]
+    yield subject.found(
+        "C015.exchanged: swaps positions with {other}, {distance} away, in {n}: {frames_text}",
+        other=person_label(other.person or 0),
+        n=counted(len(frames), "frame"),
+        frames_text=listed([str(frame + one.timing.first_frame) for frame in frames.tolist()]),
+        distance=_length(subject, float(kept[np.searchsorted(after, frames[0])])),
+        frame=number,
+        part="clip",
+        frames=frames + one.timing.first_frame,
+        times=_times(subject, one, frames),
+    )
 
 
-def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[Finding]:
+def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> Iterator[Finding]:
     """Report a person who appears where another one has just disappeared permanently."""
     first, last = int(np.flatnonzero(own.present)[0]), int(np.flatnonzero(path.present)[-1])
     pause = first - last
     if not 0 < pause <= _LATER * own.timing.frame_rate:
-        return []
+        return
     apart = float(_distance(own.places[first], path.places[last]))
     if apart > _NEAR * own.size:
-        return []
+        return
     numbers = own.timing.first_frame + np.array([first])
     ids = f"{other.person},{subject.actor.person}"
-    return [
-        subject.found(
-            "C015.continued: appears in frame {first}, {distance} from where {other} disappears in "
-            "frame {last}: may be one person{remedy}",
-            other=person_label(other.person or 0),
-            first=first + own.timing.first_frame,
-            last=last + own.timing.first_frame,
-            distance=_length(subject, apart),
-            ids=ids,
-            part="clip",
-            severity="note",
-            frames=numbers,
-            times=_times(subject, own, np.array([first])),
-            remedy=Remedy("", f" (--merge-ids {ids} of viewer convert)"),
-        )
-    ]
+    yield subject.found(
+        "C015.continued: appears in frame {first}, {distance} from where {other} disappears in "
+        "frame {last}: may be one person{remedy}",
+        other=person_label(other.person or 0),
+        first=first + own.timing.first_frame,
+        last=last + own.timing.first_frame,
+        distance=_length(subject, apart),
+        ids=ids,
+        part="clip",
+        severity="note",
+        frames=numbers,
+        times=_times(subject, own, np.array([first])),
+        remedy=Remedy("", f" (--merge-ids {ids} of viewer convert)"),
+    )
 
 
 def _path(actor: Actor) -> _Path | None:

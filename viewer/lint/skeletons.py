@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -18,116 +19,97 @@ from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels, shown_joints
 _ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Check the skeleton and the current pose of an actor."""
     skeleton, pose = subject.actor.figure.skeleton, subject.actor.pose
     if skeleton is None:
-        return []
-    return [
-        *_names(subject, skeleton),
-        *_rest(subject, skeleton),
-        *_limits(subject, skeleton, pose),
-    ]
+        return
+    yield from _names(subject, skeleton)
+    yield from _rest(subject, skeleton)
+    yield from _limits(subject, skeleton, pose)
 
 
-def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
-    findings = []
+def _names(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
     counts = Counter(skeleton.names)
     repeated = [j for j, name in enumerate(skeleton.names) if name and counts[name] > 1]
     if repeated:
         names = list(dict.fromkeys(skeleton.names[joint] for joint in repeated))
         shown = [Phrase("{name} ({n})", name=quoted(name), n=counts[name]) for name in names]
-        findings.append(
-            subject.found(
-                "S006.joints: {n} with duplicate names: {names}",
-                n=counted(len(repeated), "joint"),
-                names=listed(shown),
-                part="skeleton",
-                joints=repeated,
-                at=("joints", repeated[0]),
-            )
+        yield subject.found(
+            "S006.joints: {n} with duplicate names: {names}",
+            n=counted(len(repeated), "joint"),
+            names=listed(shown),
+            part="skeleton",
+            joints=repeated,
+            at=("joints", repeated[0]),
         )
     nameless = [
         joint for joint in shown_joints(skeleton).tolist() if not skeleton.names[joint].strip()
     ]
     if nameless:
-        findings.append(
-            subject.found(
-                "S007.joints: {n} no name (first: joint {joint})",
-                n=counted(len(nameless), "joint", "has", "have"),
-                joint=nameless[0],
-                part="skeleton",
-                joints=nameless,
-                at=("joints", nameless[0]),
-            )
+        yield subject.found(
+            "S007.joints: {n} no name (first: joint {joint})",
+            n=counted(len(nameless), "joint", "has", "have"),
+            joint=nameless[0],
+            part="skeleton",
+            joints=nameless,
+            at=("joints", nameless[0]),
         )
     roots = np.flatnonzero(skeleton.parents < 0)
     if len(roots) > 1:
         labels = joint_labels(skeleton)
-        findings.append(
-            subject.found(
-                "S008.roots: {n} joints have no parent: {names}",
-                n=len(roots),
-                names=listed([labels[joint] for joint in roots]),
-                part="skeleton",
-                joints=roots,
-                at=("joints", int(roots[1])),
-            )
+        yield subject.found(
+            "S008.roots: {n} joints have no parent: {names}",
+            n=len(roots),
+            names=listed([labels[joint] for joint in roots]),
+            part="skeleton",
+            joints=roots,
+            at=("joints", int(roots[1])),
         )
-    return findings
 
 
-def _rest(subject: Subject, skeleton: Skeleton) -> list[Finding]:
+def _rest(subject: Subject, skeleton: Skeleton) -> Iterator[Finding]:
     labels = joint_labels(skeleton)
-    findings = []
     known = subject.valid("joints", skeleton.n_joints)
     lengths = np.linalg.norm(skeleton.rest_rotations, axis=1)
     odd = np.flatnonzero((np.abs(lengths - 1.0) > UNIT_ROTATION) & known)
     if len(odd):
-        findings.append(
-            subject.found(
-                "S009.rotations: {n} not normalised (first: length {length} at {joint})",
-                n=counted(len(odd), "rest rotation", "is", "are"),
-                joint=labels[odd[0]],
-                length=rounded(float(lengths[odd[0]]), 4),
-                part="skeleton",
-                joints=odd,
-                at=("joints", int(odd[0])),
-            )
+        yield subject.found(
+            "S009.rotations: {n} not normalised (first: length {length} at {joint})",
+            n=counted(len(odd), "rest rotation", "is", "are"),
+            joint=labels[odd[0]],
+            length=rounded(float(lengths[odd[0]]), 4),
+            part="skeleton",
+            joints=odd,
+            at=("joints", int(odd[0])),
         )
     flat = np.flatnonzero((skeleton.rest_scales <= 0.0).any(axis=1) & known)
     if len(flat):
         x, y, z = skeleton.rest_scales[flat[0]].tolist()
-        findings.append(
-            subject.found(
-                "S010.scales: {n} not positive (first: {x:zg} {y:zg} {z:zg} at {joint})",
-                n=counted(len(flat), "rest scale", "is", "are"),
-                joint=labels[flat[0]],
-                x=x,
-                y=y,
-                z=z,
-                part="skeleton",
-                joints=flat,
-                at=("joints", int(flat[0])),
-            )
+        yield subject.found(
+            "S010.scales: {n} not positive (first: {x:zg} {y:zg} {z:zg} at {joint})",
+            n=counted(len(flat), "rest scale", "is", "are"),
+            joint=labels[flat[0]],
+            x=x,
+            y=y,
+            z=z,
+            part="skeleton",
+            joints=flat,
+            at=("joints", int(flat[0])),
         )
-    return findings
 
 
-def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Finding]:
+def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> Iterator[Finding]:
     facts = [fact for _, fact in subject.actor.figure.facts if isinstance(fact, Diagnostic)]
-    findings = []
     for fact in facts:
         joints = [] if fact.places is None else fact.places.tolist()
         at = ("joints", joints[0]) if joints else None
-        findings.append(
-            subject.found(
-                f"{fact.key}: {fact.sentence}",
-                part="skeleton",
-                joints=joints,
-                at=at,
-                **{**fact.values, **fact.texts},
-            )
+        yield subject.found(
+            f"{fact.key}: {fact.sentence}",
+            part="skeleton",
+            joints=joints,
+            at=at,
+            **{**fact.values, **fact.texts},
         )
     low, high = skeleton.dof_limits.T
     if pose is not None:
@@ -136,29 +118,24 @@ def _limits(subject: Subject, skeleton: Skeleton, pose: Pose | None) -> list[Fin
         if len(outside):
             outside = outside[np.argsort(-beyond[outside], kind="stable")]
             worst = int(outside[0])
-            findings.append(
-                subject.found(
-                    "S004.pose: {n} of the pose {are} limits: {dof}",
-                    n=counted(len(outside), "DOF"),
-                    dof=beyond_text(skeleton, worst, float(pose.dofs[worst])),
-                    part="skeleton",
-                    joints=np.unique(skeleton.dof_joints[outside]),
-                    at=("joints", int(skeleton.dof_joints[worst])),
-                    are=agree(len(outside), "is outside its", "are outside their"),
-                )
+            yield subject.found(
+                "S004.pose: {n} of the pose {are} limits: {dof}",
+                n=counted(len(outside), "DOF"),
+                dof=beyond_text(skeleton, worst, float(pose.dofs[worst])),
+                part="skeleton",
+                joints=np.unique(skeleton.dof_joints[outside]),
+                at=("joints", int(skeleton.dof_joints[worst])),
+                are=agree(len(outside), "is outside its", "are outside their"),
             )
     locked = np.flatnonzero(skeleton.locked)
     if len(locked):
         labels = dof_labels(skeleton)
-        findings.append(
-            subject.found(
-                "S005.dofs: {n} locked: {names}",
-                n=counted(len(locked), "DOF", "is", "are", of=skeleton.n_dofs),
-                all=skeleton.n_dofs,
-                names=listed([labels[dof] for dof in locked]),
-                part="skeleton",
-                joints=np.unique(skeleton.dof_joints[locked]),
-                at=("joints", int(skeleton.dof_joints[locked[0]])),
-            )
+        yield subject.found(
+            "S005.dofs: {n} locked: {names}",
+            n=counted(len(locked), "DOF", "is", "are", of=skeleton.n_dofs),
+            all=skeleton.n_dofs,
+            names=listed([labels[dof] for dof in locked]),
+            part="skeleton",
+            joints=np.unique(skeleton.dof_joints[locked]),
+            at=("joints", int(skeleton.dof_joints[locked[0]])),
         )
-    return findings

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from viewer.errors import RigError
@@ -20,20 +22,20 @@ _SHIFTED = 0.02  # minimum total difference of a vertex's weights
 _UNEQUAL = 0.2
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Compare both sides of a figure with a symmetry map."""
     figure = subject.actor.figure
     if figure.symmetry is None or figure.mesh is None:
-        return []
-    findings = _positions(subject, figure, figure.mesh)
+        return
+    yield from _positions(subject, figure, figure.mesh)
     if figure.skin is None or figure.skeleton is None:
-        return findings
+        return
     try:
         partners = joint_partners(figure)
     except RigError:
-        return findings  # without joint pairs, weights cannot be compared
+        return  # without joint pairs, weights cannot be compared
     known = _known(subject, figure, "weights")
-    return findings + _weights(subject, figure.skin, figure.symmetry, partners, known)
+    yield from _weights(subject, figure.skin, figure.symmetry, partners, known)
 
 
 def _known(subject: Subject, figure: Figure, part: str) -> Bools:
@@ -44,54 +46,50 @@ def _known(subject: Subject, figure: Figure, part: str) -> Bools:
     return known
 
 
-def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> list[Finding]:
+def _positions(subject: Subject, figure: Figure, mesh: Mesh) -> Iterator[Finding]:
     distances = np.where(_known(subject, figure, "positions"), asymmetry(figure), 0.0)
     size = box_size(bounding_box(mesh.positions))
     off = np.flatnonzero(distances > _MOVED * size)
     if len(off) == 0:
-        return []
+        return
     off = off[np.argsort(-distances[off], kind="stable")]
     worst = int(off[0])
-    return [
-        subject.found(
-            "Y001.positions: {n} (worst: {distance} at vertex {vertex})",
-            n=counted(
-                len(off),
-                "vertex",
-                "is not at the mirrored position of its counterpart",
-                "are not at the mirrored positions of their counterparts",
-            ),
-            distance=subject.length(float(distances[worst])),
-            vertex=worst,
-            severity="warning" if distances[worst] > _ASKEW * size else "note",
-            vertices=off,
-            at=("positions", worst),
-        )
-    ]
+    yield subject.found(
+        "Y001.positions: {n} (worst: {distance} at vertex {vertex})",
+        n=counted(
+            len(off),
+            "vertex",
+            "is not at the mirrored position of its counterpart",
+            "are not at the mirrored positions of their counterparts",
+        ),
+        distance=subject.length(float(distances[worst])),
+        vertex=worst,
+        severity="warning" if distances[worst] > _ASKEW * size else "note",
+        vertices=off,
+        at=("positions", worst),
+    )
 
 
 def _weights(
     subject: Subject, skin: Skin, symmetry: Ints, partners: Ints, known: Bools
-) -> list[Finding]:
+) -> Iterator[Finding]:
     differences = np.where(known, weight_differences(skin, symmetry, partners), 0.0)
     off = np.flatnonzero(differences > _SHIFTED)
     if len(off) == 0:
-        return []
+        return
     off = off[np.argsort(-differences[off], kind="stable")]
     worst = int(off[0])
-    return [
-        subject.found(
-            "Y002.weights: weights of {n} differ from those of {their} (worst: total "
-            "difference {difference} at vertex {vertex})",
-            n=counted(len(off), "vertex"),
-            difference=rounded(float(differences[worst])),
-            vertex=worst,
-            severity="warning" if differences[worst] > _UNEQUAL else "note",
-            vertices=off,
-            at=("weights", worst),
-            their=agree(len(off), "its mirror counterpart", "their mirror counterparts"),
-        )
-    ]
+    yield subject.found(
+        "Y002.weights: weights of {n} differ from those of {their} (worst: total "
+        "difference {difference} at vertex {vertex})",
+        n=counted(len(off), "vertex"),
+        difference=rounded(float(differences[worst])),
+        vertex=worst,
+        severity="warning" if differences[worst] > _UNEQUAL else "note",
+        vertices=off,
+        at=("weights", worst),
+        their=agree(len(off), "its mirror counterpart", "their mirror counterparts"),
+    )
 
 
 def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from viewer.diagnostics import Phrase
@@ -30,55 +32,49 @@ _SWING = 0.6  # radians: roughly the largest rotation of most joints in a walk
 _SEED = 5  # fixed, so that results are reproducible
 
 
-def check(subject: Subject) -> list[Finding]:
+def check(subject: Subject) -> Iterator[Finding]:
     """Check the weights of a figure with a skin."""
     figure = subject.actor.figure
     if figure.skin is None or figure.mesh is None:
-        return []
+        return
     # Weights missing from the file cannot be judged.
     known = subject.valid("weights", figure.skin.n_vertices)
-    return [
-        *subject.faults(weight_faults(figure, subject.invalid)),
-        *_idle_joints(subject, figure, figure.skin),
-        *_doubled(subject, figure.skin, known),
-        *_crowded(subject, figure, known),
-    ]
+    yield from subject.faults(weight_faults(figure, subject.invalid))
+    yield from _idle_joints(subject, figure, figure.skin)
+    yield from _doubled(subject, figure.skin, known)
+    yield from _crowded(subject, figure, known)
 
 
-def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
+def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> Iterator[Finding]:
     idle = idle_joints(skin, figure.skeleton)
     if len(idle) == 0 or len(subject.invalid.get("weights", ())):
-        return []  # the missing weights may refer to these joints
+        return  # the missing weights may refer to these joints
     labels = [_label(subject, int(joint)) for joint in idle]
     at = ("bindings", int(idle[0]))
-    return [
-        subject.found(
-            "W006.joints: {n} no influence: {names}",
-            n=counted(len(idle), "joint", "has", "have"),
-            names=listed(labels),
-            joints=idle,
-            at=at,
-        )
-    ]
+    yield subject.found(
+        "W006.joints: {n} no influence: {names}",
+        n=counted(len(idle), "joint", "has", "have"),
+        names=listed(labels),
+        joints=idle,
+        at=at,
+    )
 
 
-def _doubled(subject: Subject, skin: Skin, known: Bools) -> list[Finding]:
+def _doubled(subject: Subject, skin: Skin, known: Bools) -> Iterator[Finding]:
     plain = merged(skin)
     fewer = np.flatnonzero((influence_counts(plain) != influence_counts(skin)) & known)
     if len(fewer) == 0:
-        return []
-    return [
-        subject.found(
-            "W009.joints: {n} a joint more than once (first: vertex {vertex})",
-            n=counted(len(fewer), "vertex", "lists", "list"),
-            vertex=int(fewer[0]),
-            vertices=fewer,
-            at=("weights", int(fewer[0])),
-        )
-    ]
+        return
+    yield subject.found(
+        "W009.joints: {n} a joint more than once (first: vertex {vertex})",
+        n=counted(len(fewer), "vertex", "lists", "list"),
+        vertex=int(fewer[0]),
+        vertices=fewer,
+        at=("weights", int(fewer[0])),
+    )
 
 
-def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
+def _crowded(subject: Subject, figure: Figure, known: Bools) -> Iterator[Finding]:
     """Report more influences than engines support, with the error that pruning would cause."""
     skin = figure.skin
     assert skin is not None  # checked by the caller
@@ -86,7 +82,6 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
     used = np.bincount(owners(plain), plain.weights != 0.0, minlength=plain.n_vertices)
     used[~known] = 0.0
     can_pose = figure.is_attached and not len(subject.invalid.get("joints", ()))
-    findings = []
     for message, limit in (
         ("W007.influences: {n} more than 4 influences (maximum: {most}){cost}", 4),
         ("W008.influences: {n} more than 8 influences (maximum: {most}){cost}", 8),
@@ -97,17 +92,14 @@ def _crowded(subject: Subject, figure: Figure, known: Bools) -> list[Finding]:
         cost: Phrase | str = ""
         if can_pose:
             cost, crowded = _cost(subject, skin, limit, crowded)
-        findings.append(
-            subject.found(
-                message,
-                n=counted(len(crowded), "vertex", "has", "have"),
-                most=int(used.max()),
-                cost=optional("; {}", cost),
-                vertices=crowded,
-                at=("weights", int(crowded[0])),
-            )
+        yield subject.found(
+            message,
+            n=counted(len(crowded), "vertex", "has", "have"),
+            most=int(used.max()),
+            cost=optional("; {}", cost),
+            vertices=crowded,
+            at=("weights", int(crowded[0])),
         )
-    return findings
 
 
 def _cost(
