@@ -21,6 +21,7 @@ from x11_clipboard import offer_clipboard, read_clipboard
 
 import viewer
 from viewer.app.view.picks import vertex_at
+from viewer.app.window import Rest
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.inspection.front import guess_front
@@ -414,3 +415,24 @@ def test_old_opengl_opens_no_window(display, tmp_path, name, value, words):
     assert done.returncode == 4 and done.stdout == b"" and done.stderr.count(b"\n") == 1
     for word in (*words, b"renderer ", f"{name}={value}".encode()):
         assert word in done.stderr
+
+
+def test_awaited_event_is_followed_by_frames_showing_it():
+    for at in range(1, 9):  # the frame that shows it, even the last before the window sleeps
+        rest = Rest()
+        for frame in range(at):
+            rest.count(happened=frame % 4 == 0, awaits=True)
+        drawn = 0
+        for _ in range(12):
+            rest.count(happened=False, awaits=False)
+            drawn += rest.left >= 0
+        # ImGui measures a window in its first frame, and shows it with its size in the second.
+        assert drawn >= 2 and rest.left < 0
+
+
+def test_waiting_times_out_when_nothing_happens():
+    rest, drawn = Rest(), 0
+    for _ in range(20):
+        rest.count(happened=False, awaits=False)
+        drawn += rest.left >= 0
+    assert 0 < drawn < 5

@@ -1,13 +1,18 @@
 """Runs of batches, in which no item is lost or run twice after any kind of end."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
+import numpy as np
 import pytest
+from app.tiny import SKEL
 from batching.batch_jobs import (
     add_numbers,
     crash_after_writing,
@@ -19,12 +24,14 @@ from batching.batch_jobs import (
 
 import viewer
 from viewer import interrupts
-from viewer.batching.engines import Limits
+from viewer.batching.engines import ENGINES, IN_FLIGHT, Limits, load_engine
 from viewer.batching.execution import FunctionJob, attempt
 from viewer.batching.items import Item, Result
-from viewer.batching.report import read_results
-from viewer.batching.running import Settings, run_batch, shard_of
-from viewer.errors import ViewerError
+from viewer.batching.report import Report, ReportFile, read_results
+from viewer.batching.running import Settings, item_key, run_batch, shard_of
+from viewer.errors import OutputError, ViewerError
+from viewer.formats import Source, read
+from viewer.formats._figure_cache import keeping_figures
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -247,3 +254,260 @@ def test_attempts_turn_every_failure_into_a_result():
     assert fail(ViewerError("no")).message == "no" and fail(SystemExit(3)).status == "failed"
     assert attempt(item, lambda _: 1).status == "done" and attempt(item, lambda _: 2).exit_code == 2
     assert attempt(item, lambda _: {"n": 1}).values == {"n": 1}
+
+
+ITEM = Item(3, ("d/a\udcff.npz",), "out/a.bvh", "a.npz")
+RESULT = Result(
+    ITEM, "failed", 2, 0.25, 3, "why", [{"code": "F001"}], ("out/a.bvh",), "text\n", {"n": 1}, "key"
+)
+
+
+def test_results_are_read_back_from_the_report(tmp_path):
+    with ReportFile(tmp_path / "new" / "report.jsonl") as file:
+        file.add(RESULT)
+    line = json.loads((tmp_path / "new" / "report.jsonl").read_text())
+    assert (
+        line["name"] == "a.npz" and line["status"] == "failed" and line["outputs"] == ["out/a.bvh"]
+    )
+    assert read_results(tmp_path / "new" / "report.jsonl") == [RESULT]
+
+
+def test_last_result_of_an_item_is_used(tmp_path):
+    path = tmp_path / "report.jsonl"
+    for status in ("crashed", "done"):
+        with ReportFile(path) as file:
+            file.add(Result(ITEM, status))
+    assert [one.status for one in read_results(path)] == ["done"]
+
+
+@pytest.mark.parametrize("kept", [1, 30, -2])
+def test_incomplete_line_of_a_killed_process_is_terminated_and_skipped(tmp_path, kept):
+    path = tmp_path / "report.jsonl"
+    other = Item(4, ("b",), "", "b")
+    with ReportFile(path) as file:
+        file.add(RESULT)
+        end = path.stat().st_size
+        file.add(Result(other, "done"))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: end + kept] if kept > 0 else whole[:kept])
+    assert [one.item for one in read_results(path)] == [ITEM]
+    with ReportFile(path) as file:
+        file.add(Result(other, "done"))
+    assert [one.item for one in read_results(path)] == [ITEM, other]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("outputs", None), ("outputs", [1]), ("output", [1]), ("name", {}), ("time", "x")),
+        *(("key", [1]), ("files", 5), ("values", []), ("status", None)),
+    ],
+)
+def test_lines_with_values_of_other_types_are_skipped(tmp_path, name, value):
+    path = tmp_path / "report.jsonl"
+    with ReportFile(path) as file:
+        file.add(RESULT)
+    line = json.loads(path.read_text()) | {name: value}
+    path.write_text(f"{path.read_text()}{json.dumps(line)}\n")
+    assert read_results(path) == [RESULT]
+
+
+def test_several_writers_append_whole_lines(tmp_path):
+    path = tmp_path / "report.jsonl"
+    with ReportFile(path) as first, ReportFile(path) as second:
+        for index in range(20):
+            for file in (first, second):
+                name = f"{index}{'x' * 5000}{file is first}"
+                file.add(Result(Item(index, (), "", name), "done"))
+    assert len(read_results(path)) == 40 == path.read_bytes().count(b"\n")
+
+
+def test_numbers_that_json_cannot_store_are_written_as_text(tmp_path):
+    with ReportFile(tmp_path / "r.jsonl") as file:
+        file.add(Result(ITEM, "done", values={"worst": [1.5, float("nan")]}))
+
+    def refuse(name):
+        raise AssertionError(name)
+
+    line = json.loads((tmp_path / "r.jsonl").read_text(), parse_constant=refuse)
+    assert line["values"] == {"worst": [1.5, "nan"]}
+
+
+def test_other_files_are_refused_as_reports(tmp_path):
+    (tmp_path / "a.txt").write_text("1\n2\n")
+    with pytest.raises(ViewerError, match="expected the report"):
+        read_results(tmp_path / "a.txt")
+    with pytest.raises(OutputError, match=r"a\.txt"):
+        ReportFile(tmp_path / "a.txt" / "report.jsonl")
+
+
+def test_report_counts_and_sorts_failures():
+    results = [
+        Result(Item(i, (), "", ""), s) for i, s in ((2, "failed"), (0, "crashed"), (1, "done"))
+    ]
+    report = Report(results, n_items=3)
+    assert [one.item.index for one in report.failures] == [0, 2]
+    assert report.counts == {"failed": 1, "crashed": 1, "done": 1}
+    assert not report.is_complete
+    assert Report(results[2:], n_items=1).is_complete and not Report(n_items=1).is_complete
+
+
+def test_key_depends_only_on_content_options_and_output(tmp_path):
+    one, two, shared = tmp_path / "one", tmp_path / "two", tmp_path / "shared"
+    for path in (one, two, shared):
+        path.write_text("content")
+    item = Item(0, (str(one),), "out", "one")
+    key = item_key(item, "options", [str(shared)])
+    assert item_key(Item(7, (str(two),), "out", "two"), "options", [str(shared)]) == key
+    others = [
+        item_key(Item(0, (str(one),), "other", "one"), "options", [str(shared)]),
+        item_key(item, "other", [str(shared)]),
+        item_key(item, "options"),
+    ]
+    two.write_text("contents")
+    others.append(item_key(Item(0, (str(two),), "out", "one"), "options", [str(shared)]))
+    shared.write_text("changed")
+    others.append(item_key(item, "options", [str(shared)]))
+    assert len({key, *others}) == 6
+
+
+def test_key_of_folders_and_archives_depends_on_files_and_names(tmp_path):
+    (tmp_path / "take" / "smpl").mkdir(parents=True)
+    frame = tmp_path / "take" / "smpl" / "0.json"
+    frame.write_text("[]")
+    item = Item(0, (str(tmp_path / "take"),), "", "take")
+    keys = [item_key(item, "")]
+    frame.write_text("[1]")
+    keys.append(item_key(item, ""))
+    frame.rename(frame.with_name("1.json"))
+    keys.append(item_key(item, ""))
+    (tmp_path / "a.zip").write_bytes(b"PK")
+    for member in ("x/a.skel", "y/a.skel"):
+        keys.append(item_key(Item(0, (str(tmp_path / "a.zip" / member),), "", ""), ""))
+    assert len(set(keys)) == 5
+    with pytest.raises(OSError):
+        item_key(Item(0, (str(tmp_path / "missing"),), "", ""), "")
+
+
+def test_key_of_a_shared_folder_follows_its_files(tmp_path):
+    (tmp_path / "one").write_text("1")
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "a.txt").write_text("old")
+    keys = []
+    for text in ("old", "newer"):  # writing a file does not change the time of its folder
+        (tmp_path / "model" / "a.txt").write_text(text)
+        item = Item(0, (str(tmp_path / "one"),), "", "one")
+        keys.append(item_key(item, "", [str(tmp_path / "model")]))
+    assert keys[0] != keys[1]
+
+
+def test_key_reads_no_devices(tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "endless").symlink_to("/dev/zero")
+    (tmp_path / "in" / "lost").symlink_to("nowhere")
+    assert item_key(Item(0, (str(tmp_path / "in"),), "", ""), "")
+    with pytest.raises(OSError, match="not a file"):
+        item_key(Item(0, (str(tmp_path / "in" / "endless"),), "", ""), "")
+
+
+def test_arrays_and_other_keys_returned_by_functions_are_written(tmp_path):
+    values = {"size": np.float32(2.5), "ids": np.arange(3)}
+    with ReportFile(tmp_path / "r.jsonl") as file:
+        file.add(Result(ITEM, "done", values=values))
+        file.add(Result(replace(ITEM, name="b"), "done", values={"n": {(1, 2): np.arange(2)}}))
+    found = [one.values for one in read_results(tmp_path / "r.jsonl")]
+    assert found == [{"size": 2.5, "ids": [0, 1, 2]}, {"n": {"(1, 2)": [0, 1]}}]
+
+
+JOB = FunctionJob(misbehave)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_engines_can_be_loaded(name):
+    assert callable(load_engine(name).run)
+
+
+def test_sequential_engine_runs_items_in_order_in_this_process():
+    items = items_called("a", "raise.txt", "b")
+    found = list(load_engine("sequential").run(items, JOB, Limits()))
+    assert [one.item for one in found] == items
+    assert [one.status for one in found] == ["done", "failed", "done"]
+    assert found[1].message == "KeyError: 'left knee'" and "misbehave" in found[1].text
+    assert found[0].values == found[2].values == {"process": os.getpid()}
+
+
+def test_functions_that_workers_cannot_import_are_refused():
+    job = FunctionJob(lambda item: None)
+    with pytest.raises(ViewerError, match="top level of a module, or workers=0"):
+        list(load_engine("processes").run(items_called("a"), job, Limits()))
+
+
+@pytest.mark.slow
+def test_workers_receive_few_items_and_stop_on_request():
+    taken = count()
+    finished = []
+
+    def endless():
+        for index in taken:
+            yield Item(index, (), "", str(index))
+
+    limits = Limits(workers=1, is_stopping=lambda: len(finished) >= 5)
+    for result in load_engine("processes").run(endless(), JOB, limits):
+        finished.append(result)
+    assert all(one.status == "done" for one in finished)
+    assert 5 <= len(finished) <= next(taken) <= 5 + IN_FLIGHT
+
+
+@pytest.fixture
+def skel(tmp_path) -> Path:
+    """Return a skeleton with a missing last brace, which is reported as a warning."""
+    path = tmp_path / "tiny.skel"
+    path.write_text(SKEL.rstrip().removesuffix("}"))
+    return path
+
+
+def opened(path: Path):
+    source = Source.open(path)
+    return read(source), [found.key for found in source.diagnostics]
+
+
+def test_figure_is_read_once_and_its_warnings_are_repeated(skel):
+    with keeping_figures([skel]):
+        first, warnings = opened(skel)
+    assert warnings
+    with keeping_figures([skel.parent / "." / skel.name]):
+        again, repeated = opened(skel)
+    assert again is first and repeated == warnings
+
+
+def test_changed_file_is_read_again(skel):
+    with keeping_figures([skel]):
+        first, _ = opened(skel)
+        skel.write_text(SKEL.replace("arm", "leg"))
+        second, warnings = opened(skel)
+        assert second.skeleton.names[-1] == "leg" and not warnings
+        # Neither size nor name reveals the change.
+        skel.write_text(SKEL)
+        os.utime(skel, ns=(1, 1))
+        assert opened(skel)[0].skeleton.names == first.skeleton.names
+
+
+def test_files_are_cached_until_others_are_requested(skel, tmp_path):
+    first, _ = opened(skel)
+    assert opened(skel)[0] is not first
+    with keeping_figures([tmp_path / "other"]):
+        assert opened(skel)[0] is not opened(skel)[0]
+    with keeping_figures([skel]):
+        first, _ = opened(skel)
+    with keeping_figures([]):
+        pass
+    with keeping_figures([skel]):
+        assert opened(skel)[0] is not first
+
+
+def test_figures_are_read_again_with_different_options(skel):
+    with keeping_figures([skel]):
+        first, _ = opened(skel)
+        source = Source.open(skel)
+        source.options = {"rig": "mixamo"}
+        assert read(source) is not first

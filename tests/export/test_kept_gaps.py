@@ -1,6 +1,7 @@
 """Missing frames in formats that can omit them, which stay missing unless requested otherwise."""
 
 import json
+from pathlib import Path
 
 import faults
 import numpy as np
@@ -9,9 +10,12 @@ from export.plain_readers import read_obj
 from exporting import export_frames
 from family_animations import family_animation, family_motion
 from family_models import family_figure
+from formats.gltf.files import File, skinned
 from numpy.testing import assert_allclose, assert_array_equal
 from seamed import POSITIONS, seamed_actor
 
+import viewer
+from viewer.cli import run
 from viewer.errors import RigError
 from viewer.export import ExportOptions
 from viewer.export._gaps import filled
@@ -147,3 +151,38 @@ def test_scales_of_joints_are_interpolated_in_gaps(fills, x):
     )
     found = filled(sample_animation(Actor(figure, clip=clip)).frames, fills)
     assert_allclose(found.scales[:, 0, 0], x, atol=1e-12)
+
+
+IRREGULAR = "the keys are at irregular times, so the motion is sampled at 30 frames per second"
+
+
+def keyed(times: np.ndarray) -> File:
+    """Return a skinned triangle whose second joint turns to a new angle at each key."""
+    file, angles = skinned(), 0.5 * np.sin(0.7 * np.arange(len(times)))
+    zero = 0.0 * angles
+    keys = file.accessor(np.stack([zero, zero, np.sin(angles), np.cos(angles)], axis=1))
+    samplers = [{"input": file.times(times.tolist()), "output": keys}]
+    channels = [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}]
+    file.root["animations"] = [{"channels": channels, "samplers": samplers}]
+    return file
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".glb"])
+def test_frames_are_the_keys(tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture) -> None:
+    source, path = tmp_path / "keys.glb", tmp_path / f"frames{suffix}"
+    source.write_bytes(keyed(np.arange(13) / 120.0).glb())
+    assert run(["convert", str(source), "-o", str(path), "--frames", "0:"]) == 0
+    assert "13 frames (0 to 12) at 120 fps" in capsys.readouterr().out
+    (actor,) = viewer.load(path).actors
+    assert actor.clip.frame_rate == pytest.approx(120.0, rel=1e-6)
+    assert actor.clip.end - actor.clip.start == pytest.approx(0.1, abs=1e-6)
+
+
+@pytest.mark.parametrize(("options", "said"), [((), True), (("--fps", "50"), False)])
+def test_rate_of_irregular_keys_is_reported(
+    tmp_path: Path, options: tuple[str, ...], said: bool, capsys: pytest.CaptureFixture
+) -> None:
+    source, path = tmp_path / "keys.glb", tmp_path / "frames.npz"
+    source.write_bytes(keyed(np.array([0.0, 0.1, 0.1234, 0.2])).glb())
+    assert run(["convert", str(source), "-o", str(path), *options]) == 0
+    assert (IRREGULAR in capsys.readouterr().out) is said

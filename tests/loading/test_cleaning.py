@@ -1,22 +1,40 @@
 """Clean-up of a scene: order of changes, notes, merging of people, and refusals."""
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from exporting import export_frames
+from faults import told
+from formats.capture_files import body, points, write_frames
+from formats.easymocap.test_camera_files import cameras
 from lint.sound import keypoints, legs, standing
 from numpy.testing import assert_allclose, assert_array_equal
+from rig.animated import leg
+from rig.retargeting.rest_twins import t_pose, written
+from rig.retargeting.walking import RATE, walk
 
+from viewer.cli import run
 from viewer.errors import RigError
+from viewer.export import ExportOptions
+from viewer.export.rig import scaled
+from viewer.formats.rigged import save
+from viewer.loading import Contents, MotionSettings, begin, bundled_body, load
 from viewer.loading.cleaning import clean_up
+from viewer.loading.placing import placed_views, stand_up
+from viewer.loading.scene_draft import SceneDraft
 from viewer.loading.settings import CleanUp
+from viewer.rig.captures.cameras import CameraView
 from viewer.rig.cleanup.smoothing import SavitzkyGolay
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Scene, scene_unit
 
 FIGURE = legs()
 
@@ -225,3 +243,106 @@ def test_keypoints_of_merged_people_get_the_first_number():
     assert note.key == "X006.renumbered"
     assert str(note) == "keypoints of person 7 assigned to person 3"
     assert [actor.person for actor in scene.actors] == [3, 3]
+
+
+@pytest.fixture(scope="module")
+def walking(tmp_path_factory):
+    path = tmp_path_factory.mktemp("walk") / "walk.bvh"
+    motion = written(t_pose(), *walk(), rate=RATE)
+    actor = Actor(motion.figure, clip=motion.clip)
+    export_frames(sample_animation(actor), path, "bvh", ExportOptions())
+    return path
+
+
+def feet_notes(scene):
+    return [key for key, _ in told(scene.diagnostics) if ".feet-" in key]
+
+
+def test_feet_are_planted_by_default(walking):
+    (planted,) = load(walking, bundled_body()).actors
+    plain = load(walking, bundled_body(), motion=MotionSettings(feet=False))
+    assert feet_notes(plain) == []
+    legs = [planted.figure.skeleton.names.index(f"left_{part}") for part in ("knee", "hip")]
+    rotations = plain.actors[0].clip.rotations
+    assert np.abs(planted.clip.rotations - rotations)[:, legs].max() > 1e-3
+    named = load(walking, motion=MotionSettings(model=bundled_body()))
+    assert feet_notes(named)[:2] == ["F007.feet-planted", "F007.feet-gap"]
+    np.testing.assert_array_equal(named.actors[0].clip.rotations, planted.clip.rotations)
+
+
+@pytest.mark.slow
+def test_option_and_note_are_the_same_in_every_command(walking, capsys):
+    out = str(walking.with_name("out.bvh"))
+    for words, is_said in ((), True), (("--feet", "on"), True), (("--feet", "off"), False):
+        assert run(["convert", str(walking), "--body", "-o", out, "--force", *words]) == 0
+        assert ("feet of body planted during 6 contacts" in capsys.readouterr().err) is is_said
+    assert run(["render", str(walking), "--feet", "no", "-o", "x.png"]) == 2
+    assert "--feet" in capsys.readouterr().err
+
+
+def opened(*units):
+    figures = [(Path(f"{unit}.glb"), replace(leg(name=unit), unit=unit)) for unit in units]
+    return begin(Contents(figures=figures))[0]
+
+
+@pytest.mark.parametrize(
+    ("units", "factors", "unit"),
+    [
+        (("m", "cm"), (1.0, 0.01), "m"),
+        (("cm", "m", "in"), (1.0, 100.0, 2.54), "cm"),
+        (("", "mm", "m"), (1.0, 1.0, 1000.0), "mm"),  # unknown units are not scaled
+        (("cm", "cm"), (1.0, 1.0), "cm"),
+    ],
+)
+def test_figures_are_scaled_to_the_unit_of_the_first(units, factors, unit):
+    scene = opened(*units)
+    linear = [actor.placement[:3, :3] for actor in scene.actors]
+    assert_allclose(linear, [factor * np.eye(3) for factor in factors], atol=1e-12)
+    assert scene_unit(scene) == unit
+    notes = [found for found in scene.diagnostics if found.key == "F007.unit-matched"]
+    assert [note.values["factor"] for note in notes] == pytest.approx(
+        [factor for factor in factors if factor != 1.0]
+    )
+    assert all(note.severity == "note" for note in notes)
+
+
+def test_scaled_figures_stand_side_by_side():
+    scene = opened("m", "cm")
+    sides = [actor.placement[0, 3] for actor in scene.actors]
+    # The second is 0.01 times as wide as the first.
+    assert 0.0 < sides[1] - sides[0] < 3.0
+
+
+def test_later_people_and_cameras_of_a_capture_are_scaled(tmp_path):
+    known = load(bundled_body()).actors[0].figure
+    skeleton = scaled(known, 100.0).skeleton
+    names = ("Hips", *skeleton.names[1:])  # another name, so that the capture drives the figure
+    save(
+        replace(scaled(known, 100.0), unit="cm", skeleton=replace(skeleton, names=names)),
+        tmp_path / "large.npz",
+    )
+    folder = tmp_path / "capture"
+    first, both = (0,), (0, 1)
+    for name, record in {"smpl": body, "keypoints3d": points}.items():
+        frames = {
+            n: [record(person) for person in people] for n, people in enumerate([first, both])
+        }
+        write_frames(folder / name, frames)
+    cameras(folder)
+    scene = load(tmp_path / "large.npz", folder)
+    assert scene_unit(scene) == "cm"
+    scales = [np.linalg.norm(a.placement[:3, 0]) for a in scene.actors if a.figure.points]
+    assert scales == pytest.approx([100.0, 100.0])
+    assert_allclose(scene.views[0].translation, [50.0, -100.0, 300.0])
+    notes = [found for found in scene.diagnostics if found.key == "F007.unit-matched"]
+    assert len(notes) == 1  # of the first person only
+
+
+def test_later_people_and_cameras_are_upright():
+    late, draft = SimpleNamespace(placement=np.eye(4), up="y", views=(), unit=""), SceneDraft([])
+    late.views = (CameraView("1", np.eye(3), np.eye(3), np.array([0.0, 1.0, 0.0])),)
+    draft.builders = [late]
+    stand_up(draft, "z")
+    assert_allclose(late.placement[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], atol=1e-12)
+    view = placed_views(draft)[0]
+    assert_allclose(-view.rotation.T @ view.translation, [0.0, 0.0, -1.0], atol=1e-12)

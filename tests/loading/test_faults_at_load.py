@@ -6,10 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats import pig_text, skel_text, skin_text, synthetic_smpl
+from formats.bvh_text import person
+from formats.capture_files import body, write_frames
+from formats.video_mocap.tool_files import wham_file
 
 import viewer
 from viewer.cli import run
 from viewer.lint import SEVERITIES, lint_files
+from viewer.loading import MotionSettings, bundled_body, load
 
 GOOD, SMPL = skin_text.GOOD, synthetic_smpl.model("smpl")
 PIG = pig_text.GOOD["skinning_weights.txt"]
@@ -151,3 +155,41 @@ def test_figures_that_load_accepts_have_no_error_in_lint(tmp_path: Path) -> None
     found = [one for one in lint_files(files)[1] if one.severity != "note"]
     assert [(one.code, one.severity) for one in found] == [("W002", "warning")]
     assert found[0].severity in SEVERITIES
+
+
+FILE = Path("some.file")
+
+
+def unused(*paths, **settings):
+    found = load(*paths, motion=MotionSettings(**settings)).diagnostics
+    return [note.key for note in found if ".unused-" in note.key]
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        ({"space": "camera"}, "space"),
+        ({"average_shape": True}, "average-shape"),
+        ({"video": FILE}, "video"),
+        ({"images": FILE}, "images"),
+        ({"rig": "mixamo"}, "rig"),
+    ],
+)
+def test_options_of_captures_are_reported_for_other_files(tmp_path, settings, name):
+    path = tmp_path / "walk.bvh"
+    path.write_text(person(100.0))
+    assert unused(path, **settings) == [f"F007.unused-{name}"]
+    # A model does not suppress the message, because it is read but has no choice of rigs.
+    assert unused(path, model=bundled_body(), **settings) == [f"F007.unused-{name}"]
+
+
+def test_model_without_a_motion_is_reported():
+    assert unused(bundled_body(), model=bundled_body()) == ["F007.unused-model"]
+
+
+def test_space_and_shape_options_apply_only_to_video_motion_capture(tmp_path):
+    path = wham_file(tmp_path)
+    assert unused(path, space="camera", average_shape=True) == []
+    write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
+    found = unused(tmp_path / "take", space="camera", average_shape=True)
+    assert found == ["F007.unused-space", "F007.unused-average-shape"]

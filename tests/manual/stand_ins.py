@@ -15,8 +15,8 @@ from formats.mhr import mhr_files
 from formats.pig_text import GOOD, arrays
 from formats.synthetic_smpl import model
 from formats.torch.torch_bytes import object_npy
-from formats.video_mocap.test_romp import image
 from formats.video_mocap.test_sam3d_body import npz as sam3d_file
+from formats.video_mocap.test_video_tools import image
 from formats.video_mocap.tool_files import (
     gvhmr_file,
     phalp,

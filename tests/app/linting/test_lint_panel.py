@@ -1,6 +1,8 @@
 """The Lint panel: checks, the list of findings, jumps to findings, marks, and stale findings."""
 
 import json
+import os
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,14 +10,21 @@ import pytest
 from app.linting.checked_scenes import LIGHT, PINK, SIZE, codes, finish, jump, marked, row_of
 from imgui_bundle import imgui
 from lint.planted import weighted
-from lint.sound import RATE, column, keypoints, scene_of
+from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
+from lint.test_rechecks import TEXTS
+from rig.animated import animated_leg, bow, channel, clip_of
 
 from viewer.app.layout import ShownPanels
-from viewer.app.linting.lint_panel import Linting
+from viewer.app.linting.lint_panel import Linting, check_rig, start_check
 from viewer.app.linting.marks import marks_of
+from viewer.cli import run
 from viewer.lint import Places, describe, lint_scene
+from viewer.loading import bundled_files
+from viewer.progress import report
 from viewer.rendering.camera import camera_axes
 from viewer.rig.figure import Figure
+from viewer.rig.motion.animation_choice import play_animation
+from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
 
@@ -276,3 +285,310 @@ def test_non_finite_positions_are_not_marked():
     marks, note = marks_of(Places(vertices=vertices))
     assert marks.points.tolist() == [[0.0, 0.0, 0.0]]
     assert note == "the worst 1 of 3 vertices are marked"
+
+
+@pytest.fixture
+def files(tmp_path):
+    for name, text in TEXTS.items():
+        (tmp_path / name).write_text(text)
+    return [tmp_path / name for name in TEXTS]
+
+
+@pytest.fixture
+def lint(drive):
+    """Open an app that shows files or a scene with the Lint panel open and the check finished."""
+
+    def open_panel(*paths, **settings):
+        hand = drive(*paths, size=SIZE, samples=1, **settings)
+        hand.menu("menu Edit", "Check the rig")
+        finish(hand)
+        return hand
+
+    return open_panel
+
+
+def test_panel_copies_the_text_that_the_command_prints(lint, files, monkeypatch, capsys):
+    hand = lint(*files)
+    copied = []
+    monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
+    hand.click("Copy text")
+    run(["lint", *map(str, files)])
+    assert copied[-1] + "\n" == capsys.readouterr().out
+    assert " S003: " in copied[-1] and copied[-1].endswith(" in 3 files")
+
+
+def test_files_of_the_bundled_figure_are_checked(lint, monkeypatch, capsys):
+    hand = lint()
+    copied = []
+    monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
+    hand.click("Copy text")
+    run(["lint", *map(str, bundled_files())])
+    assert copied[-1] + "\n" == capsys.readouterr().out
+
+
+def test_rows_show_file_and_line_and_can_be_filtered_by_them(lint, files, texts):
+    hand = lint(*files)
+    texts.clear()
+    hand.step()
+    assert "limit with minimum above maximum (a.skel:5)" in texts
+    hand.click("Filter findings")
+    hand.type("a.anim")
+    listed = [name for name in hand.state.item_rects if name.startswith("finding ")]
+    assert row_of(hand, "C001") in listed and row_of(hand, "W001") not in listed
+
+
+def test_click_on_a_reader_finding_jumps_to_its_vertex(lint, files):
+    hand = lint(*files)
+    hand.click(row_of(hand, "M007"))
+    assert hand.state.of(Linting).marks.points.shape == (1, 3)
+    assert hand.state.camera.target == pytest.approx(hand.state.of(Linting).marks.points[0])
+
+
+def test_missing_or_changed_files_are_reported(lint, files, texts):
+    hand = lint(*files)
+    files[1].unlink()
+    os.utime(files[0], (time.time() + 100.0,) * 2)
+    texts.clear()
+    hand.click("Recheck")
+    finish(hand)
+    assert "a.skin is missing: only the open scene was checked" in texts
+    assert "a.skel was changed after opening: readers' messages are about the new contents" in texts
+
+
+def test_finding_about_a_file_states_this_and_copies_its_location(lint, files, texts, monkeypatch):
+    hand = lint(*files)
+    copied = []
+    monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
+    # The second vertex is on the third line; the scene was loaded before the change.
+    files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 nan 0", 1))
+    hand.click("Recheck")
+    finish(hand)
+    row = row_of(hand, "F003")
+    assert hand.state.of(Linting).checked.findings[int(row.split()[1])].actor is None
+    texts.clear()
+    hand.move(row)
+    hand.step(60)
+    words = "this finding is about the file, not the figure shown: click to copy its path and line"
+    assert words in texts and f"{files[1]}:3" in texts
+    target = hand.state.camera.target.copy()
+    hand.click(row)
+    assert copied == [f"{files[1]}:3"] and hand.says(f"Copied {files[1]}:3")
+    assert hand.state.of(Linting).chosen == -1 and (hand.state.camera.target == target).all()
+
+
+def test_rows_describe_what_a_click_does(lint, files, texts):
+    hand = lint(*files)
+    row = row_of(hand, "M007")
+    hand.move(row)
+    hand.step(60)
+    assert "click to show it in the view; click again or press Esc to stop" in texts
+    actor = hand.state.actor
+    hand.state.scene.actors[0] = replace(actor, figure=replace(actor.figure))
+    texts.clear()
+    hand.step(2)
+    assert "click to select the actor: its figure has changed since the check" in texts
+
+
+def gappy() -> Scene:
+    """Return a column that is at x = 7 in frame 109 and missing in frames 110 to 112."""
+    figure = column()
+    rows = np.arange(FRAMES)
+    rows[10:13] = -1
+    places = np.zeros((FRAMES, figure.skeleton.n_joints, 3))
+    places[:13, 0, 0] = 7.0
+    clip = replace(
+        standing(figure), translations=places, timing=Timing(RATE, rows, first_frame=100)
+    )
+    return scene_of(figure, clip)
+
+
+def test_click_on_a_gap_jumps_to_the_frame_before_it(lint):
+    hand = lint(scene=gappy())
+    hand.click(row_of(hand, "C005"))
+    playback, view = hand.state.clock, hand.state.of(Linting)
+    assert playback.frame + playback.first_frame == 109
+    assert view.finding.message == "3 of 60 frames are missing in 1 gap: frames 110 to 112"
+    assert hand.state.actor.is_present
+    # The root of the figure is marked, and the whole figure is visible.
+    assert view.marks.points.tolist() == [[7.0, 0.0, 0.0]]
+    assert hand.state.camera.target == pytest.approx([7.0, 2.0, 0.0])
+    assert hand.says("Last frame before the gap: the person is absent in the next frame")
+
+
+def test_gap_in_captured_points_marks_their_centre(lint):
+    figure, clip = keypoints()
+    rows = np.arange(FRAMES)
+    rows[30] = -1
+    hand = lint(scene=scene_of(figure, replace(clip, timing=Timing(RATE, rows))))
+    hand.click(row_of(hand, "C005"))
+    assert hand.state.clock.frame == 29
+    # The points are at heights 1, 0.5 and 0.
+    np.testing.assert_allclose(hand.state.of(Linting).marks.points, [[0.0, 0.5, 0.0]])
+
+
+def test_ground_height_is_a_limit(lint):
+    hand = lint(scene=scene_of(column()))
+    hand.click("Limits…")
+    hand.step(2)
+    assert "Ground height" not in hand.state.item_rects
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, ground=0.0)
+    hand.step(2)
+    hand.enter_value("Ground height", "1.25")
+    assert hand.state.of(Linting).options.ground == pytest.approx(1.25)
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, ground="none")
+    hand.step(2)
+    assert hand.state.of(Linting).options.ground == "none"
+    assert "Ground height" not in hand.state.item_rects
+
+
+def test_keyed_frames_are_numbered_as_in_the_timeline(lint, files):
+    hand = lint(*files)
+    assert hand.state.of(Linting).checked.options.frame_rate == 30.0
+    hand.state.clock.count_by(24.0)
+    hand.step(2)
+    hand.click("Recheck")
+    finish(hand)
+    assert hand.state.of(Linting).checked.options.frame_rate == 24.0
+
+
+def stale(hand, texts):
+    texts.clear()
+    hand.step(2)
+    return any(text.startswith("The figure, pose or limits have changed") for text in texts)
+
+
+def test_findings_are_stale_while_the_pose_differs(lint, texts):
+    hand = lint(LIGHT)
+    assert not stale(hand, texts)
+    hand.state.actor.pose.dofs[4] = 0.3
+    hand.step()
+    assert stale(hand, texts)
+    hand.key("z", "ctrl")
+    assert not stale(hand, texts)
+
+
+def test_posing_makes_findings_stale_and_playback_does_not(lint, texts):
+    hand = lint(jump())
+    hand.state.clock.playing = True
+    hand.step(20)
+    hand.state.clock.playing = False
+    assert not stale(hand, texts)
+    hand.click(row_of(hand, "C003"))
+    assert not stale(hand, texts)
+    hand.state.actor.pose.dofs[4] = 0.3
+    assert stale(hand, texts)
+    hand.click("Recheck")
+    finish(hand)
+    assert not stale(hand, texts)
+
+
+def test_a_finding_in_another_animation_plays_it(lint, texts):
+    leap = clip_of(channel(0, "translation", [0.0, 1.0], [[0.0] * 3, [1000.0, 0, 0]]), name="leap")
+    scene = scene_of(animated_leg(bow(), leap))
+    play_animation(scene.actors[0], 0)
+    hand = lint(scene)
+    hand.click(row_of(hand, "C003"))
+    assert hand.state.actor.clip is leap and not hand.state.clock.playing
+    assert not stale(hand, texts)
+    assert any(text.startswith("leap: ") for text in texts)
+
+
+def test_recheck_uses_the_current_pose_and_limits(lint, texts):
+    hand = lint(column())
+    assert codes(hand) == []
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_rotation=1.0)
+    assert stale(hand, texts)
+    hand.state.actor.pose.dofs[4] = 3.5  # the limits of the DOF are -3 and 3
+    hand.click("Recheck")
+    finish(hand)
+    assert codes(hand) == ["S004"] and not stale(hand, texts)
+
+
+def test_new_scene_is_shown_as_unchecked(lint, rig, texts):
+    hand = lint(LIGHT)
+    hand.click(row_of(hand, "W001"))
+    hand.open(*rig)
+    texts.clear()
+    hand.step(2)
+    assert hand.state.of(Linting).checked is None and hand.state.of(Linting).marks is None
+    assert "This scene has not been checked yet." in texts
+    assert not marked(hand)
+    hand.click("Check")
+    finish(hand)
+    assert hand.state.of(Linting).checked.source is hand.state.scene
+
+
+def test_marks_disappear_with_their_figure(lint, texts):
+    hand = lint(LIGHT)
+    hand.click(row_of(hand, "W001"))
+    hand.state.scene.actors[0] = Actor(column())
+    assert stale(hand, texts)
+    assert hand.state.of(Linting).marks is None and not marked(hand)
+
+
+def test_posing_during_a_check_does_not_affect_it(drive, monkeypatch):
+    hand = drive(scene=scene_of(column()), size=SIZE, samples=1)
+    started, seen, is_held = hold_checks(monkeypatch)
+    check_rig(hand.state)
+    assert is_held.wait(30)
+    hand.step(2)
+    assert hand.state.job is not None and hand.state.job.progress == (3, 8, "")
+    hand.state.actor.pose.dofs[4] = 3.5
+    hand.step()
+    started.set()
+    finish(hand)
+    assert seen and hand.state.of(Linting).checked.findings == ()
+    assert hand.state.of(Linting).checked.scene.actors[0].pose.dofs[4] == 0.0
+
+
+def hold_checks(monkeypatch):
+    """Block checks after three steps until an event is set; return it, later steps and times."""
+    import threading
+
+    go, seen, is_held = threading.Event(), [], threading.Event()
+
+    def held(scene, options):
+        report(3, 8, what="column: mesh")
+        is_held.set()
+        go.wait(30)
+        report(4, 8, what="column: symmetry")
+        seen.append(scene)
+        return lint_scene(scene, options)
+
+    monkeypatch.setattr("viewer.lint._files.lint_scene", held)
+    return go, seen, is_held
+
+
+@pytest.mark.parametrize("how", ["Cancel check", "escape"])
+def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
+    hand = drive(scene=scene_of(LIGHT), size=SIZE, samples=1)
+    go, seen, is_held = hold_checks(monkeypatch)
+    check_rig(hand.state)
+    assert is_held.wait(30)
+    hand.step(3)
+    running = hand.state.of(Linting).running
+    if how == "escape":
+        hand.key("escape")
+    else:
+        hand.click(how)
+    hand.step(3)
+    assert running.job.is_cancelled and hand.says("Cancelled")
+    go.set()
+    hand.finish_job()
+    assert hand.state.job is None and hand.state.of(Linting).running is None
+    assert not seen and hand.state.of(Linting).checked is None
+
+
+def test_check_waits_for_another_running_job(lint, monkeypatch):
+    hand = lint(LIGHT)
+    go, _, is_held = hold_checks(monkeypatch)
+    first = hand.state.of(Linting).checked
+    start_check(hand.state)
+    assert is_held.wait(30)
+    hand.step(2)
+    job = hand.state.job
+    hand.click("Recheck")  # greyed out
+    assert hand.state.job is job
+    go.set()
+    finish(hand)
+    assert hand.state.of(Linting).checked is not first

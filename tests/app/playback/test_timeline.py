@@ -4,16 +4,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from app.captured import people, walk
+from app.curves.plotted import SIZE, _at, _center, clip_text
+from numpy.testing import assert_allclose, assert_array_equal
+from rig.animated import animated_leg, wave
 
-from viewer.app.core.clock import MODES
+from viewer.app.core.clock import MODES, Clock
 from viewer.app.files.files import Files, Stream, stream_captures
+from viewer.app.playback.tracks import bars, key_times, present_spans, ruler_text_place
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor
+from viewer.rig.srgb import decode_color, encode_color
 
 ARM = 0  # the DOF that the test's clip moves
 
@@ -316,3 +322,169 @@ def test_arrow_keys_choose_from_an_open_list(moving):
     assert clock.mode == modes[2] and clock.time == before and not clock.playing
     moving.key("right_arrow")  # the list is closed: the key steps again
     assert clock.mode == modes[2] and clock.time > before
+
+
+@pytest.fixture
+def keyed(drive, rig, tmp_path):
+    """A test driver on the tiny rig with a clip of keys from 0 to 2 s."""
+    (tmp_path / "wave.anim").write_text(clip_text())
+    return drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
+
+
+def scrub(hand, share, held=""):
+    """Drag in the timeline from its middle to a fraction of its length; return the end point."""
+    x0, y0, x1, _ = hand.state.item_rects["Scrubber"]
+    x = round(x0 + share * (x1 - x0))
+    hand.pull(((x0 + x1) / 2, y0 + 5), (x, y0 + 5), held=held)
+    low, high = hand.state.clock.whole
+    return low + (x - x0) / (x1 - x0) * (high - low)
+
+
+@pytest.mark.parametrize("rate", [30.0, 24.0, 12.5])
+@pytest.mark.parametrize("share", [0.137, 0.611, 0.93])
+def test_scrubbing_snaps_to_the_nearest_frame(keyed, rate, share):
+    playback = keyed.state.clock
+    playback.count_by(rate)
+    wanted = scrub(keyed, share)
+    number = round(wanted * rate)
+    assert playback.time == pytest.approx(number / rate, abs=1e-9)
+    assert playback.frame == number
+
+
+def test_scrubbing_with_alt_stops_between_frames(keyed):
+    playback = keyed.state.clock
+    playback.count_by(2.0)
+    wanted = scrub(keyed, 0.63, held="alt")
+    assert playback.time == pytest.approx(wanted, abs=2e-3)
+    assert abs(playback.time * 2.0 - round(playback.time * 2.0)) > 0.2
+
+
+def test_scrubbing_a_capture_snaps_to_its_frames(drive, rig):
+    scene = people(rig, [True] * 11, rate=7.0)
+    scene.actors[0].offset = 0.3
+    hand = drive(scene=scene, size=SIZE, samples=1)
+    wanted = scrub(hand, 0.44)
+    number = round((wanted - 0.3) * 7.0)
+    assert hand.state.clock.time == pytest.approx(0.3 + number / 7.0)
+    assert hand.state.clock.frame == number
+
+
+@pytest.mark.parametrize("held", ["", "alt"])
+def test_time_line_in_the_curves_panel_snaps_to_frames(keyed, held):
+    keyed.show_panel("Curves")
+    keyed.state.selected_joint = 1
+    keyed.step(3)
+    keyed.click("curve arm.x")
+    keyed.step(3)
+    playback = keyed.state.clock
+    playback.count_by(5.0)
+    playback.seek(0.6)
+    keyed.step(2)
+    x, y = _center(keyed, "time line")
+    keyed.pull((x, y), (_at(keyed, 1.3, 0)[0], y), held=held)
+    keyed.step()
+    if held:
+        assert playback.time == pytest.approx(1.3, abs=0.02)
+    else:
+        assert min(abs(playback.time - frame / 5.0) for frame in (6, 7)) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("time", "nearest"), [(-5.0, 0.0), (0.04, 0.0), (0.06, 0.1), (0.93, 0.9), (9.0, 0.9)]
+)
+def test_nearest_frame_stays_in_the_range(time, nearest):
+    playback = Clock(frame_rate=10.0, whole=(0.0, 0.97), has_motion=True)
+    assert playback.nearest_frame_time(time) == pytest.approx(nearest)
+
+
+SMOOTH = ("smooth", "smooth")
+
+
+def test_track_shows_keys_of_the_selected_joint_or_all_keys():
+    actor = Actor(animated_leg(), clip=wave(), offset=1.0)
+    assert_array_equal(key_times(actor, -1), [1.5, 2.0, 2.5, 3.0, 3.5])
+    assert_array_equal(key_times(actor, 1), [1.5, 2.0, 3.5])
+    assert_array_equal(key_times(actor, 2), [])
+
+
+def test_keys_of_dofs_belong_to_their_joint():
+    channels = (
+        Channel(0, np.array([0.0, 1.0]), np.zeros(2), (SMOOTH,) * 2),
+        Channel(5, np.array([0.5]), np.zeros(1), (SMOOTH,)),
+    )
+    actor = Actor(animated_leg(), clip=Clip("c", channels, 0.0, 1.0))
+    assert_array_equal(key_times(actor, 1), [0.5])
+    assert_array_equal(key_times(actor, -1), [0.0, 0.5, 1.0])
+
+
+def test_captures_have_no_keys(rig):
+    assert all(len(key_times(actor, -1)) == 0 for actor in people(rig, [True] * 3).actors)
+
+
+@pytest.mark.parametrize(
+    ("places", "drawn"),
+    [
+        ([0, 9], [(0, 9)]),
+        ([10, 10], [(10, 15)]),  # the minimum width
+        ([40, 40], [(35, 40)]),  # at the end of the track the bar grows to the left
+        ([20, 20, 22, 30], [(16, 21), (22, 30)]),  # one point remains free before the next bar
+        ([0, 18, 20, 20, 22, 30], [(0, 18), (19, 21), (22, 30)]),  # between other bars
+        ([], []),
+    ],
+)
+def test_bars_are_never_too_narrow(places, drawn):
+    assert bars(places, 5, 40) == drawn
+
+
+def test_single_frame_is_a_span_of_zero_length():
+    present = [False, True, False, False, True, True]
+    assert present_spans(walk(present, 1), 0.01) == [(0.1, 0.1), (0.4, 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("x", "begin"),
+    [(0.0, 3.0), (77.0, 80.0), (77.5, 54.5), (100.0, 77.0)],
+)
+def test_ruler_labels_stay_within_the_ruler(x, begin):
+    assert ruler_text_place(x, 20.0, 100.0) == begin
+
+
+def test_last_ruler_label_is_not_cut_off(drive, rig):
+    scene = people(rig, np.ones(121, dtype=bool))
+    hand = drive(scene=scene, size=(1280, 800), samples=1, pixels_per_point=1.0)
+    _, y0, x1, _ = hand.state.item_rects["Scrubber"]
+    picture = hand.screen()[round(y0) : round(y0) + 14].astype(int).sum(axis=2)
+    # The digits are the brightest pixels there; those of the last number are left of the end.
+    letters = np.flatnonzero((picture > 380).any(axis=0))
+    last = letters[letters > x1 - 45]
+    assert len(last) > 10 and last.max() < x1 - 1
+
+
+def test_srgb_round_trip():
+    color = (0.001, 0.2, 0.9)
+    # In IEC 61966-2-1, dark values are 12.92 times the linear value; 0.2 is 0.4845 by its formula.
+    assert encode_color(color)[:2] == pytest.approx((0.01292, 0.484529), abs=1e-6)
+    assert decode_color(encode_color(color)) == pytest.approx(color, abs=1e-12)
+
+
+def _row(hand, index):
+    """The pixels of an actor's track, a line through its middle."""
+    x0, _, x1, _ = hand.state.item_rects["Scrubber"]
+    _, y0, _, y1 = hand.state.item_rects[f"track {index}"]
+    return hand.screen()[round((y0 + y1) / 2), round(x0) : round(x1)].astype(int)
+
+
+def test_single_frame_is_visible_and_tracks_have_the_colour_of_their_actor(drive, rig):
+    lone = np.zeros(2000, dtype=bool)
+    lone[1000] = True
+    scene = people(rig, np.ones(2000, dtype=bool), lone)
+    scene.actors[0].color = decode_color((0.2, 0.8, 0.4))
+    scene.actors[1].color = decode_color((0.9, 0.1, 0.1))
+    hand = drive(scene=scene, size=(1280, 800), samples=1, pixels_per_point=1.0)
+    first = _row(hand, 0)
+    # The middle of the bar, where neither ruler nor current time are drawn.
+    assert np.abs(first - [51, 204, 102]).max(axis=1).min() <= 2
+    second = _row(hand, 1)
+    red = np.flatnonzero((second[:, 0] > 120) & (second[:, 1] < 70))
+    assert 4 <= len(red) <= 10
+    assert abs(red.mean() - 1000 / 1999 * len(second)) < 8

@@ -5,11 +5,22 @@ import time
 
 import numpy as np
 import pytest
+from app.curves.plotted import SIZE, _center, clip_text
+from app.posing_rigs import arm_figure
 from app.tiny import FILE_POSE, LABELS, chain, comb
+from imgui_bundle import imgui
+from numpy.testing import assert_allclose
 
 from viewer.app.keys import Keyboard
+from viewer.app.posing.joint_transform import moved_joints
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.joints_panel import joint_rows
+from viewer.app.posing.move_tool import shift_text
+from viewer.app.posing.posed_joint import posed_joint
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
+from viewer.rig.pose import joint_rotations, placement_matrix
+from viewer.rig.scene import Actor
 
 SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
 
@@ -302,3 +313,213 @@ def test_drawing_changes_no_pose(hand):
     assert (
         abs(hand.dof("arm.y")) < 0.2 and hand.dof("root.x") == before[0][hand.dof_index("root.x")]
     )
+
+
+@pytest.fixture
+def tooltips(monkeypatch):
+    """Tooltip texts in the order in which they were shown."""
+    said = []
+    show = imgui.set_tooltip
+    monkeypatch.setattr(imgui, "set_tooltip", lambda text: (said.append(text), show(text))[1])
+    return said
+
+
+@pytest.fixture
+def sliders(monkeypatch):
+    """Slider texts by label."""
+    shown = {}
+    draw = imgui.slider_float
+
+    def record(label, value, low, high, text="%.3f", flags=0):
+        shown[label] = text % value
+        return draw(label, value, low, high, text, flags)
+
+    monkeypatch.setattr(imgui, "slider_float", record)
+    return shown
+
+
+@pytest.mark.parametrize(
+    ("unit", "dof", "said"),
+    [
+        ("degrees", "root.x", "-57.3\N{DEGREE SIGN} to 57.3\N{DEGREE SIGN}"),
+        ("radians", "root.x", "-1.000 rad to 1.000 rad"),
+        ("degrees", "root.z", "locked at 17.2\N{DEGREE SIGN}"),
+        ("radians", "root.z", "locked at 0.300 rad"),
+        ("degrees", "root.y", "28.6\N{DEGREE SIGN} to 114.6\N{DEGREE SIGN}"),
+        ("degrees", "arm.x", "unlimited"),
+    ],
+)
+def test_tooltip_shows_limits_in_the_unit_of_the_panel(hand, tooltips, unit, dof, said):
+    hand.click(unit)
+    hand.move(dof)
+    hand.step(1)
+    assert tooltips[-1].startswith(f"{dof}\n{said}")
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("degrees", math.degrees(1.0)), ("radians", 1.0)])
+def test_copied_value_equals_the_shown_value(hand, unit, factor):
+    hand.click(unit)
+    hand.state.actor.pose.dofs[hand.dof_index("arm.x")] = 0.75
+    hand.step(2)
+    hand.click("arm.x", button=1)
+    hand.click("Copy value")
+    assert float(imgui.get_clipboard_text()) == pytest.approx(0.75 * factor)
+
+
+@pytest.mark.parametrize("value", [-0.0, -1e-5])
+def test_sliders_show_no_negative_zero(hand, sliders, value):
+    row = hand.dof_index("arm.x")
+    hand.state.actor.pose.dofs[row] = value
+    hand.step(2)
+    assert sliders[f"##dof{row}"] == "0.0\N{DEGREE SIGN}"
+    assert hand.state.actor.pose.dofs[row] == value  # only the shown value is rounded
+    hand.click("radians")
+    assert sliders[f"##dof{row}"] == "0.0000 rad"
+
+
+def test_timeline_and_status_show_no_negative_zero(drive, rig, tmp_path, texts):
+    (tmp_path / "wave.anim").write_text(clip_text())
+    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
+    hand.state.clock.mode = "run on"
+    hand.state.clock.seek(-1e-4)
+    texts.clear()
+    hand.step(2)
+    assert any(text.endswith("0.000 s") for text in texts)
+    assert not any("-0.000" in text for text in texts)
+    hand.key("i")
+    assert hand.says("0.000 s") and not hand.says("-0.000")
+
+
+def test_joint_translation_shows_no_negative_zero():
+    assert shift_text("root", np.array([-0.0, 0.25, -1.0])) == "root   +0 +0.25 -1"
+
+
+def test_raw_pose_values_have_no_negative_zero(box, texts):
+    box.click("Rotation vectors")
+    box.state.actor.pose.dofs[:] = -1e-9
+    texts.clear()
+    box.step(2)
+    shown = {text for text in texts if text.startswith("file:")}
+    assert shown == {"file: 0.0000  0.0000  0.0000"}
+
+
+def test_curve_view_is_fitted_again_when_the_unit_changes(curves):
+    heights = [_center(curves, f"key arm.x {key}")[1] for key in (0, 1, 2)]
+    curves.click("radians")
+    curves.step(3)
+    again = [_center(curves, f"key arm.x {key}")[1] for key in (0, 1, 2)]
+    assert again == pytest.approx(heights, abs=1.5)
+
+
+def turned_actor():
+    """An arm with the shoulder rotated by 90 degrees about z and the elbow by -45 about its z."""
+    actor = Actor(arm_figure())
+    actor.pose.dofs[2], actor.pose.dofs[3] = np.pi / 2, -np.pi / 4
+    return actor
+
+
+def test_positions_and_axes_match_hand_calculation() -> None:
+    actor = turned_actor()
+    elbow = posed_joint(actor, 1)
+    assert_allclose(elbow.center, [0, 1, 0], atol=1e-12)
+    assert_allclose(elbow.axes("world"), np.eye(3))
+    # The shoulder's x axis points up; the elbow's points 45 degrees to the right of that.
+    assert_allclose(elbow.axes("parent")[:, 0], [0, 1, 0], atol=1e-12)
+    assert_allclose(elbow.axes("local")[:, 0], np.array([1, 1, 0]) / np.sqrt(2), atol=1e-12)
+
+
+def test_placement_and_scale_of_the_figure_are_applied() -> None:
+    actor = turned_actor()
+    actor.placement[:3, 3] = 1, 2, 3
+    actor.pose.figure_scale = 2.0
+    assert_allclose(posed_joint(actor, 1).center, [1, 4, 3], atol=1e-12)
+    assert_allclose(posed_joint(actor, 1).axes("local")[:, 2], [0, 0, 1], atol=1e-12)
+
+
+def test_missing_joint_returns_none() -> None:
+    actor = turned_actor()
+    assert posed_joint(actor, -1) is None and posed_joint(actor, 3) is None
+    actor.pose = None
+    assert posed_joint(actor, 0) is None
+
+
+PLACEMENTS = {
+    "turned": rotation_vector_to_matrix(np.array([0.3, -0.8, 0.5])),
+    "mirrored": np.diag([-1.0, 1.0, 1.0]),
+    "mirrored along two": np.diag([-1.0, 1.0, -2.0]),
+    "point": -np.eye(3),
+}
+
+
+@pytest.mark.parametrize("name", PLACEMENTS)
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0.6, 0, 0.8)])
+def test_rotation_axis_matches_observed_rotation(name, axis) -> None:
+    actor = Actor(arm_figure())
+    actor.placement[:3, :3] = PLACEMENTS[name]
+    joint = posed_joint(actor, 0)
+    inside = rotation_vector_to_matrix(1e-6 * np.array(axis, float))
+    seen = joint.rotation_axis(np.array(axis, float))
+    # No point moves along the axis, and all move around it by the right-hand rule.
+    for point in np.eye(3):
+        step = PLACEMENTS[name] @ (inside - np.eye(3)) @ np.linalg.solve(PLACEMENTS[name], point)
+        assert abs(step @ seen) < 1e-12
+        assert np.cross(seen, point) @ step >= -1e-12
+    if name != "mirrored along two":  # that placement stretches
+        assert_allclose(joint.parent_axis(seen), axis, atol=1e-9)
+
+
+def test_world_matrices_cover_every_joint() -> None:
+    actor = turned_actor()
+    joint = posed_joint(actor, 2)
+    assert joint.world.shape == (3, 4, 4)
+    assert_allclose(joint.placement, actor.placement @ placement_matrix(actor.pose))
+    local = joint_rotations(joint.skeleton, actor.pose)
+    assert_allclose(joint.world[2, :3, :3], local[0] @ local[1] @ local[2], atol=1e-12)
+
+
+@pytest.fixture
+def unlocked(drive, rig):
+    """A test driver on a rig whose arm has sliders for translation and scale."""
+    hand = drive(*rig, size=(1000, 1000))
+    hand.click("joint arm", button=1)
+    hand.step(2)
+    hand.click("Translation and scale")
+    hand.step(3)
+    return hand
+
+
+def test_unlocked_joint_is_moved_and_scaled(unlocked):
+    pose = unlocked.state.actor.pose
+    assert moved_joints(unlocked.state) == {1}
+    x, y = unlocked.place("arm.translation y")
+    unlocked.pull((x, y), (x + 40.0, y))
+    assert pose.translations[1, 1] > 0.0
+    assert not pose.translations[1, [0, 2]].any() and not pose.translations[0].any()
+    x, y = unlocked.place("arm.scale x")
+    unlocked.pull((x, y), (x + 40.0, y))
+    assert pose.scales[1, 0] > 1.0
+    unlocked.key("z", "ctrl")
+    unlocked.key("z", "ctrl")
+    pose = unlocked.state.actor.pose
+    assert not pose.translations.any() and (pose.scales == 1.0).all()
+
+
+def test_reset_of_a_joint_covers_translation_and_scale(unlocked):
+    pose = unlocked.state.actor.pose
+    pose.translations[1], pose.scales[1] = 1.0, 2.0
+    unlocked.step(2)
+    unlocked.click("joint arm", button=1)
+    unlocked.step(2)
+    unlocked.click("Reset this joint")
+    pose = unlocked.state.actor.pose
+    assert not pose.translations.any() and (pose.scales == 1.0).all()
+
+
+def test_joints_that_an_animation_moves_or_scales_are_listed(hand):
+    times, skeleton = np.array([0.0, 1.0]), hand.state.actor.figure.skeleton
+    rest = np.tile(skeleton.rest_translations[0], (2, 1))
+    moved = TransformChannel(0, "translation", times, np.add(rest, [[0, 0, 0], [0, 1, 0]]))
+    still = TransformChannel(1, "scale", times, np.tile(skeleton.rest_scales[1], (2, 1)))
+    turned = TransformChannel(1, "rotation", times, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+    hand.state.actor.clip = TransformClip("walk", (moved, still, turned), 0.0, 1.0)
+    assert moved_joints(hand.state) == {0}

@@ -7,13 +7,19 @@ import pytest
 from app import rig_scene
 from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
+from app.test_panel_pictures import _compare, _shown
+from app.tiny import write_rig
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
+import viewer
+from viewer.app.layout import ShownPanels
 from viewer.app.rigging.placing import as_similarity, move_by_hand, placing_now
+from viewer.app.rigging.results import trial_clip
 from viewer.app.rigging.rigging import Rigging, current_template
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.motion.clip import sample
 from viewer.rig.skinning import deform
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
@@ -360,3 +366,48 @@ def test_new_scene_keeps_only_the_rig_settings(rigging, rig):
     hand.step(2)
     assert hand.state.of(Rigging).results == {} and hand.state.of(Rigging).target is None
     assert hand.state.of(Rigging).choices.method == "nearest"
+
+
+TALL = (1000, 1100)
+
+
+def _aligned(hand):
+    hand.click("Align")
+    hand.finish_job()
+    hand.click("rig tool rotate")
+    hand.move((5, 5))
+
+
+def _result(hand):
+    hand.click("Run")
+    hand.finish_job()
+    hand.state.clock.playing = False
+    hand.state.clock.seek(0.0)
+    hand.click("color class:confidence")
+    hand.move((5, 5))
+
+
+@pytest.mark.golden("app_{name}")
+@pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
+def test_rig_panel_matches_golden_image(drive, name, prepare):
+    hand = drive(scene=rig_scene.scene(), size=TALL, samples=1, pixels_per_point=1.0)
+    hand.state.of(ShownPanels).closed.add("stats")  # the displayed times differ between runs
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    _compare(_shown(hand, prepare), name)
+
+
+def test_joints_bend_one_after_another_and_return(tmp_path):
+    actor = viewer.load(*write_rig(tmp_path)).actors[0]
+    skeleton, pose = actor.figure.skeleton, actor.pose
+    clip = trial_clip(skeleton, pose)
+    assert len(clip.channels) == sum(skeleton.parents >= 0)
+    for channel in clip.channels:
+        assert skeleton.parents[skeleton.dof_joints[channel.target]] >= 0
+        low, high = skeleton.dof_limits[channel.target]
+        assert (low <= channel.values).all() and (channel.values <= high).all()
+        assert np.ptp(channel.values) > 0.0
+    for time in (clip.start, clip.end):
+        posed = pose.copy()
+        sample(clip, skeleton, time, posed)
+        np.testing.assert_allclose(posed.dofs, pose.dofs, atol=1e-12)

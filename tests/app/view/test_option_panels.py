@@ -2,9 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from formats.filmed_capture import write_filmed
+from numpy.testing import assert_allclose
+from rendering.moving import moving_camera
 
-from viewer.rendering.camera import VIEWS
+from viewer.app.view.camera_panel import look_through
+from viewer.app.view.display_panel import JOINT_TOGGLES
+from viewer.app.weights.weights_panel import Weights
+from viewer.rendering.camera import VIEWS, eye
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import BACKGROUNDS, BONES, MATCAPS, SHOWN, Lights
 from viewer.rig.scene import Actor
@@ -282,3 +289,119 @@ def test_check_box_of_vertex_colours_is_shown_with_vertex_colours(drive, tmp_pat
 
 def test_check_box_of_vertex_colours_is_hidden_without_vertex_colours(tall):
     assert "Vertex colours" not in tall.state.item_rects
+
+
+@pytest.fixture
+def filmed(drive, tmp_path):
+    """A driver on the Camera panel of a capture with one camera and images of grey 100 / 255."""
+    driver = drive(write_filmed(tmp_path / "take"), size=(1000, 900), pixels_per_point=1.0)
+    driver.state.options.grid = False
+    driver.state.options.background = "white"
+    driver.show_panel("Camera")
+    return driver
+
+
+def picture(driver) -> np.ndarray:
+    driver.step(3)
+    return np.array(driver.scene_picture())[..., :3].astype(int)
+
+
+def test_show_cameras_draws_frusta_with_their_images(filmed):
+    # The camera stands 5 m from the keypoints.
+    filmed.state.camera.distance, filmed.state.camera.azimuth = 25.0, 40.0
+    plain = picture(filmed)
+    filmed.click("Show cameras")
+    assert filmed.state.options.cameras
+    shown = picture(filmed)
+    changed = np.abs(shown - plain).max(axis=2) > 20
+    image = (np.abs(shown - 100) <= 2).all(axis=2) & changed
+    lines = changed & ~image
+    assert image.sum() > 20 and lines.sum() > 20
+    filmed.click("Show cameras")
+    assert not filmed.state.options.cameras
+    assert np.array_equal(picture(filmed), plain)
+
+
+def test_image_brightness_dims_the_image_of_the_camera(filmed):
+    assert "Image brightness" not in filmed.state.item_rects
+    filmed.pick("Calibrated camera", 1)
+    assert filmed.state.camera.fixed is filmed.state.scene.views[0]
+    grey = []
+    for value in ("", "1", "0.25", "0"):
+        if value:
+            filmed.enter_value("Image brightness", value)
+        # The border of the image contains no points.
+        shown = picture(filmed)
+        grey.append(np.median(shown[:, shown.shape[1] // 2 - 60]))
+    # 100 of 255 in the file, dimmed to 60 % at first; without an image the background is white.
+    assert grey == [60, 100, 25, 255]
+
+
+def test_view_follows_a_moving_camera_during_playback(filmed):
+    state = filmed.state
+    view = moving_camera()
+    state.scene.views = (view,)
+    look_through(state, 0)
+    state.clock.seek(1 / 30)
+    filmed.step(2)
+    # A third of the way from its first to its second frame.
+    assert_allclose(eye(state.camera)[0], 0.2 / 3.0, atol=1e-9)
+    assert state.camera.fixed is view
+
+
+KEYS = {"xray": ("b", ""), "joint_names": ("j", ""), "joint_axes": ("j", "shift")}
+
+
+@pytest.mark.parametrize("name", JOINT_TOGGLES)
+def test_menu_and_key_toggle_joint_display(hand, name):
+    text, _ = JOINT_TOGGLES[name]
+    before = hand.scene_picture()
+    hand.menu("menu View", text)
+    assert getattr(hand.state.options, name) and hand.says(f"{text} on")
+    hand.step(2)
+    assert (hand.scene_picture() != before).any()
+    assert hand.undo_steps == 1
+    key, held = KEYS[name]
+    hand.key(key, held)
+    hand.step(2)
+    assert not getattr(hand.state.options, name) and hand.says(f"{text} off")
+    assert (hand.scene_picture() == before).all()
+
+
+def test_display_panel_has_the_same_check_boxes(drive, rig):
+    hand = drive(*rig, size=(1000, 1000), samples=1)
+    for short, name in (("X-ray", "xray"), ("Names", "joint_names"), ("Axes", "joint_axes")):
+        hand.click(f"{short}###{name}")
+        assert getattr(hand.state.options, name)
+
+
+def test_menu_turns_the_heat_map_on_and_off(hand):
+    hand.click(hand.place("joint arm", 0.5))
+    hand.menu("menu View", "Weights of the selected joint")
+    assert (hand.state.options.shading, hand.state.options.scalar) == ("scalar", "weight")
+    assert hand.says("Weights of arm")
+    hand.menu("menu View", "Weights of the selected joint")
+    assert hand.state.options.shading == "auto"
+
+
+def test_menu_toggles_picking_of_vertices(hand):
+    hand.menu("menu View", "Pick vertices")
+    assert hand.state.of(Weights).picks_vertices and hand.says("Clicks pin vertices")
+    hand.menu("menu View", "Pick vertices")
+    assert not hand.state.of(Weights).picks_vertices
+
+
+def test_joint_display_is_greyed_without_a_skeleton(drive, rig):
+    hand = drive(rig[1])
+    for text in ("X-ray", "Joint names", "Joint axes", "Unpin vertex"):
+        hand.menu("menu View", text)
+        hand.key("escape")
+    assert not hand.state.options.xray and not hand.state.options.joint_names
+
+
+def test_vertex_display_is_greyed_without_a_skin(drive, rig):
+    lone = drive(rig[0])
+    for text in ("Weights of the selected joint", "Pick vertices", "Inspect vertex under cursor"):
+        lone.menu("menu View", text)
+        lone.key("escape")
+    assert lone.state.options.shading == "auto" and not lone.state.of(Weights).picks_vertices

@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app.tiny import chain
-from app.view.test_picking_in_view import click, seen_at
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
+from viewer.app.posing.gizmo import joint_places
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.posing import Posing
+from viewer.app.view.hovering import Hovered
+from viewer.app.view.outlines import outlined_parts
 from viewer.app.view.picks import take_pick
 from viewer.app.weights.weights_panel import Weights
+from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rendering.picking import Pick
 from viewer.rig.annotations import BodyParts, ReducedMesh
+from viewer.rig.scene import actor_points
 from viewer.rig.skinning import deform, joint_matrices
 
 
@@ -323,3 +327,187 @@ def test_window_stays_awake_only_until_the_mouse_rests(column):
     while column.state.of(Weights).is_waiting:
         column.step()
     assert imgui.get_time() - waited < 0.3
+
+
+@pytest.fixture
+def pair(drive, rig, tmp_path):
+    """A test driver on two tiny figures side by side."""
+    hand = drive(*rig, *rig, size=(1280, 800), samples=1)
+    hand.step(3)
+    return hand
+
+
+def seen_at(hand, point):
+    """The window coordinates of a point, by the camera's matrices."""
+    camera = hand.state.camera
+    x, y, width, height = hand.state.view_rect
+    matrix = camera.projection_matrix(width / height, hand.state.box) @ camera.view_matrix()
+    clip = matrix @ np.append(point, 1.0)
+    across, upward = clip[:2] / clip[3]
+    return x + width * (across + 1) / 2, y + height * (1 - upward) / 2
+
+
+def middle_of(hand, index):
+    points = actor_points(hand.state.scene.actors[index])
+    return (points.min(axis=0) + points.max(axis=0)) / 2
+
+
+def click(hand, place, times=1):
+    io_place = (float(place[0]), float(place[1]))
+    for _ in range(times):
+        hand.pull(io_place, io_place)
+    hand.step(2)
+
+
+def test_click_activates_the_actor_under_it(pair):
+    assert pair.state.chosen_actor == 0
+    click(pair, seen_at(pair, middle_of(pair, 1)))
+    assert pair.state.chosen_actor == 1
+    click(pair, seen_at(pair, middle_of(pair, 0)))
+    assert pair.state.chosen_actor == 0
+
+
+def test_click_on_the_background_has_no_effect(pair):
+    pair.state.choose_actor(1)
+    x, y, width, _ = pair.state.view_rect
+    click(pair, (x + width - 5, y + 5))
+    assert pair.state.chosen_actor == 1 and pair.undo_steps == 0
+
+
+def test_click_on_a_joint_selects_it(pair):
+    pair.state.options.show = "skeleton"
+    pair.step(2)
+    from viewer.rig.geometry.transform import apply_transform
+    from viewer.rig.skinning import joint_matrices
+
+    actor = pair.state.scene.actors[1]
+    joints = joint_matrices(actor.figure, actor.pose)[:, :3, 3]
+    chosen = actor.figure.skeleton.n_joints - 1
+    boxes = actor.figure.skeleton.boxes
+    inside = boxes[chosen].mean(axis=0) if boxes is not None else np.zeros(3)
+    world = joint_matrices(actor.figure, actor.pose)[chosen]
+    place = apply_transform(actor.placement, apply_transform(world, inside[None]))[0]
+    assert len(joints) > chosen
+    click(pair, seen_at(pair, place))
+    assert (pair.state.chosen_actor, pair.state.selected_joint) == (1, chosen)
+
+
+def test_drag_orbits_and_selects_nothing(pair):
+    azimuth = pair.state.camera.azimuth
+    x, y = seen_at(pair, middle_of(pair, 1))
+    pair.pull((x, y), (x + 60, y))
+    pair.step(1)
+    assert pair.state.camera.azimuth != azimuth
+    assert pair.state.chosen_actor == 0
+
+
+def test_double_click_aims_the_camera_at_the_surface(pair):
+    distance = pair.state.camera.distance
+    place = seen_at(pair, middle_of(pair, 1))
+    click(pair, place, times=2)
+    x, y, width, height = pair.state.view_rect
+    # The clicked point is now in the middle of the view, at the distance of the previous target.
+    points = actor_points(pair.state.scene.actors[1])
+    size = np.ptp(points, axis=0).max()
+    assert pair.state.camera.distance == distance
+    assert np.linalg.norm(pair.state.camera.target - middle_of(pair, 1)) < size
+    assert_allclose(
+        seen_at(pair, pair.state.camera.target), (x + width / 2, y + height / 2), atol=1e-6
+    )
+
+
+@pytest.fixture
+def bones(drive, rig):
+    """A test driver on the tiny figure with its skeleton."""
+    hand = drive(*rig, pixels_per_point=1.0)
+    hand.state.options.show = "both"
+    hand.step(2)
+    return hand
+
+
+@pytest.fixture
+def hovered_pair(drive, rig):
+    """A test driver on two tiny figures side by side."""
+    return drive(*rig, *rig, size=(1280, 800))
+
+
+def keys(hand):
+    return [part.key() for part in outlined_parts(hand.state)]
+
+
+def beside(hand, joint, across=11.0):
+    x, y = joint_places(hand.state)[joint]
+    return float(x) + across, float(y)
+
+
+def root_place(hand, actor):
+    hand.state.chosen_actor, kept = actor, hand.state.chosen_actor
+    places = joint_places(hand.state)
+    hand.state.chosen_actor = kept
+    return tuple(float(side) for side in places[0])
+
+
+def test_joint_near_the_pointer_is_outlined_and_selected_by_a_click(bones):
+    bones.move(beside(bones, 1))
+    bones.step(2)
+    assert bones.state.of(Hovered).joint == 1
+    assert keys(bones) == [Outlined(0, 1, is_hovered=True).key()]
+    bones.click(beside(bones, 1))
+    assert bones.state.selected_joint == 1
+    assert keys(bones) == [Outlined(0, 1).key()]
+    bones.move((1.0, 1.0))
+    assert bones.state.of(Hovered).joint == -1
+
+
+def test_hidden_joints_are_not_hovered(hand):
+    hand.move(beside(hand, 1, 2.0))
+    hand.step(10)
+    assert hand.state.of(Hovered).joint == -1 and not keys(hand)
+
+
+def test_outlines_are_drawn_in_the_window_but_not_in_pictures(bones):
+    plain = bones.scene_picture()
+    bones.menu("menu View", "Selection outlines")
+    bones.state.selected_joint = 1
+    bones.step(3)
+    selected = bones.scene_picture()
+    bones.menu("menu View", "Selection outlines")
+    bones.step(2)
+    rows, columns = (slice(round(a), round(b)) for a, b in zip((100, 260), (500, 600), strict=True))
+    with_outline = bones.screen()[rows, columns]
+    assert (bones.scene_picture() == selected).all() and (selected != plain).any()
+    bones.menu("menu View", "Selection outlines")
+    bones.move((1.0, 1.0))
+    assert (bones.screen()[rows, columns] != with_outline).any()
+
+
+def test_chosen_actor_among_several_is_outlined(hovered_pair):
+    assert not keys(hovered_pair)
+    hovered_pair.state.select_actor(1)
+    hovered_pair.step()
+    assert keys(hovered_pair) == [Outlined(1).key()]
+    hovered_pair.key("escape")
+    assert not keys(hovered_pair) and hovered_pair.state.chosen_actor == 1
+
+
+def test_actor_under_a_resting_pointer_is_outlined(hovered_pair):
+    hovered_pair.move(root_place(hovered_pair, 1))
+    hovered_pair.step(6)
+    assert hovered_pair.state.of(Hovered).actor == 1
+    assert keys(hovered_pair) == [Outlined(1, is_hovered=True).key()]
+
+
+@pytest.mark.parametrize(("away", "orbits"), [(16.0, False), (60.0, True)])
+def test_drag_next_to_a_ring_does_not_orbit(bones, away, orbits):
+    bones.state.selected_joint = 1
+    bones.key("e")
+    bones.step(2)
+    x, y = joint_places(bones.state)[1]
+    # The outermost ring faces the eye.
+    from viewer.app.posing.rotate_tool import RADIUS
+
+    start = float(x) + 1.18 * RADIUS + away, float(y)
+    before, dofs = bones.state.camera.azimuth, bones.dofs()
+    bones.pull(start, (start[0] + 40.0, start[1] + 10.0))
+    assert (bones.state.camera.azimuth != before) == orbits
+    np.testing.assert_array_equal(bones.dofs(), dofs)

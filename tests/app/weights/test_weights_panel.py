@@ -4,14 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from app.tiny import SKEL, skin_text
 from imgui_bundle import imgui
 from numpy.testing import assert_array_equal
 
 from viewer.app.preferences.preferences import Appearance
-from viewer.app.weights.weights_panel import no_view
+from viewer.app.weights.weights_panel import no_view, start_heat_map, toggle_weights
 from viewer.rendering.colors import colormap
 from viewer.rig.annotations import VertexField
-from viewer.rig.scalars import SCALARS, compute, missing_part
+from viewer.rig.scalars import (
+    SCALARS,
+    compute,
+    informative_quantity,
+    joint_influences,
+    missing_part,
+    most_influential,
+)
+from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning
 
 
@@ -352,3 +361,81 @@ def test_legend_grows_with_the_scale_of_the_interface(wide):
     wide.step(3)
     left, _, right = _legend_colours(wide)
     assert right - left == pytest.approx(1.5 * (bright - dark), rel=0.05)
+
+
+TIP = "balljoint arm {\n        balljoint tip { }"
+
+
+@pytest.fixture
+def tipped(drive, tmp_path):
+    """A test driver on the tiny rig with an additional child of the arm that moves no vertex."""
+    skel, skin = tmp_path / "tipped.skel", tmp_path / "tipped.skin"
+    skel.write_text(SKEL.replace("balljoint arm {", TIP))
+    skin.write_text(skin_text(3).replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.75"))
+    return drive(skel, skin, size=(1000, 1000), samples=1)
+
+
+def shown(hand):
+    """Return the lowest and highest value of the drawn view."""
+    hand.step(3)
+    return hand.state.stats.scalar_range
+
+
+def test_influence_of_a_joint_is_the_sum_of_its_weights(tipped):
+    figure = tipped.state.actor.figure
+    # Four vertices follow the root, four the arm, and four both.
+    np.testing.assert_allclose(joint_influences(figure), [5.0, 7.0, 0.0])
+    assert most_influential(figure) == 1
+    assert informative_quantity("weight", [figure]) == "weight:arm"
+    assert most_influential(replace(figure, skin=None)) == -1
+
+
+@pytest.mark.parametrize("way", ["check box", "shading", "key"])
+def test_heat_map_selects_the_joint_with_the_most_influence(tipped, way):
+    if way == "check box":
+        tipped.show_panel("Weights")
+        tipped.click("Heat map")
+    elif way == "shading":
+        start_heat_map(tipped.state)
+    else:
+        tipped.key("v")
+    assert tipped.state.selected_joint == 1
+    assert tipped.state.options.scalar == "weight"
+    assert shown(tipped) == (0.0, 1.0)
+
+
+def test_selected_joint_with_influence_stays(tipped):
+    tipped.state.selected_joint = 0
+    toggle_weights(tipped.state)
+    assert tipped.state.selected_joint == 0 and shown(tipped) == (0.0, 1.0)
+
+
+def test_selected_joint_without_influence_is_replaced_with_a_note(tipped):
+    tipped.state.selected_joint = 2
+    toggle_weights(tipped.state)
+    assert tipped.state.selected_joint == 1 and shown(tipped) == (0.0, 1.0)
+    assert tipped.says("tip has no influence")
+    # A later explicit choice is kept, although the joint moves no vertex.
+    tipped.state.selected_joint = 2
+    assert shown(tipped) == (0.0, 0.0)
+
+
+def test_chosen_view_is_not_replaced(tipped):
+    tipped.state.options.scalar = "entropy"
+    start_heat_map(tipped.state)
+    assert tipped.state.options.scalar == "entropy" and tipped.state.selected_joint == -1
+
+
+def test_field_is_the_first_that_is_not_zero_everywhere(tipped):
+    state = tipped.state
+    count = state.actor.figure.mesh.n_vertices
+    fields = (
+        VertexField("empty", "Empty", np.zeros(count)),
+        VertexField("full", "Full", np.arange(float(count))),
+    )
+    mesh = replace(state.actor.figure, skeleton=None, skin=None, fields=fields)
+    state.scene.actors[:] = [Actor(mesh)]
+    state.choose_actor(0)
+    start_heat_map(state)  # the field is shown because there are no weights
+    assert state.options.scalar == "field:full"
+    assert shown(tipped) == (0.0, count - 1.0)

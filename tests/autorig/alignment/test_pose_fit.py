@@ -1,15 +1,19 @@
 """Fit of the template's joints to the pose of the target."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from autorig.rigged_shapes import arm, turn
 from numpy.testing import assert_allclose
 
 from viewer.autorig.alignment.icp import Triangles
-from viewer.autorig.alignment.pose_fit import fit_pose
+from viewer.autorig.alignment.pose_fit import AlignedTemplate, Pairs, fit_pose, solve_step
 from viewer.autorig.alignment.proportions import limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.progress import receiving
 from viewer.rig.geometry.closest_point import Surface
+from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import joint_rotations, rest_pose
 from viewer.rig.skinning import deform
 
@@ -84,3 +88,143 @@ def test_too_few_pairs_do_not_change_the_template():
     found = fit_pose(figure, pose, START, side, side, True)
     assert found.similarity is START
     assert (found.pose.dofs == pose.dofs).all() and not found.rotated.any()
+
+
+FIGURE = arm()
+LIMBS = limbs_of(FIGURE)
+PARENTS = FIGURE.skeleton.parents
+X = FIGURE.mesh.positions
+LAID = AlignedTemplate(
+    X,
+    vertex_normals(X, FIGURE.mesh.triangles),
+    np.array([[0.0, 0, 0], [0, 1, 0]]),
+    LIMBS.axes,
+)
+SIZE = 2.4
+NONE = np.zeros((2, 3)), np.zeros((2, 2))
+
+
+def solved(targets, scales=True, before=NONE):
+    every = np.arange(len(X))
+    # Each vertex occurs three times with normals along x, y and z, which is equivalent to distances
+    # of points.
+    normals = np.repeat(np.eye(3), len(X), axis=0)
+    pairs = Pairs(np.tile(every, 3), np.tile(targets, (3, 1)), normals, every, targets)
+    return solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, *before, scales)
+
+
+def test_rotated_joint_is_found():
+    turn = np.array([0.0, 0.0, 0.02])
+    targets = X + LIMBS.fractions[:, 1:] * np.cross(turn, X - [0, 1, 0])
+    step = solved(targets)
+    assert_allclose(step.rotation_vectors, [[0, 0, 0], turn], atol=2e-4)
+    assert_allclose(step.rotation, 0.0, atol=2e-4)
+    assert_allclose(step.limb_growths, 0.0, atol=5e-4)
+
+
+def test_overall_translation_and_scale_are_found():
+    step = solved(X * 1.03 + [0.1, -0.2, 0.3])
+    assert_allclose(step.growth, 0.03, atol=1e-3)
+    middle = np.tile(X, (3, 1)).mean(axis=0)
+    assert_allclose(step.shift, 0.03 * middle + [0.1, -0.2, 0.3], atol=1e-3)
+    assert_allclose(step.rotation_vectors, 0.0, atol=1e-3)
+
+
+def test_longer_limb_is_distinguished_from_overall_scale():
+    fraction = LIMBS.fractions[:, 1]
+    # The base is 5 % longer; its vertices stretch, and the tip moves with it.
+    up = 0.05 * ((1 - fraction) * X[:, 1] + fraction)
+    step = solved(X + up[:, None] * [0.0, 1.0, 0.0])
+    along, across = step.limb_growths + step.growth
+    assert_allclose(along[0] - along[1], 0.05, atol=5e-3)
+    assert_allclose(across[0], 0.0, atol=5e-3)
+
+
+def test_known_scale_is_not_changed():
+    step = solved(X * 1.03, scales=False)
+    assert abs(step.growth) < 1e-8 and np.abs(step.limb_growths).max() < 1e-8
+
+
+def test_steps_are_bounded():
+    turn = np.array([0.0, 0.0, 2.0])
+    step = solved(X + LIMBS.fractions[:, 1:] * np.cross(turn, X - [0, 1, 0]))
+    assert_allclose(np.linalg.norm(step.rotation_vectors[1]), 0.3)
+    step = solved(3.0 * X)
+    assert step.growth == 0.2
+
+
+def test_unsupported_rotations_of_earlier_iterations_decay():
+    # The axis of the tip is y, and a rotation about it slides a round section along itself; there
+    # is only one pair, which does not constrain the tip.
+    pairs = Pairs(np.array([0]), X[:1], np.array([[0.0, 0, 1.0]]), np.array([0]), X[:1])
+    rotated = np.array([[0.0, 0, 0], [0, 0.1, 0]])
+    step = solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, rotated, np.zeros((2, 2)), True)
+    # The penalties are 3e-6 on the total rotation and 1e-5 on one step, so 0.1 * 3 / 13 is
+    # reverted.
+    assert step.rotation_vectors[1, 1] == pytest.approx(-0.1 * 3 / 13, rel=1e-6)
+
+
+ONES = np.ones(2)
+
+
+def test_limbs_point_to_the_next_joint_or_the_centre_of_the_children():
+    figure = arm()
+    limbs = limbs_of(figure)
+    fraction = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
+    assert_allclose(limbs.weights, np.stack([1 - fraction, fraction], axis=1), atol=1e-12)
+    assert_allclose(
+        limbs.fractions, np.stack([np.ones_like(fraction), fraction], axis=1), atol=1e-12
+    )
+    assert_allclose(limbs.axes[0], [0, 1, 0], atol=1e-12)
+    middle = (fraction @ figure.mesh.positions) / fraction.sum() - [0, 1, 0]
+    assert_allclose(limbs.axes[1], middle / np.linalg.norm(middle), atol=1e-12)
+
+
+def test_joint_without_vertices_has_no_axis():
+    figure = arm()
+    everything = replace(figure.skin, joints=np.zeros_like(figure.skin.joints))
+    limbs = limbs_of(replace(figure, skin=everything))
+    assert limbs.axes[1].tolist() == [0, 0, 0]
+    still = resized(replace(figure, skin=everything), limbs, ONES, np.array([1.0, 5.0]))
+    assert_allclose(still.mesh.positions, figure.mesh.positions, atol=1e-12)
+
+
+def test_factors_of_one_have_no_effect():
+    figure = arm()
+    same = resized(figure, limbs_of(figure), ONES, ONES)
+    assert_allclose(same.mesh.positions, figure.mesh.positions, atol=1e-12)
+    assert_allclose(same.skin.inverse_bind, figure.skin.inverse_bind, atol=1e-12)
+    assert_allclose(same.skeleton.rest_translations, figure.skeleton.rest_translations, atol=1e-12)
+
+
+def test_longer_limb_moves_its_descendants():
+    figure = arm()
+    longer = resized(figure, limbs_of(figure), np.array([2.0, 1.0]), ONES)
+    before, after = figure.mesh.positions, longer.mesh.positions
+    low, high = before[:, 1] < 0.79, before[:, 1] > 1.21
+    assert_allclose(after[low], before[low] * [1, 2, 1], atol=1e-12)
+    assert_allclose(after[high], before[high] + [0, 1, 0], atol=1e-12)
+    assert_allclose(longer.skeleton.rest_translations[1], [0, 2, 0], atol=1e-12)
+    assert_allclose(longer.skin.inverse_bind[1, :3, 3], [0, -2, 0], atol=1e-12)
+    # At rest the joints move no vertex, because binding and skeleton agree.
+    assert_allclose(deform(longer, rest_pose(longer.skeleton))[0], after, atol=1e-12)
+
+
+def test_girth_scale_keeps_the_length():
+    figure = arm()
+    thick = resized(figure, limbs_of(figure), ONES, np.array([3.0, 1.0]))
+    low = figure.mesh.positions[:, 1] < 0.79
+    assert_allclose(thick.mesh.positions[low], figure.mesh.positions[low] * [3, 1, 3], atol=1e-12)
+    assert_allclose(thick.skeleton.rest_translations[1], [0, 1, 0], atol=1e-12)
+
+
+def test_offsets_follow_a_rotated_bind_pose():
+    figure = arm()
+    axes = turn([0, 0, 1], np.pi / 2)
+    bind = np.linalg.inv(figure.skin.inverse_bind)
+    bind[:, :3, :3] = axes
+    skin = replace(figure.skin, inverse_bind=np.linalg.inv(bind))
+    rotated = replace(figure, skin=skin)
+    longer = resized(rotated, limbs_of(rotated), np.array([2.0, 1.0]), ONES)
+    # One more unit along y is a unit along x in axes rotated by 90 degrees about z.
+    assert_allclose(longer.skeleton.rest_translations[1], [1, 1, 0], atol=1e-12)

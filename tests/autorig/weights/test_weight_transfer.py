@@ -2,15 +2,27 @@ import numpy as np
 import pytest
 from faults import told
 from scipy import sparse
+from scipy.sparse import linalg as linear
 
-from viewer.autorig.correspondence import MatchSettings, Template
+from viewer.autorig.correspondence import Matches, MatchSettings, Template
+from viewer.autorig.surface.laplacian import laplacian
+from viewer.autorig.surface.welding import weld
+from viewer.autorig.weights.result import RigidIslands, match_lines, nothing_matched, rigid_lines
 from viewer.autorig.weights.weight_transfer import (
     WeightSettings,
+    inpaint,
     nearest_weights,
+    put_rows,
+    scaled_rows,
+    skin_of,
+    smooth,
     transferred_weights,
+    weight_matrix,
+    within,
 )
 from viewer.errors import RigError
 from viewer.progress import Cancelled, receiving
+from viewer.rig.geometry.closest_point import SurfacePoints
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import Skin, skin_from_entries, skin_from_lists
 
@@ -265,3 +277,345 @@ def test_settings_refuse_invalid_values():
         WeightSettings(max_influences=0)
     assert str(caught.value) == "influences: expected at least 1, found 0"
     assert WeightSettings().match == MatchSettings()
+
+
+def wavy_grid(count=9):
+    """Return a curved grid of count x count vertices."""
+    x, y = np.meshgrid(np.linspace(0, 1, count), np.linspace(0, 1, count))
+    positions = np.stack([x.ravel(), y.ravel(), 0.1 * np.sin(5 * x * y).ravel()], axis=1)
+    index = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (
+        part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    )
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return weld(positions, triangles.astype(np.int32))
+
+
+def problem(rng):
+    """Return the operators of a grid, weights of three of five joints, and the unknown vertices."""
+    mesh = wavy_grid()
+    operator, areas = laplacian(mesh)
+    count = len(areas)
+    weights = np.zeros((count, 5))
+    weights[:, [0, 2, 3]] = rng.dirichlet([1, 1, 1], count)
+    unknown = np.zeros(count, dtype=bool)
+    unknown[30:52] = True
+    weights[unknown] = 99.0  # these must not be read
+    return operator, areas, weights, unknown
+
+
+def minimiser(energy, weights, unknown):
+    """Minimise trace(W^T Q W) with fixed known rows, as one dense system with multipliers."""
+    count, known = len(weights), np.nonzero(~unknown)[0]
+    hold = np.zeros((len(known), count))
+    hold[np.arange(len(known)), known] = 1.0
+    system = np.block([[energy, hold.T], [hold, np.zeros((len(known), len(known)))]])
+    right = np.concatenate([np.zeros((count, weights.shape[1])), weights[known]])
+    found = np.linalg.solve(system, right)[:count][unknown]
+    found = np.maximum(found, 0.0)
+    return found / found.sum(axis=1, keepdims=True)
+
+
+def smooth_energy(operator, areas):
+    dense = operator.toarray()
+    return dense + dense @ np.diag(1.0 / areas) @ dense
+
+
+def run(operator, areas, weights, unknown):
+    return inpaint(operator, areas, sparse.csr_array(weights), ~unknown, unknown)
+
+
+def test_inpainting_minimises_the_energy():
+    operator, areas, weights, unknown = problem(np.random.default_rng(1))
+    found, method = run(operator, areas, weights, unknown)
+    assert method == "direct"
+    expected = minimiser(smooth_energy(operator, areas), weights, unknown)
+    # Solved weights below 1e-6 are set to 0.
+    np.testing.assert_allclose(found.toarray(), expected, atol=3e-6)
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
+    assert found.data.min() > 0.0
+    assert set(found.indices) == {0, 2, 3}
+
+
+def test_inpainting_with_one_joint_returns_that_joint():
+    operator, areas, weights, unknown = problem(np.random.default_rng(2))
+    weights[:] = [0, 1, 0, 0, 0]
+    found, _ = run(operator, areas, weights, unknown)
+    np.testing.assert_allclose(found.toarray(), weights[unknown], atol=1e-12)
+    assert found.nnz == unknown.sum()
+
+
+def test_inpainting_without_unknown_vertices_returns_no_rows():
+    operator, areas, weights, unknown = problem(np.random.default_rng(2))
+    found, _ = run(operator, areas, weights, np.zeros_like(unknown))
+    assert found.shape == (0, 5)
+
+
+def test_inpainting_skips_vertices_that_are_neither_known_nor_requested():
+    operator, areas, weights, unknown = problem(np.random.default_rng(3))
+    far = sparse.csr_array(sparse.block_diag([operator, sparse.csr_array((2, 2))]))
+    weights = np.concatenate([weights, np.full((2, 5), 7.0)])
+    matched = np.concatenate([~unknown, [False, False]])
+    wanted = np.concatenate([unknown, [False, False]])
+    found, _ = inpaint(
+        far, np.concatenate([areas, [1.0, 1.0]]), sparse.csr_array(weights), matched, wanted
+    )
+    expected, _ = run(operator, areas, weights[:-2], unknown)
+    np.testing.assert_allclose(found.toarray(), expected.toarray(), atol=1e-12)
+
+
+def failing(times):
+    """Return a factorisation that fails a given number of times before succeeding."""
+    real, calls = linear.splu, []
+
+    def splu(*arguments, **options):
+        calls.append(1)
+        if len(calls) <= times:
+            raise RuntimeError("Factor is exactly singular")
+        return real(*arguments, **options)
+
+    return splu
+
+
+@pytest.mark.parametrize(("times", "method"), [(1, "shifted"), (2, "conjugate gradients")])
+def test_inpainting_falls_back_when_the_factorisation_fails(monkeypatch, times, method):
+    monkeypatch.setattr("scipy.sparse.linalg.splu", failing(times))
+    operator, areas, weights, unknown = problem(np.random.default_rng(4))
+    found, used = run(operator, areas, weights, unknown)
+    assert used == method
+    expected = minimiser(smooth_energy(operator, areas), weights, unknown)
+    np.testing.assert_allclose(found.toarray(), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("times", "method"), [(2, "harmonic"), (9, "harmonic, conjugate gradients")]
+)
+def test_inpainting_falls_back_to_harmonic_weights(monkeypatch, times, method):
+    monkeypatch.setattr("scipy.sparse.linalg.splu", failing(times))
+    operator, areas, weights, unknown = problem(np.random.default_rng(5))
+    areas = areas.copy()
+    # With areas this uneven, the conjugate gradients of the smooth energy do not converge.
+    areas[unknown] *= np.logspace(-16, 0, unknown.sum())
+    found, used = run(operator, areas, weights, unknown)
+    assert used == method
+    expected = minimiser(operator.toarray(), weights, unknown)
+    np.testing.assert_allclose(found.toarray(), expected, atol=3e-6)
+
+
+def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
+    operator, areas, weights, unknown = problem(np.random.default_rng(6))
+    # The vertex is disconnected from all known vertices.
+    inside, outside = np.nonzero(unknown)[0], np.nonzero(~unknown)[0]
+    dense = operator.toarray()
+    dense[np.ix_(inside, outside)] = 0.0
+    dense[np.ix_(outside, inside)] = 0.0
+    with pytest.raises(RigError) as caught:
+        run(sparse.csr_array(dense), areas, weights, unknown)
+    assert str(caught.value) == (
+        "the weights of unmatched vertices could not be computed: the mesh is too irregular"
+    )
+
+
+def test_inpainting_can_be_cancelled():
+    operator, areas, weights, unknown = problem(np.random.default_rng(7))
+
+    def stop(done, total, unit, what):
+        raise Cancelled
+
+    with pytest.raises(Cancelled), receiving(stop):
+        run(operator, areas, weights, unknown)
+
+
+def test_inpainting_solves_in_blocks_of_joints(monkeypatch):
+    operator, areas, weights, unknown = problem(np.random.default_rng(8))
+    whole, _ = run(operator, areas, weights, unknown)
+    monkeypatch.setattr("viewer.autorig.weights.weight_transfer._BLOCK", 1)
+    seen = []
+    with receiving(lambda *step: seen.append(step)):
+        single, _ = run(operator, areas, weights, unknown)
+    np.testing.assert_allclose(single.toarray(), whole.toarray(), atol=1e-12)
+    assert [step[3] for step in seen] == ["factorising"] + 3 * ["inpainting weights"]
+    assert [step[:2] for step in seen] == [(0, 100), (0, 100), (33, 100), (67, 100)]
+
+
+STRIP = np.array([[0, 1, 2], [2, 1, 3]])  # edges 01 02 12 13 23
+
+
+def test_smoothing_adds_a_fifth_of_the_neighbour_mean():
+    weights = sparse.csr_array(np.array([[1.0, 0], [0, 1], [0, 1], [0, 1]]))
+    active = np.array([True, False, False, True])
+    found = smooth(weights, STRIP, active, 1).toarray()
+    np.testing.assert_allclose(found, [[0.8, 0.2], [0, 1], [0, 1], [0, 1]], atol=1e-12)
+    found = smooth(weights, STRIP, active, 2).toarray()
+    np.testing.assert_allclose(found[0], [0.64, 0.36], atol=1e-12)
+
+
+def test_smoothing_reads_the_previous_iteration():
+    weights = np.eye(4)
+    mean = np.array([[0, 1, 1, 0], [1, 0, 1, 1], [1, 1, 0, 1], [0, 1, 1, 0]])
+    step = 0.8 * np.eye(4) + 0.2 * mean / mean.sum(axis=1, keepdims=True)
+    found = smooth(sparse.csr_array(weights), STRIP, np.ones(4, dtype=bool), 3).toarray()
+    np.testing.assert_allclose(found, np.linalg.matrix_power(step, 3), atol=1e-12)
+
+
+def test_smoothing_skips_isolated_vertices_and_drops_tiny_weights():
+    weights = sparse.csr_array(np.array([[1.0, 0], [1, 0], [1, 0], [1 - 1e-8, 1e-8], [0.5, 0.5]]))
+    active = np.array([True, True, False, False, True])
+    found = smooth(weights, STRIP, active).toarray()
+    assert found[2:].tolist() == weights.toarray()[2:].tolist()
+    # The tiny weight spreads to vertex 1, where it is dropped.
+    np.testing.assert_allclose(found[:2], [[1.0, 0.0], [1.0, 0.0]], atol=0.0)
+
+
+def test_smoothing_keeps_sums():
+    rng = np.random.default_rng(1)
+    rows = rng.dirichlet([1, 1, 1], 4) * np.array([[1.0], [1], [1], [1]])
+    found = smooth(sparse.csr_array(rows), STRIP, np.ones(4, dtype=bool))
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_within_follows_edges():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [3, 0, 0], [0, 0, 0.1]])
+    sources = np.array([True, False, False, False, False])
+    assert within(positions, STRIP, sources, 0.9).tolist() == [1, 0, 0, 0, 0]
+    assert within(positions, STRIP, sources, 1.0).tolist() == [1, 1, 0, 0, 0]
+    assert within(positions, STRIP, sources, 1.5).tolist() == [1, 1, 1, 0, 0]
+    # Vertex 4 is near but not connected by an edge.
+    assert within(positions, STRIP, sources, 9.0).tolist() == [1, 1, 1, 1, 0]
+
+
+def test_within_without_sources_is_empty():
+    positions = np.zeros((4, 3))
+    assert not within(positions, STRIP, np.zeros(4, dtype=bool), 1.0).any()
+
+
+ALL = np.array([[0, 1, 2]])
+
+
+def test_weight_matrix_sums_and_normalises_weights():
+    skin = skin_from_lists([[(0, 0.5), (2, 1.0), (0, 0.5)], [(1, 4.0)], [(1, 1), (2, 0)]], BIND)
+    matrix = weight_matrix(skin, ALL)
+    assert matrix.toarray().tolist() == [[0.5, 0.0, 0.5], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+    assert matrix.nnz == 4
+
+
+def test_weight_matrix_ignores_negative_weights():
+    skin = skin_from_lists([[(0, 1.0), (1, -0.25)], [(1, 1.0)], [(1, 1.0)]], BIND)
+    assert weight_matrix(skin, ALL).toarray()[0].tolist() == [1.0, 0.0, 0.0]
+
+
+def test_weight_matrix_requires_weights_only_for_used_vertices():
+    skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], []], BIND)
+    assert weight_matrix(skin, ALL).toarray()[3].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_weight_matrix_reports_the_first_vertex_without_weights():
+    skin = skin_from_lists([[(0, 1.0)], [(1, 0.0)], []], BIND)
+    with pytest.raises(RigError) as caught:
+        weight_matrix(skin, ALL)
+    assert str(caught.value) == (
+        "template: expected weights for every vertex, found none for 2 of 3, the first is vertex 1"
+    )
+
+
+def test_weight_matrix_refuses_a_skin_of_a_different_mesh():
+    skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)]], BIND)
+    with pytest.raises(RigError) as caught:
+        weight_matrix(skin, ALL)
+    assert str(caught.value) == "template: expected weights for 3 vertices, found 2"
+
+
+def test_skin_of_is_the_inverse_of_weight_matrix():
+    rows = sparse.csr_array(np.array([[0.25, 0, 0.75], [0, 1, 0], [0.5, 0.25, 0.25]]))
+    skin = skin_of(rows, BIND)
+    assert skin.starts.tolist() == [0, 2, 3, 6]
+    assert weight_matrix(skin, ALL).toarray().tolist() == rows.toarray().tolist()
+
+
+def test_skin_of_keeps_the_strongest_weights_if_requested():
+    rows = sparse.csr_array(np.array([[0.25, 0, 0.75], [0, 1, 0], [0.5, 0.125, 0.375]]))
+    skin = skin_of(rows, BIND, 1)
+    assert skin.joints.tolist() == [2, 1, 0]
+    assert skin.weights.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_scaled_rows_empties_rows_with_factor_zero():
+    found = scaled_rows(sparse.csr_array(np.array([[1.0, 2.0], [3.0, 4.0]])), np.array([0.0, 2.0]))
+    assert found.toarray().tolist() == [[0.0, 0.0], [6.0, 8.0]]
+    assert found.nnz == 2
+
+
+def test_put_rows_replaces_rows():
+    rows = sparse.csr_array(np.array([[1.0, 0], [0, 1], [0.5, 0.5]]))
+    values = sparse.csr_array(np.array([[0.25, 0.75], [0, 1]]))
+    found = put_rows(rows, np.array([2, 0]), values)
+    assert found.toarray().tolist() == [[0, 1], [0, 1], [0.25, 0.75]]
+
+
+def matches(matched, inside_out=()):
+    count = len(matched)
+    points = SurfacePoints(
+        np.zeros(count, int),
+        np.tile([1.0, 0, 0], (count, 1)),
+        np.zeros((count, 3)),
+        np.zeros(count),
+    )
+    return Matches(points, np.array(matched), np.zeros(count), np.array(inside_out, dtype=np.int32))
+
+
+def test_match_report_counts_vertices():
+    found = matches([True, True, True, False])
+    assert told(match_lines(found, ~found.matched, "direct")) == [
+        ("R005.matched", {"n": 3, "all": 4, "ratio": 0.75, "inpainted": 1})
+    ]
+
+
+def test_match_report_mentions_exceptions():
+    found = matches([True, False, False, False], [0, 2])
+    lines = match_lines(found, ~found.matched, "harmonic")
+    assert told(lines) == [
+        ("R005.matched", {"n": 1, "all": 4, "ratio": 0.25, "inpainted": 3}),
+        ("R006.matched", {"limit": 0.75}),
+        ("R005.reversed", {"n": 2}),
+        ("R005.solver", {"method": "harmonic"}),
+    ]
+    assert [line.severity for line in lines] == ["note", "warning", "note", "note"]
+    assert lines[1].labelled == (
+        "warning: less than 75% of the target matches the template: check the "
+        "alignment or allow a larger distance"
+    )
+
+
+def test_match_report_uses_the_singular_for_one_part():
+    found = matches([True, True], [0])
+    (line,) = match_lines(found, ~found.matched, "direct")[1:]
+    assert str(line) == (
+        "1 part of the target is wound opposite to the template: matched with reversed normals"
+    )
+
+
+def islands(counts):
+    number = np.arange(len(counts), dtype=np.int32)
+    return RigidIslands(10 * number, np.array(counts), number, np.zeros(len(counts)))
+
+
+def test_rigid_part_report_lists_the_largest_first():
+    assert told(rigid_lines(islands([1, 30]))) == [
+        ("R007.part", {"n": 30, "vertex": 10, "joint": 1}),
+        ("R007.part", {"n": 1, "vertex": 0, "joint": 0}),
+    ]
+    assert rigid_lines(islands([])) == ()
+
+
+def test_rigid_part_report_counts_unnamed_parts():
+    lines = rigid_lines(islands([9, 8, 7, 6, 5, 4, 3]))
+    assert len(lines) == 6
+    assert told(lines[-1:]) == [("R007.more-parts", {"n": 2})]
+    assert told(rigid_lines(islands([9, 8, 7, 6, 5, 4])))[-1] == ("R007.more-parts", {"n": 1})
+
+
+def test_no_match_reports_the_distance():
+    assert nothing_matched(np.array([1.0, 3.0, 9.0]), 10.0) == (
+        "no vertex of the target meets the template: expected a target aligned with it, found "
+        "it at a median distance of 30.0% of the target's size"
+    )

@@ -2,6 +2,9 @@
 
 import csv
 import json
+import re
+import shlex
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +14,15 @@ from formats.bvh_text import person
 from formats.synthetic_smpl import model
 
 import viewer
+from viewer.batching.engines._cluster_text import parse_cluster
+from viewer.batching.items import Item
+from viewer.batching.naming import template_of
 from viewer.batching.report import read_results
+from viewer.batching.running import shard_of
 from viewer.cli import run
+from viewer.commands import render
+from viewer.commands._batch import jobs
+from viewer.commands._batch.jobs import JOBS, CommandJob, job_parser
 from viewer.errors import ViewerError
 
 BROKEN = "balljoint root {\noffset 0 zero 0\n}"
@@ -360,3 +370,47 @@ def test_every_job_writes_a_page_and_sheets_without_images_are_refused_first(rig
     assert not Path("new").exists() and not Path("c.png").exists()
     assert run(["batch", "info", "in/a", "--overview", "o.html"]) == 0
     assert "one: 2 joints" in Path("o.html").read_text()
+
+
+def test_workers_that_render_use_separate_devices_unless_one_is_given(monkeypatch) -> None:
+    used = []
+    monkeypatch.setattr(render, "run", lambda arguments: used.append(arguments.gpu) or 0)
+    monkeypatch.setattr(jobs, "_device", lambda: 3)
+    item = Item(0, ("a.glb",), "", "a.glb")
+    for given in (None, 1):
+        job = CommandJob("render", Namespace(files=[], gpu=given))
+        assert job(item).status == "done" and job.uses_gpu
+    assert used == [3, 1]
+
+
+def test_process_of_the_batch_uses_the_default_device() -> None:
+    assert jobs._device() is None
+
+
+PAGE = Path(viewer.__file__).parent / "manual" / "batches.md"
+
+
+def commands() -> list[str]:
+    """Return the command lines in the page's blocks, with continued lines joined."""
+    blocks = re.findall(r"```sh\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.startswith("viewer batch ")]
+
+
+def test_page_has_a_command_of_each_kind() -> None:
+    assert {line.split()[2] for line in commands()} == JOBS.keys() - {"rig"}
+
+
+@pytest.mark.parametrize("line", commands())
+def test_command_of_the_page_is_valid(line) -> None:
+    line = line.replace("$SLURM_ARRAY_TASK_ID", "0").replace("$SLURM_ARRAY_TASK_COUNT", "8")
+    words = shlex.split(line, comments=True)[2:]
+    parser = job_parser(words[0])
+    parser.check_options(words)
+    arguments = parser.parse_intermixed_args(words)
+    if arguments.cluster:
+        parse_cluster(arguments.cluster)
+    if arguments.shard:
+        assert shard_of(range(8), arguments.shard) == [0]
+    if getattr(arguments, "output", None):
+        assert template_of(arguments.output, arguments.to or JOBS[words[0]].suffix)

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from app.tiny import write_rig
 from export.gltf.two_parts import two_parts
+from export.plain_gltf import Gltf
 from exporting import export_clips
+from formats.capture_files import body, write_frames
 from formats.synthetic_smpl import model
+from formats.vrm.swinging import HAIR, swinging
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
+from viewer.loading import MotionSettings, load
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
 from viewer.rig.motion.evaluation import pose_actors
 from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning, deform
 
 
 @pytest.fixture
@@ -231,3 +237,221 @@ def test_optimisation_of_other_formats_is_refused(tmp_path, capsys):
     command = ["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.bvh", "--optimize"]
     assert run(command) == 2
     assert "--optimize: expected .glb, .gltf or .vrm, found .bvh" in capsys.readouterr().err
+
+
+def places(actor, time):
+    pose_actors([actor], time)
+    names = actor.figure.require_skeleton().names
+    matrices = viewer.joint_matrices(actor.figure, actor.pose)
+    return matrices[[names.index(name) for name in HAIR], :3, 3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bakes", [False, True])
+def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
+    path, out = tmp_path / "ada.vrm", tmp_path / "out.glb"
+    file = swinging()
+    path.write_bytes(file.glb())
+    options = ["--bake-springs"] if bakes else []
+    assert run(["convert", str(path), "-o", str(out), "--fps", "60", *options]) == 0
+    said = capsys.readouterr().out
+    assert ("simulated rotations of 3 spring joints are written" in said) == bakes
+    assert "the humanoid bone map, 1 spring chain, authors and licence of the VRM" in said
+    assert ("viewer convert --bake-springs writes the simulated ones" in said) == (not bakes)
+    (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
+    (found,) = load(out).actors
+    for time in (0.5, 1.0):
+        # The file has single precision.
+        assert_allclose(places(found, time), places(wanted, time), rtol=0, atol=1e-6)
+
+
+def test_figures_without_springs_are_refused(tmp_path, capsys):
+    path = tmp_path / "ada.vrm"
+    file = swinging()
+    del file.root["extensions"]["VRMC_springBone"]
+    path.write_bytes(file.glb())
+    out = str(tmp_path / "a.glb")
+    assert run(["convert", str(path), "-o", out, "--bake-springs"]) == 2
+    said = capsys.readouterr().err
+    assert "--bake-springs: no figure with a motion has spring joints" in said
+    assert np.array_equal([*tmp_path.iterdir()], [path])
+
+
+@pytest.mark.parametrize("suffix", [".vrm", ".vrma"])
+def test_formats_without_such_motions_are_refused(tmp_path, capsys, suffix):
+    path = tmp_path / "ada.vrm"
+    path.write_bytes(swinging().glb())
+    assert run(["convert", str(path), "-o", f"{tmp_path}/a{suffix}", "--bake-springs"]) == 2
+    said = capsys.readouterr().err
+    assert f"--bake-springs: {suffix} cannot store motions of spring joints" in said
+    assert [*tmp_path.iterdir()] == [path]
+
+
+TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)
+OVER = np.diag([1.0, -1.0, -1.0])
+
+
+@pytest.fixture
+def upright_recording(tmp_path):
+    """A model with y up, and a folder of two frames of a person upright along z."""
+    path = tmp_path / "SMPL.npz"
+    np.savez(path, **model("smpl"))
+    folder = tmp_path / "take" / "smpl"
+    folder.mkdir(parents=True)
+    for frame in range(2):
+        poses = np.zeros(72)
+        poses[12] = 0.1 * frame
+        record = {"id": 0, "Rh": [[np.pi / 2, 0, 0]], "Th": [[1.0, 2.0, 3.0 + frame]]}
+        record |= {"poses": [poses.tolist()], "shapes": [[0.5] + [0.0] * 9]}
+        (folder / f"{frame:06}.json").write_text(json.dumps([record]))
+    return tmp_path / "take", path
+
+
+def wanted(recording, up="z"):
+    """Return the vertices in the world of the capture, without correctives."""
+    folder, path = recording
+    settings = MotionSettings(model=path, up=up)
+    (actor,) = viewer.load(folder, motion=settings).actors
+    pose_actors([actor], 1 / 30)
+    return deform(actor.figure, actor.pose, Skinning(correctives=False))[0]
+
+
+def convert_one_frame(recording, out, *options):
+    folder, path = recording
+    files = [str(folder), "--model", str(path), "-o", str(out), "--frame", "1", *options]
+    assert run(["convert", *files]) == 0
+
+
+@pytest.mark.parametrize(("up", "turn"), [("z", TO_Y), ("y", np.eye(3)), ("-y", OVER)])
+def test_gltf_of_one_frame_has_y_up(upright_recording, tmp_path, up, turn):
+    out = tmp_path / "pose.glb"
+    convert_one_frame(upright_recording, out, f"--up={up}")
+    gltf = Gltf(out)
+    found = gltf.vertices()[0]
+    assert_allclose(found, wanted(upright_recording, up) @ turn.T, rtol=0, atol=1e-5)
+
+
+def test_standing_people_are_upright_in_gltf(upright_recording, tmp_path):
+    convert_one_frame(upright_recording, tmp_path / "pose.glb")  # z is detected as the up axis
+    gltf = Gltf(tmp_path / "pose.glb")
+    world = gltf.world()
+    head, pelvis = (world[gltf.named(name), :3, 3] for name in ("head", "pelvis"))
+    rest = viewer.load(upright_recording[1]).actors[0]
+    joints = viewer.joint_matrices(rest.figure, rest.pose)[:, :3, 3]
+    names = rest.figure.skeleton.names
+    height = (joints[names.index("head")] - joints[names.index("pelvis")])[1]
+    assert (head - pelvis)[1] == pytest.approx(height, rel=0.2)
+    assert gltf.nodes[gltf.top(gltf.named("head"))]["name"] == "z up"
+
+
+def test_other_formats_record_the_up_axis(upright_recording, tmp_path):
+    convert_one_frame(upright_recording, tmp_path / "pose.obj")
+    assert ": z up, metres\n" in (tmp_path / "pose.obj").read_text().partition("v ")[0]
+    convert_one_frame(upright_recording, tmp_path / "pose.npz")
+    with np.load(tmp_path / "pose.npz") as arrays:
+        assert str(arrays["up"]) == "z"
+    convert_one_frame(upright_recording, tmp_path / "over.npz", "--up=-y")
+    with np.load(tmp_path / "over.npz") as arrays:
+        assert str(arrays["up"]) == "y"
+        found = arrays["vertices"][:, 1]
+    assert_allclose(found, -heights_in_capture(upright_recording), rtol=0, atol=1e-9)
+
+
+def heights_in_capture(recording):
+    folder, path = recording
+    (actor,) = viewer.load(folder, motion=MotionSettings(model=path, up="y")).actors
+    pose_actors([actor], 1 / 30)
+    return deform(actor.figure, actor.pose)[0][:, 1]
+
+
+@pytest.fixture
+def smpl(tmp_path):
+    path = tmp_path / "SMPL.npz"
+    np.savez(path, **model("smpl"))
+    return path
+
+
+@pytest.fixture
+def hanging(tmp_path):
+    """Bodies upright along y that are explicitly rotated upside down."""
+    frames = {}
+    for frame in range(3):
+        record = body(0, seed=0.01 * frame)
+        turn = rotation_vector_to_matrix(np.array(record["Rh"][0]))
+        record["Rh"] = [matrix_to_rotation_vector(OVER @ turn).tolist()]
+        record["Th"] = [(OVER @ np.array(record["Th"][0])).tolist()]
+        frames[frame] = [record]
+    write_frames(tmp_path / "take" / "smpl", frames)
+    return tmp_path / "take"
+
+
+def records(folder):
+    return [json.loads(path.read_text())[0] for path in sorted((folder / "smpl").iterdir())]
+
+
+def converted(*arguments):
+    assert run(["convert", *map(str, arguments)]) == 0
+
+
+def test_upside_down_world_is_reported_when_detected(hanging, smpl):
+    scene = viewer.load(smpl, hanging)
+    told = (
+        f"{hanging}: -y up, estimated from the poses: the capture is upside down and is rotated "
+        "upright; --up overrides it"
+    )
+    assert told in scene.warnings
+    assert scene.up == "y"
+    assert_allclose(scene.actors[0].placement[:3, :3], OVER, atol=1e-12)
+
+
+def test_easymocap_round_trips_its_values(hanging, smpl, tmp_path, capsys):
+    converted(hanging, "--model", smpl, "-o", tmp_path / "back")
+    assert ", -y up; " in capsys.readouterr().out
+    for found, wanted in zip(records(tmp_path / "back"), records(hanging), strict=True):
+        for key in ("Rh", "Th"):
+            assert_allclose(found[key], wanted[key], atol=1e-9)
+
+
+def test_amass_keeps_the_capture_values_and_round_trips(hanging, smpl, tmp_path):
+    converted(hanging, "--model", smpl, "-o", tmp_path / "m.npz")
+    (path,) = tmp_path.glob("m*.npz")
+    first = viewer.load(smpl, hanging)
+    with np.load(smpl) as arrays:  # J0 of the shaped body, from the arrays of the model
+        shape = first.actors[0].pose.shape_weights
+        vertices = arrays["v_template"] + arrays["shapedirs"][:, :, : len(shape)] @ shape
+        regressor = arrays["J_regressor"]
+        root = (regressor @ vertices)[0]
+    with np.load(path) as arrays:
+        assert str(arrays["up"]) == "-y"
+        for record, trans in zip(records(hanging), arrays["trans"], strict=True):
+            turn = rotation_vector_to_matrix(np.array(record["Rh"][0]))
+            # The specification: transl = T + R J0 - J0.
+            assert_allclose(trans, np.array(record["Th"][0]) + turn @ root - root, atol=1e-6)
+    second = viewer.load(smpl, path)
+    for one, other in zip(first.actors, second.actors, strict=True):
+        assert_allclose(
+            viewer.deform(one.figure, one.pose)[0], viewer.deform(other.figure, other.pose)[0],
+            atol=1e-6,
+        )  # fmt: skip
+        assert_allclose(one.placement, other.placement, atol=1e-12)
+
+
+def test_amass_with_a_different_requested_up_axis_is_upright(hanging, smpl, tmp_path):
+    converted(hanging, "--model", smpl, "-o", tmp_path / "m.npz", "--to-up", "y")
+    (path,) = tmp_path.glob("m*.npz")
+    scene = viewer.load(smpl, path)
+    assert scene.up == "y" and scene.warnings == ()
+    names = scene.actors[0].figure.skeleton.names
+    joints = viewer.joint_matrices(scene.actors[0].figure, scene.actors[0].pose)[:, 1, 3]
+    assert joints[names.index("head")] > joints[names.index("pelvis")]
+
+
+def test_up_axis_is_inferred_from_the_people_if_not_recorded(smpl, tmp_path):
+    # A rotation by 90 degrees about x maps the model's up axis y to z.
+    poses = np.zeros((4, 72))
+    poses[:, 0] = np.pi / 2
+    np.savez(tmp_path / "m.npz", poses=poses, trans=np.zeros((4, 3)), fps=np.array(25))
+    scene = viewer.load(smpl, tmp_path / "m.npz")
+    assert scene.up == "z"
+    told = f"{tmp_path / 'm.npz'}: z up, estimated from the poses; --up overrides it"
+    assert told in scene.warnings

@@ -13,6 +13,7 @@ from exporting import export_clips, export_figures
 from formats.gltf.files import File, animated, skinned
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
+from two_parts import two_parts
 
 import viewer
 from viewer.export import export
@@ -21,7 +22,9 @@ from viewer.formats.gltf import read_nodes
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning, deform
 
 PIXELS = np.arange(48, dtype=np.uint8).reshape(3, 4, 4) | 128
 
@@ -44,7 +47,7 @@ def jpeg() -> Texture:
     )
 
 
-def two_parts() -> Mesh:
+def roof_of_two_parts() -> Mesh:
     """Return a roof with triangles of two parts and two materials."""
     painted = Material(
         "painted", jpeg(), (1.0, 1.0, 1.0, 1.0), 0.5, 0.25, double_sided=False, is_physical=True
@@ -72,7 +75,7 @@ def corners(mesh: Mesh, name: str) -> np.ndarray:
 
 
 def test_parts_colours_and_materials_round_trip(tmp_path):
-    wanted = two_parts()
+    wanted = roof_of_two_parts()
     export(Actor(Figure("roof", wanted, unit="m")), tmp_path / "roof.glb")
     found = viewer.load(tmp_path / "roof.glb").actors[0].figure.mesh
     assert found.parts == ("hull", "lid")
@@ -100,7 +103,7 @@ def test_parts_colours_and_materials_round_trip(tmp_path):
 
 
 def test_parts_are_separate_meshes_and_nodes(tmp_path):
-    export(Actor(Figure("roof", two_parts(), unit="m")), tmp_path / "roof.glb")
+    export(Actor(Figure("roof", roof_of_two_parts(), unit="m")), tmp_path / "roof.glb")
     file = read_nodes(Source.open(tmp_path / "roof.glb"))
     assert [mesh.name for mesh in file.meshes] == ["hull", "lid"]
     names = [file.tree.names[node] for node in np.flatnonzero(file.tree.meshes >= 0)]
@@ -194,3 +197,64 @@ def test_names_are_kept_or_listed(tmp_path: Path, called: str) -> None:
     assert root["cameras"][0]["name"] == (called or "lens")
     (note,) = [note for note in notes if note.key == "X003.file-members"]
     assert set(note.values["names"]) == {"samplers.name", *(["cameras.name"] if called else [])}
+
+
+STEP = 1.0 / 32767.0  # relative to half the size of 2 units
+
+
+def document(path) -> tuple[dict, bytes]:
+    data = path.read_bytes()
+    (size,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def test_attributes_are_normalised_integers_with_exact_sums(tmp_path):
+    export_clips(Actor(two_parts()), tmp_path / "small.glb", optimizes=True)
+    root, binary = document(tmp_path / "small.glb")
+    assert root["extensionsUsed"] == root["extensionsRequired"] == ["KHR_mesh_quantization"]
+    (bar,) = (mesh for mesh in root["meshes"] if mesh["name"] == "bar mesh")
+    attributes = bar["primitives"][0]["attributes"]
+    accessors = {name: root["accessors"][index] for name, index in attributes.items()}
+    kinds = {name: each["componentType"] for name, each in accessors.items()}
+    assert kinds == {"POSITION": 5122, "NORMAL": 5122, "JOINTS_0": 5121, "WEIGHTS_0": 5123}
+    assert all(root["accessors"][index]["normalized"] for index in (attributes["POSITION"],))
+    for name in ("POSITION", "NORMAL"):
+        assert root["bufferViews"][accessors[name]["bufferView"]]["byteStride"] == 8
+    start = root["bufferViews"][accessors["WEIGHTS_0"]["bufferView"]]["byteOffset"]
+    weights = np.frombuffer(binary, "<u2", 24, start).reshape(6, 4)
+    assert weights.sum(axis=1).tolist() == [65535] * 6
+
+
+def test_quantised_figure_moves_like_the_original(tmp_path):
+    figure = two_parts()
+    notes = export_clips(Actor(figure), tmp_path / "small.glb", optimizes=True)
+    back = viewer.load(tmp_path / "small.glb").actors[0].figure
+    (measured,) = (note.values["distance"] for note in notes if note.key == "X002.animations")
+    assert 0.0 < measured < 3.0 * STEP
+    order = [6, 7, 8, 0, 1, 2, 3, 4, 5]
+    for animation, other in zip(figure.animations, back.animations, strict=True):
+        for time in (0.2, 0.7, 1.4):
+            shapes = []
+            for each, played in ((figure, animation), (back, other)):
+                frames = frames_of(each, played.clip(), np.array([time]))
+                shapes.append(deform(each, pose_of(each, frames, 0), Skinning())[0])
+            assert_allclose(shapes[1], shapes[0][order], rtol=0, atol=3.0 * STEP)
+
+
+@pytest.mark.parametrize("unbound", [False, True])
+def test_single_pose_is_quantised(tmp_path, unbound):
+    figure = replace(two_parts(), animations=(), record=None)
+    if unbound:
+        figure = replace(figure, skin=None, skeleton=None)
+    notes = viewer.export(Actor(figure), tmp_path / "small.glb", optimizes=True)
+    assert "X002.quantized" in [note.key for note in notes]
+    back = viewer.load(tmp_path / "small.glb").actors[0]
+    found = deform(back.figure, back.pose, Skinning())[0]
+    for point in figure.mesh.positions:
+        assert np.linalg.norm(found - point, axis=1).min() < 2.0 * STEP
+
+
+def test_optimisation_of_other_formats_is_refused(tmp_path):
+    with pytest.raises(viewer.ViewerError, match=r"\.obj: only glTF files can be optimised"):
+        export(Actor(two_parts()), tmp_path / "small.obj", optimizes=True)
+    assert not (tmp_path / "small.obj").exists()

@@ -1,7 +1,12 @@
 """The ``.fbx`` reader: contents, units and axes, and failures of the child process."""
 
+import gc
+import os
+import sys
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +16,10 @@ from numpy.testing import assert_allclose
 from viewer.errors import FormatError
 from viewer.formats import Source
 from viewer.formats._scene_graph.content import NodeFile
-from viewer.formats.fbx.contents import node_file
+from viewer.formats.fbx import worker
+from viewer.formats.fbx.contents import materials_of, node_file
 from viewer.formats.fbx.message import packed, unpacked
+from viewer.media.png import encode_png
 
 needs_ufbx = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")
 
@@ -198,3 +205,86 @@ def _posed(content: NodeFile, keys: dict[tuple[int, str], np.ndarray]) -> np.nda
             )
             found.append((total @ [*position, 1.0])[:3] / weights.sum())
     return np.array(found)
+
+
+GREY = encode_png(np.full((1, 1, 4), 128, dtype=np.uint8))
+NAMES = (
+    *("base_factor", "base_color", "roughness", "metalness", "emission_factor"),
+    *("emission_color", "opacity", "normal_map", "ambient_occlusion"),
+)
+VALUES = {
+    "emission_factor": [0.5],
+    "emission_color": [0.0, 0.0, 0.2, 1.0],
+    "metalness": [0.25],
+    "roughness": [0.75],
+}
+
+
+def material(content: bytes, textured: tuple[str, ...]) -> Any:
+    """Return a material with values, and a texture on some properties."""
+    told: dict[str, Any] = {"name": "skin", "is_physical": True}
+    for name in NAMES:
+        number = 0 if name in textured else None
+        told[name] = {"value": VALUES.get(name), "texture": number}
+    stated = {
+        "names": ["map.png"],
+        "uv_set": "",
+        "wrap": ["repeat", "repeat"],
+        "transform": np.eye(4).tolist(),
+    }
+    message = {"materials": [told], "textures": [stated], "meshes": []}
+    arrays = {"texture0": np.frombuffer(content, dtype=np.uint8)}
+    (found,) = materials_of(Source(Path("figure.fbx"), b""), arrays, message)
+    return found
+
+
+def test_values_apply_without_textures() -> None:
+    found = material(GREY, ())
+    assert (found.metallic, found.roughness) == (0.25, 0.75)
+    assert found.emissive == pytest.approx((0.0, 0.0, 0.1))
+
+
+def test_textures_replace_values() -> None:
+    found = material(GREY, ("metalness", "roughness", "emission_color"))
+    assert (found.metallic, found.roughness) == (1.0, 1.0)
+    assert found.emissive == pytest.approx((0.5, 0.5, 0.5))
+    assert found.emissive_texture.image is not None
+
+
+def test_values_replace_textures_that_cannot_be_read() -> None:
+    found = material(b"not an image", ("metalness", "roughness", "emission_color"))
+    assert (found.metallic, found.roughness) == (0.25, 0.75)
+    assert found.emissive == pytest.approx((0.0, 0.0, 0.1))
+    assert found.metallic_texture.image is None
+
+
+def test_objects_of_the_library_live_until_the_process_exits(
+    monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    events = []
+
+    class Scene:
+        def __init__(self, *_arguments: object) -> None:
+            pass
+
+        def message(self, _stack: list[str]) -> tuple[dict[str, object], dict[str, object]]:
+            return {}, {"names": ["root"]}
+
+        def __del__(self) -> None:
+            events.append("destroyed")
+
+    def leave(code: int) -> None:
+        events.append(f"exit {code}")
+        raise SystemExit
+
+    monkeypatch.setitem(sys.modules, "ufbx", SimpleNamespace(UfbxError=RuntimeError))
+    monkeypatch.setattr(worker, "_Scene", Scene)
+    monkeypatch.setattr(os, "_exit", leave)
+    try:
+        with pytest.raises(SystemExit):
+            worker.main(["figure.fbx"])
+    finally:
+        gc.enable()
+    assert events[0] == "exit 0"
+    message = unpacked(capfdbinary.readouterr().out)
+    assert message is not None and message[1] == {"names": ["root"]}

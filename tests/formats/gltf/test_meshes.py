@@ -1,5 +1,7 @@
 """Meshes: modes, shared vertices, attributes, influences and morph targets."""
 
+import sys
+
 import numpy as np
 import pytest
 from formats.gltf.files import TRIANGLE, File, read, refused, skinned, source_of, warned
@@ -242,3 +244,140 @@ def test_invalid_primitives_are_refused(members: dict[str, object], key: str, po
     file.accessor([0.0, 1.0, 2.0])
     file.primitive.update(members)
     assert refused(file) == (key, f"/meshes/0/primitives/0{pointer}")
+
+
+MOVED = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1]
+
+
+def bound(matrices: list[list[float]]) -> File:
+    file = skinned()
+    file.root["skins"][0]["inverseBindMatrices"] = file.accessor(matrices)
+    return file
+
+
+def test_joints_and_matrices_are_read() -> None:
+    [skin] = read(bound([MOVED, MOVED])).skins
+    assert skin.joints.tolist() == [1, 2]
+    assert skin.inverse_bind[1, :3, 3].tolist() == [1, 2, 3]
+
+
+def test_missing_matrices_are_the_identity() -> None:
+    [skin] = read(skinned()).skins
+    assert skin.inverse_bind.tolist() == [np.eye(4).tolist()] * 2
+
+
+def test_surplus_matrices_are_ignored_with_a_warning() -> None:
+    file = bound([MOVED] * 3)
+    assert read(file).skins[0].inverse_bind.shape == (2, 4, 4)
+    assert warned(file) == [("G004.bind-count", "/skins/0/inverseBindMatrices")]
+
+
+@pytest.mark.parametrize(
+    ("matrices", "key"),
+    [
+        ([MOVED], "F002.gltf-bind-count"),
+        ([MOVED, [*MOVED[:15], 2.0]], "F002.gltf-bind-row"),
+        ([MOVED, [*MOVED[:3], 1.0, *MOVED[4:]]], "F002.gltf-bind-row"),
+        ([[np.nan, *MOVED[1:]], MOVED], "F003.gltf-bind"),
+    ],
+)
+def test_invalid_matrices_are_refused(matrices: list[list[float]], key: str) -> None:
+    assert refused(bound(matrices)) == (key, "/skins/0/inverseBindMatrices")
+
+
+@pytest.mark.parametrize(
+    ("skin", "key", "pointer"),
+    [
+        ({"joints": [1, 3]}, "F002.gltf-index", "/joints/1"),
+        ({"joints": [1, "2"]}, "F002.gltf-type", "/joints/1"),
+        ({}, "F002.gltf-missing", ""),
+        ({"joints": [1, 2], "inverseBindMatrices": 3}, "F002.gltf-index", "/inverseBindMatrices"),
+        ({"joints": [1, 2], "inverseBindMatrices": 0}, "F002.gltf-kind", "/inverseBindMatrices"),
+    ],
+)
+def test_invalid_skins_are_refused(skin: dict[str, object], key: str, pointer: str) -> None:
+    file = skinned()
+    file.root["skins"] = [skin]
+    assert refused(file) == (key, f"/skins/0{pointer}")
+
+
+def test_skin_without_joints_is_ignored() -> None:
+    file = skinned()
+    file.root["skins"][0]["joints"] = []
+    file.root["skins"].append({"joints": [2]})
+    file.root["nodes"][2]["skin"] = 1
+    content = read(file)
+    assert [skin.joints.tolist() for skin in content.skins] == [[2]]
+    assert content.tree.skins.tolist() == [-1, -1, 0]
+    assert warned(file) == [("G004.no-joints", "/skins/0/joints")]
+
+
+def test_skeleton_that_is_not_a_node_is_ignored() -> None:
+    file = skinned()
+    file.root["skins"][0]["skeleton"] = 3
+    assert warned(file) == [("G004.skeleton", "/skins/0/skeleton")]
+    file.root["skins"][0]["skeleton"] = 1
+    assert warned(file) == []
+
+
+NAME = "KHR_draco_mesh_compression"
+# A square of two triangles, as DracoPy 2.2 encodes it.
+STREAM = bytes.fromhex(
+    "445241434f02020100000002040100010201030201010009030000020001010003030130011003002882881100000000"
+    "ff3f00000000000000000000000000000000803f0e"
+)
+POINTER = f"/meshes/0/primitives/0/extensions/{NAME}"
+
+
+def compressed(data: bytes = STREAM, **members: object) -> File:
+    """Return a mesh that has only compressed data."""
+    file = File(extensionsUsed=[NAME], extensionsRequired=[NAME])
+    file.add("accessors", {"componentType": 5126, "count": 4, "type": "VEC3"})
+    file.add("accessors", {"componentType": 5121, "count": 6, "type": "SCALAR"})
+    extension = {"bufferView": file.view(data), "attributes": {"POSITION": 0}, **members}
+    primitive = {"attributes": {"POSITION": 0}, "indices": 1, "extensions": {NAME: extension}}
+    file.add("meshes", {"primitives": [primitive]})
+    return file
+
+
+def test_positions_and_triangles_are_decoded() -> None:
+    pytest.importorskip("DracoPy")
+    [primitive] = read(compressed()).meshes[0].primitives
+    assert primitive.positions.tolist() == SQUARE
+    assert primitive.triangles.tolist() == [[0, 1, 2], [1, 3, 2]]
+
+
+def test_vertex_count_is_that_of_the_compressed_data() -> None:
+    pytest.importorskip("DracoPy")
+    file = compressed()
+    file.root["accessors"][0]["count"] = 2**40
+    assert len(read(file).meshes[0].primitives[0].positions) == 4
+
+
+@pytest.mark.parametrize(
+    ("file", "key", "pointer"),
+    [
+        (compressed(STREAM[:40]), "F002.gltf-compressed", POINTER),
+        (
+            compressed(attributes={"POSITION": 7}),
+            "F002.gltf-draco-id",
+            f"{POINTER}/attributes/POSITION",
+        ),
+        (compressed(attributes=[]), "F002.gltf-type", f"{POINTER}/attributes"),
+        (compressed(bufferView=4), "F002.gltf-index", f"{POINTER}/bufferView"),
+    ],
+)
+def test_invalid_data_are_refused(file: File, key: str, pointer: str) -> None:
+    pytest.importorskip("DracoPy")
+    assert refused(file) == (key, pointer)
+
+
+def test_uncompressed_data_are_required_without_the_library(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "DracoPy", None)
+    assert refused(compressed()) == ("F002.gltf-draco", POINTER)
+    file = compressed()
+    del file.root["extensionsRequired"]
+    file.primitive["attributes"]["POSITION"] = file.accessor(SQUARE)
+    file.primitive["indices"] = file.accessor([2, 1, 0], "B")
+    [primitive] = read(file).meshes[0].primitives
+    assert primitive.triangles.tolist() == [[2, 1, 0]]

@@ -8,7 +8,9 @@ from faults import Fault, refusal_of
 
 import viewer
 from viewer.errors import FormatError
-from viewer.formats import Source, detect, obj
+from viewer.formats import Source, _polygons, detect, obj
+from viewer.formats._polygons import triangulate
+from viewer.formats._text.growing_table import GrowingTable
 from viewer.media.png import encode_png
 from viewer.rig.mesh import triangle_areas, volume
 
@@ -421,3 +423,114 @@ def test_randomly_damaged_file_is_refused_in_one_line_or_read() -> None:
         else:
             assert np.isfinite(figure.mesh.positions).all()
             assert np.isfinite(figure.mesh.normals).all()
+
+
+HEAD = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 1 0 0\nvn 0 1 0\nvn 0 0 1\n"
+UVS = [[0, 2, 1]]
+NORMALS = [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
+FLAT = [[0, 0, 1]] * 3
+
+
+def mesh_of_faces(faces: str):
+    return obj.read(Source("a.obj", (HEAD + faces).encode())).require_mesh()
+
+
+@pytest.mark.parametrize("between", ["", "# comment\n", "\n", "g part\n"])
+@pytest.mark.parametrize(
+    ("face", "uvs", "normals"),
+    [
+        ("f 1 2 3\n", None, FLAT),
+        ("f 1/1 2/3 3/2\n", UVS, FLAT),
+        ("f 1//2 2//3 3//1\n", None, NORMALS),
+        ("f 1/1/2 2/3/3 3/2/1\n", UVS, NORMALS),
+        ("  fo\t-3/-3/-2\t2/3/-1   3/2/1  \r\n", UVS, NORMALS),
+    ],
+)
+def test_all_forms_of_corners_are_read(face, uvs, normals, between):
+    mesh = mesh_of_faces(face + between + face)
+    assert mesh.triangles.tolist() == [[0, 1, 2]] * 2
+    assert (mesh.uv_triangles if uvs is None else mesh.uv_triangles.tolist()) == (
+        None if uvs is None else uvs * 2
+    )
+    assert mesh.normals.tolist() == normals
+
+
+def test_forms_may_be_mixed():
+    mesh = mesh_of_faces("f 1 2//3 3/2/1\nf 1//2 2 3/2\n")
+    assert mesh.triangles.tolist() == [[0, 1, 2]] * 2
+    assert mesh.normals.tolist() == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
+
+
+def test_slashes_without_a_number_after_them_are_ignored():
+    mesh = mesh_of_faces("f 1/2/ 2/1/ 3/2/\nf 1/ 2// 3/2/1\nf 1//1\t2//2 3//\r\n")
+    assert mesh.triangles.tolist() == [[0, 1, 2]] * 3
+    given = mesh_of_faces("f 1/2 2/1 3/2\nf 1 2 3/2/1\nf 1//1 2//2 3\n")
+    assert mesh.uvs[mesh.uv_triangles].tolist() == given.uvs[given.uv_triangles].tolist()
+    assert mesh.normals.tolist() == given.normals.tolist()
+
+
+@pytest.mark.parametrize(
+    "face",
+    [
+        *("f 1/1/1/1 2 3", "f /1 2/2 3/3", "f 1///1 2/2 3//3", "f //1 2//2 3//3"),
+        *("f 1/1 /2 3/3", "f 1 / 2 3", "f 1/\x011 2/2 3/3", "f 1/1.5 2/2 3/3", "f 1/0 2/2 3/3"),
+    ],
+)
+def test_invalid_corners_are_refused_at_their_line(face):
+    with pytest.raises(FormatError, match=r"a\.obj:10: "):
+        mesh_of_faces(face + "\n")
+
+
+def test_normals_of_many_vertices_are_averaged_without_overflow() -> None:
+    # The number of pairs of 50,000 vertices and 50,000 normals does not fit into 32 bits.
+    count = 50_000
+    text = "v 0 0 0\n" * (count - 3) + "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    text += "vn 1 0 0\n" * (count - 2) + "vn 0 1 0\nvn 0 0 1\n"
+    a, b, c = count - 2, count - 1, count
+    text += f"f {a}//{b} {b}//{b} {c}//{b}\nf {a}//{c} {c}//{c} {b}//{c}\n"
+    figure = obj.read(Source("large.obj", text.encode()))
+    half = 0.5**0.5
+    np.testing.assert_allclose(figure.mesh.normals[-3:], [[0, half, half]] * 3, atol=1e-12)
+
+
+@pytest.mark.parametrize("part", [1, 2, 3, 7])
+def test_parts_give_the_triangles_of_single_polygons(monkeypatch, part):
+    rng = np.random.default_rng(0)
+    counts = np.array([4, 3, 5, 3, 3, 4, 8, 6, 3, 4])
+    points = rng.normal(size=(40, 3))
+    corners = rng.integers(0, 40, counts.sum())
+    monkeypatch.setattr(_polygons, "_PART", part)
+    picks, owners = triangulate(points, corners, counts)
+    assert owners.tolist() == np.repeat(np.arange(10), counts - 2).tolist()
+    starts = np.cumsum(counts) - counts
+    for face, (start, size) in enumerate(zip(starts, counts, strict=True)):
+        alone, _ = triangulate(points, corners[start : start + size], np.array([size]))
+        np.testing.assert_array_equal(picks[owners == face], alone + start)
+
+
+def test_rows_are_those_that_were_added():
+    rng = np.random.default_rng(0)
+    parts = [rng.normal(size=(size, 3)) for size in (0, 1, 5, 0, 300, 2)]
+    table = GrowingTable((3,), np.float64)
+    for part in parts:
+        table.add(part)
+    np.testing.assert_array_equal(table.rows(), np.concatenate(parts))
+    assert GrowingTable((2,)).rows().shape == (0, 2)
+
+
+def test_table_is_widened_for_large_numbers():
+    table = GrowingTable((), np.int32)
+    table.add(np.array([1], np.int32))
+    table.add(np.array([1 << 40], np.int64))
+    assert table.rows().tolist() == [1, 1 << 40]
+
+
+def test_hard_edges_of_large_meshes_get_mean_normals() -> None:
+    # The product of the numbers of vertices and normals does not fit into 32 bits.
+    count = 50_000
+    places = "".join(f"v {n} {n % 7} {n % 3}\n" for n in range(count))
+    normals = "vn 0 0 1\n" * (count - 2) + "vn 1 0 0\nvn 0 1 0\n"
+    faces = f"f 1//1 2//1 {count}//{count - 1}\nf 1//1 3//1 {count}//{count}\n"
+    mesh = obj.read(Source("a.obj", (places + normals + faces).encode())).require_mesh()
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(mesh.normals[-1], [half, half, 0.0], atol=1e-15)

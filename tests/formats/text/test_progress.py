@@ -11,6 +11,8 @@ from viewer.progress import Cancelled, receiving, report
 from viewer.rig.scene import Actor
 
 HEAD = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+
+
 HEAD += "property float z\nend_header\n"
 
 
@@ -90,3 +92,19 @@ def test_reports_are_sent_only_to_the_innermost_receiver():
         report(2, 2, "steps")
     assert inner == [(1, 2, "steps", "working")]
     assert outer == [(2, 2, "steps", "")]
+
+
+def test_released_files_are_read_again(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes(b"\xef\xbb\xbfv 0\nv 1\n")
+    source = Source(path)
+    assert source.data == b"v 0\nv 1\n"
+    source.release()
+    path.write_bytes(b"v 0\n\nv 2\n")
+    assert source.line(5) == 3
+
+
+def test_data_without_a_file_is_kept():
+    source = Source("a.obj", b"v 0\n")
+    source.release()
+    assert source.data == b"v 0\n"

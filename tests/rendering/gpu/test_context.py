@@ -3,26 +3,40 @@
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import moderngl
 import numpy as np
 import pytest
 
+import viewer
 from viewer.cli import run
 from viewer.errors import RenderError, ViewerError
+from viewer.rendering.gpu import upload
 from viewer.rendering.gpu.context import (
+    Graphics,
+    OpenGLOffer,
     check_errors,
     device_count,
     explain_failure,
     headless_context,
+    offer_text,
+    thread_graphics,
 )
+from viewer.rendering.gpu.egl_devices import EglDevice, device_of_worker, egl_devices
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.posed_mesh import PosedMesh
+from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import buffer
-from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.joint_pass import SkeletonBuffers
+from viewer.rig.scene import scene_box
 
 ROOT = Path(__file__).resolve().parents[3]
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is used only on Linux")
-
 TINY_SKEL = """balljoint root {
   boxmin -0.1 0 -0.1
   boxmax 0.1 1 0.1
@@ -313,3 +327,210 @@ def test_display_without_opengl_3_reports_the_requirement():
         "OpenGL 3.3 is needed, but this display's driver does not offer it "
         "[GLX: Failed to create context: GLXBadFBConfig]"
     )
+
+
+SOFTWARE = EglDevice(2, None, True)
+# EGL lists cards in a different order than CUDA.
+CARDS = [EglDevice(0, 1), EglDevice(1, 0), SOFTWARE]
+# This driver numbers only the card in CUDA_VISIBLE_DEVICES.
+ONE_VISIBLE = [EglDevice(0, None), EglDevice(1, 0), SOFTWARE]
+
+
+@pytest.mark.parametrize(
+    ("devices", "visible", "chosen"),
+    [
+        (CARDS, "", [0, 1, 0]),
+        (CARDS, "0", [1, 1, 1]),
+        (CARDS, "1,0", [0, 0, 0]),
+        (ONE_VISIBLE, "3", [1, 1, 1]),
+        (CARDS, "GPU-5c0f", [0, 1, 0]),
+        ([EglDevice(0), EglDevice(1)], "1", [0, 1, 0]),
+        ([SOFTWARE], "0", [None, None, None]),
+    ],
+    ids=["in-turn", "by-cuda", "first", "relative", "uuid", "no-cuda", "software"],
+)
+def test_workers_draw_on_the_visible_card_or_take_cards_in_turn(devices, visible, chosen) -> None:
+    assert [device_of_worker(rank, devices, visible) for rank in range(3)] == chosen
+
+
+def test_listed_devices_are_those_used_by_contexts() -> None:
+    devices = egl_devices()
+    assert [one.index for one in devices] == [*range(device_count())]
+
+
+SIZE = (40, 30)
+
+
+def picture(offscreen):
+    scene = viewer.load()
+    camera = default_camera(scene, SIZE)
+    return offscreen.render(scene, SIZE, camera, DisplayOptions(), scene_box(scene))
+
+
+def test_renderers_that_share_a_context_draw_equal_images():
+    with Offscreen() as alone:
+        expected = picture(alone)
+    graphics = Graphics()
+    for _ in range(2):
+        with Offscreen(graphics=graphics) as borrowing:
+            np.testing.assert_array_equal(picture(borrowing), expected)
+    with graphics.context:
+        assert graphics.context.error == "GL_NO_ERROR"
+    graphics.release()
+    assert isinstance(graphics.context.mglo, moderngl.InvalidObject)
+
+
+def test_programs_are_compiled_once_for_all_renderers():
+    graphics = Graphics()
+    with Offscreen(graphics=graphics) as borrowing, graphics.context:
+        program = graphics.programs.drawing("motion_path")
+    with Offscreen(graphics=graphics) as borrowing, graphics.context:
+        assert borrowing.renderer.programs.drawing("motion_path") is program
+        assert not isinstance(program.mglo, moderngl.InvalidObject)
+    graphics.release()
+
+
+def test_each_thread_has_a_separate_context():
+    found = []
+    mine = thread_graphics()
+
+    def look():
+        found.extend([thread_graphics(), thread_graphics()])
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    thread.join()
+    assert found[0] is found[1] and found[0] is not mine is thread_graphics()
+
+
+MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
+
+
+@pytest.mark.parametrize(
+    ("version", "language", "environment", "needed", "offered"),
+    [
+        ("3.1 Mesa 22.3.6", "4.50", {}, "OpenGL 3.3", "offers 3.1 ("),
+        ("2.1 Mesa 22.3.6", "1.20", {}, "OpenGL 3.3", "offers 2.1 with GLSL 1.20 ("),
+        ("OpenGL ES 3.2 Mesa", "OpenGL ES GLSL ES 3.20", {}, "OpenGL 3.3", "offers 3.2 with GLSL"),
+        ("3.3 (Core Profile)", "1.50", {}, "GLSL 3.30", "offers GLSL 1.50 ("),
+        # The override applies to core profiles; compatibility profiles do not report it.
+        (
+            "4.5 (Compatibility Profile) Mesa 22.3.6",
+            "4.50",
+            {"MESA_GLSL_VERSION_OVERRIDE": "130"},
+            "GLSL 3.30",
+            "offers GLSL 1.30 (",
+        ),
+        ("4.5 (Compatibility Profile)", "4.50", {}, "core profile of OpenGL 3.3", "offers 4.5 "),
+        ("4.5 (Compatibility)", "4.50", {"MESA_GLSL_VERSION_OVERRIDE": "x"}, "core", "offers 4.5 "),
+        ("", "", {}, "OpenGL 3.3", "offers 0.0"),
+    ],
+)
+def test_required_and_available_versions_are_reported(
+    version, language, environment, needed, offered
+):
+    text = offer_text(OpenGLOffer(version, language, MESA), environment)
+    before, after = text.split("; ")
+    assert needed in before and offered in after and f"renderer {MESA}" in after
+    assert all(f"{name}={value} is set" in after for name, value in environment.items())
+
+
+def test_no_message_states_that_a_newer_version_is_too_old():
+    for version in ("3.3", "4.5", "4.6 (Core Profile)"):
+        text = offer_text(OpenGLOffer(version, "4.60", MESA), {"MESA_GLSL_VERSION_OVERRIDE": "140"})
+        assert "OpenGL 3.3 is needed" not in text and "GLSL 1.40" in text
+
+
+class Item:
+    def __init__(self, log, name):
+        self.log, self.name = log, name
+
+    def release(self):
+        self.log.append(self.name)
+
+
+def test_owner_frees_in_reverse_order_and_only_once():
+    log, owner = [], Owner()
+    for name in "abc":
+        owner.keep(Item(log, name))
+    owner.release()
+    owner.release()
+    assert log == ["c", "b", "a"]
+
+
+def test_guard_frees_on_failure():
+    log, owner = [], Owner()
+    with pytest.raises(RenderError), owner.guard():
+        owner.keep(Item(log, "a"))
+        raise RenderError("refused")
+    assert log == ["a"]
+
+
+class Alive:
+    """A count of the objects that were created and not released."""
+
+    def __init__(self, monkeypatch, refused: int) -> None:
+        self.made, self.objects = 0, []
+
+        def check(context: moderngl.Context, what: str) -> None:
+            self.made += 1
+            if self.made == refused:
+                raise RenderError(f"{what}: refused")
+
+        monkeypatch.setattr(upload, "check_errors", check)
+
+    def left(self) -> list[object]:
+        return [item for item in self.objects if not isinstance(item.mglo, moderngl.InvalidObject)]
+
+
+def makers():
+    figure = viewer.load().actors[0].figure
+    return {
+        "mesh": lambda ctx: MeshBuffers(ctx, figure, []),
+        "skeleton": lambda ctx: SkeletonBuffers(ctx, figure, None),
+    }
+
+
+@pytest.mark.parametrize("name", ["mesh", "skeleton"])
+@pytest.mark.parametrize("refused", range(1, 13))
+def test_refused_upload_leaves_no_objects(ctx, monkeypatch, name, refused):
+    alive = Alive(monkeypatch, refused)
+    context = Spy(ctx, alive)
+    try:
+        made = makers()[name](context)
+    except RenderError:
+        assert alive.made == refused
+    else:
+        assert alive.made < refused
+        made.release()
+    assert alive.objects and alive.left() == []
+
+
+def test_refused_posed_mesh_leaves_no_objects(ctx, monkeypatch):
+    programs, mesh = Programs(ctx), makers()["mesh"](ctx)
+    for refused in (1, 2):
+        with monkeypatch.context() as patch:
+            alive = Alive(patch, refused)
+            with pytest.raises(RenderError):
+                PosedMesh(Spy(ctx, alive), programs, mesh)
+            assert alive.left() == []
+    mesh.release()
+    programs.release()
+
+
+class Spy:
+    """A context that records the objects it creates."""
+
+    def __init__(self, context: moderngl.Context, alive: Alive) -> None:
+        self._context, self._alive = context, alive
+
+    def __getattr__(self, name: str):
+        value = getattr(self._context, name)
+        if name not in ("buffer", "texture"):
+            return value
+
+        def make(*args, **keywords):
+            self._alive.objects.append(value(*args, **keywords))
+            return self._alive.objects[-1]
+
+        return make

@@ -1,11 +1,26 @@
 """Triangle order for the vertex cache: consecutive neighbours, all triangles, unchanged runs."""
 
+import subprocess
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rendering.drawn_figures import sphere
+from rendering.drawn_figures import arm, checker, sphere
+from rendering.front_view import alone, drawn, front_view, grid_figure
+from rendering.gpu.gl_objects import gl_objects
+from rendering.plain_pictures import draw, front, plain
 
+from viewer.errors import RenderError
+from viewer.rendering.camera import Camera
+from viewer.rendering.gpu import upload
 from viewer.rendering.gpu.index_sets import curve_order, curve_places, index_set
 from viewer.rendering.gpu.surfaces import PLAIN
+from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skinning import Skinning
 
 
 def shaded(triangles, kept=32) -> int:
@@ -19,7 +34,7 @@ def shaded(triangles, kept=32) -> int:
     return count
 
 
-def drawn(ctx, triangles, materials, positions):
+def drawn_order(ctx, triangles, materials, positions):
     parts = np.full(len(triangles), -1)
     order = None if positions is None else curve_order(triangles, materials, parts, positions)
     made = index_set(ctx, triangles, materials, [PLAIN, PLAIN], order)
@@ -31,7 +46,7 @@ def drawn(ctx, triangles, materials, positions):
 def test_shuffled_triangles_are_sorted_spatially(ctx):
     ball = sphere(24)
     shuffled = np.random.default_rng(0).permutation(ball.triangles)
-    made, indices = drawn(ctx, shuffled, np.full(len(shuffled), -1), ball.positions)
+    made, indices = drawn_order(ctx, shuffled, np.full(len(shuffled), -1), ball.positions)
     assert np.array_equal(indices, shuffled[made.order])
     assert sorted(made.order) == list(range(len(shuffled)))
     assert made.spans == ((0, 3 * len(shuffled)),)
@@ -45,7 +60,7 @@ def test_material_runs_keep_their_order(ctx):
     materials = np.zeros(len(ball.triangles), dtype=np.int32)
     materials[20:50] = 1
     materials[100:] = -1
-    made, indices = drawn(ctx, ball.triangles, materials, ball.positions)
+    made, indices = drawn_order(ctx, ball.triangles, materials, ball.positions)
     assert [(run.first, run.count) for run in made.runs] == [
         (0, 60),
         (60, 90),
@@ -58,7 +73,7 @@ def test_material_runs_keep_their_order(ctx):
 
 def test_order_is_unchanged_without_positions(ctx):
     ball = sphere(6)
-    made, indices = drawn(ctx, ball.triangles, np.zeros(len(ball.triangles)), None)
+    made, indices = drawn_order(ctx, ball.triangles, np.zeros(len(ball.triangles)), None)
     assert np.array_equal(indices, ball.triangles)
     assert np.array_equal(made.order, np.arange(len(ball.triangles)))
 
@@ -85,3 +100,172 @@ def test_curve_interleaves_the_bits_of_cells():
     assert curve_places(cells).tolist() == wanted
     # The result does not depend on size and position of the cloud.
     assert curve_places(cells / 1024 + 64.0).tolist() == wanted
+
+
+@pytest.fixture(scope="module")
+def offscreen():
+    with Offscreen() as result:
+        yield result
+
+
+def rows():
+    """Return a grid of 4 rows of 8 triangles: feet, two of belly, and a head without a part."""
+    figure = grid_figure(4)
+    parts = np.repeat([0, 1, 1, -1], 8)
+    return replace(figure, mesh=replace(figure.mesh, parts=("feet", "belly"), triangle_parts=parts))
+
+
+def picked(offscreen, scene: Scene, y: float) -> int | None:
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    size = 64, 64
+    place = size[0] * (0.5 + 0.1 / 4), size[1] * (0.5 - y / 4)
+    with offscreen.context:
+        found = offscreen.renderer.pick(
+            scene, camera, DisplayOptions(), size, *place, scene_box(scene)
+        )
+    return None if found is None else found.triangle
+
+
+# The grid is from -1.5 to 1.5; each row is 0.75 high.
+@pytest.mark.parametrize(
+    ("hidden", "shown"),
+    [({0}, [0, 1, 1, 1]), ({1}, [1, 0, 0, 1]), ({0, 1}, [0, 0, 0, 1]), ({7}, [1, 1, 1, 1])],
+)
+def test_hidden_parts_are_not_drawn(offscreen, hidden, shown):
+    actor = Actor(rows(), hidden_parts=frozenset(hidden))
+    for options in ({}, {"wireframe": True, "normals": True}, {"shading": "normals"}):
+        picture = drawn(front_view(offscreen, alone(actor.figure), **options))
+        scene = Scene([actor])
+        found = drawn(front_view(offscreen, scene, **options))
+        height = len(picture)
+        middles = [round(height * (0.5 + (1.125 - 0.75 * row) / 4)) for row in range(4)]
+        assert picture[middles, height // 2 + 2].all()
+        assert found[middles, height // 2 + 2].tolist() == [bool(row) for row in shown]
+
+
+def test_hidden_parts_are_not_picked_and_other_triangles_keep_their_numbers(offscreen):
+    scene = Scene([Actor(rows(), hidden_parts=frozenset({1}))])
+    assert picked(offscreen, scene, -1.2) in range(8)
+    assert picked(offscreen, scene, 0.3) is None
+    assert picked(offscreen, scene, 1.2) in range(24, 32)
+
+
+def test_camera_is_fitted_without_hidden_parts():
+    actor = Actor(rows(), hidden_parts=frozenset({0, 1}))
+    assert scene_box(Scene([actor]))[:, 1] == pytest.approx([0.75, 1.5])
+
+
+def test_actors_of_one_figure_may_hide_different_parts(offscreen):
+    figure = rows()
+    aside = np.eye(4)
+    aside[2, 3] = -0.5
+    front = Actor(figure, hidden_parts=frozenset({0}))
+    behind = Actor(figure, hidden_parts=frozenset({1}), placement=aside)
+    assert drawn(front_view(offscreen, Scene([front, behind]))).sum() == pytest.approx(
+        drawn(front_view(offscreen, alone(figure))).sum(), rel=0.02
+    )
+
+
+OPTIONS = (
+    plain(show="both"),
+    plain(shading="scalar", scalar="weight:#0"),
+    plain(wireframe=True, normals=True, samples=4),
+    plain(quality="final", passes=2, background="gradient"),
+)
+
+
+def scene(count: int) -> Scene:
+    """Return textured arms, drawn singly or as instances, and a ball."""
+    figure = arm(3, sides=6, rings=9, material=checker(2))
+    return Scene([*(Actor(figure) for _ in range(count)), Actor(Figure("ball", sphere(6)))])
+
+
+def test_closed_figures_leave_no_objects_behind(offscreen) -> None:
+    found = []
+    for _ in range(4):
+        # Draw one at a time, and nine as instances; every pose is new, and every option creates
+        # buffers.
+        for count in (1, 9):
+            opened = scene(count)
+            for frame, options in enumerate(OPTIONS):
+                opened.actors[0].require_pose().dofs[4] = 0.1 * frame
+                draw(offscreen, opened, options)
+        draw(offscreen, Scene([]), plain())
+        with offscreen.context:
+            found.append(gl_objects())
+    # The first round compiles programs and creates the buffers that all figures share.
+    assert found[1] == found[2] == found[3]
+    assert found[1].total() > 20
+
+
+@pytest.mark.parametrize("count", [1, 9])
+def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(
+    offscreen, monkeypatch, count
+) -> None:
+    old = Scene([Actor(arm(2))])
+    picture = draw(offscreen, old, camera=front())
+    check = upload.check_errors
+    refused, is_done = 0, False
+    while not is_done:
+        made = 0
+
+        def fail_once(context, doing, at=refused) -> None:
+            nonlocal made
+            made += 1
+            if made > at:
+                raise RenderError(f"{doing}: not enough graphics memory")
+            check(context, doing)
+
+        with offscreen.context:
+            before = gl_objects()
+            monkeypatch.setattr(upload, "check_errors", fail_once)
+            monkeypatch.setattr("viewer.rendering.gpu.posed_mesh.checked", upload.checked)
+            try:
+                offscreen.renderer.prepare(scene(count))
+                is_done = True
+            except RenderError:
+                assert gl_objects() == before
+            monkeypatch.undo()
+        refused += 1
+    # The uploads of mesh, skin, palette, texture and skeleton have each failed once.
+    assert refused > 12
+    np.testing.assert_array_equal(draw(offscreen, old, camera=front()), picture)
+
+
+def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch) -> None:
+    """Allocation of the second of two buffers fails, so the first is freed."""
+    figure = arm(2)
+    mesh = figure.require_mesh()
+    opened = Scene([Actor(figure)])
+    draw(offscreen, opened)
+    with offscreen.context:
+        buffers = offscreen.renderer.buffers.mesh(figure)
+        rest = offscreen.renderer.buffers.posed_mesh(opened.actors[0])._rest
+        before, calls = gl_objects(), []
+
+        def second_fails(context, doing) -> None:
+            calls.append(doing)
+            if len(calls) == 2:
+                raise RenderError(f"{doing}: not enough graphics memory")
+
+        monkeypatch.setattr(upload, "check_errors", second_fails)
+        moved = replace(figure, mesh=replace(mesh, positions=mesh.positions + 0.1))
+        shape = replace(opened.actors[0].require_pose(), shape_weights=np.ones(1))
+        with pytest.raises(RenderError, match=r"^a shaped mesh of 0\.\d MB: not enough"):
+            rest.update(moved, shape, Skinning())
+        assert gl_objects() == before
+        rest.update(moved, shape, Skinning())
+        found = np.frombuffer(rest.positions.read(), "f4").reshape(-1, 3)
+        expected = (mesh.positions + 0.1 - buffers.center)[buffers.sources]
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_hundred_thousand_coincident_boxes_are_drawn(tmp_path):
+    deep = tmp_path / "deep.skel"
+    deep.write_text("balljoint a { " * 100_000 + "} " * 100_000)
+    out = tmp_path / "deep.png"
+    # In final quality, a slow machine would print the time that the image takes.
+    options = ["--size", "320x240", "--quality", "normal"]
+    command = [sys.executable, "-m", "viewer", "render", deep, "-o", out, *options]
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "") and out.stat().st_size > 1000

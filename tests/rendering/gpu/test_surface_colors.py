@@ -1,10 +1,14 @@
-"""Pixels of vertex colours, additional texture coordinates, and texture filters."""
+"""Colors of surfaces, mipmaps of textures, and the light of the studio."""
 
+import math
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
+import moderngl
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from rendering.drawn_figures import square
 from rendering.front_view import (
     WHITE,
@@ -20,7 +24,9 @@ from rendering.front_view import (
 
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.surfaces import upload_surfaces
+from viewer.rendering.gpu.upload import picture_texture
 from viewer.rendering.offscreen import Offscreen
+from viewer.resources import resource
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
 from viewer.rig.scene import Actor, Scene
@@ -124,3 +130,171 @@ def test_masks_apply_to_the_opacity_of_vertex_colours(offscreen):
     material = Material("", None, WHITE, alpha_mode="mask", unlit=True, is_physical=True)
     shown = front_view(offscreen, alone(painted(material, colors=colors)), lights=dark())
     assert [pixel(shown, x, 0.0)[3] for x in (-0.2, 0.2)] == [0, 255]
+
+
+def noise(height: int, width: int):
+    rng = np.random.default_rng(0)
+    return rng.integers(0, 256, (height, width, 4)).astype(np.uint8)
+
+
+SHOW_LEVEL = """#version 330
+uniform sampler2D u_texture;
+uniform float u_level;
+uniform vec2 u_size;
+out vec4 f_color;
+void main() {
+    f_color = textureLod(u_texture, gl_FragCoord.xy / u_size, u_level);
+}
+"""
+COVER = """#version 330
+void main() {
+    gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}
+"""
+
+
+def level_as_drawn(ctx, texture, level: int, size):
+    """Return the texels of a level in linear light, 0 to 1, as sampled by a shader."""
+    program = ctx.program(vertex_shader=COVER, fragment_shader=SHOW_LEVEL)
+    program["u_level"], program["u_size"] = float(level), size
+    target = ctx.framebuffer([ctx.renderbuffer(size, 4, dtype="f4")])
+    array = ctx.vertex_array(program, [])
+    texture.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
+    texture.use(0)
+    with ctx.scope(target):
+        array.render(moderngl.TRIANGLES, vertices=3)
+        values = np.frombuffer(target.read(components=4, dtype="f4"), "f4")
+    for item in (array, program, *target.color_attachments, target):
+        item.release()
+    return values.reshape(size[1], size[0], 4)
+
+
+@pytest.mark.parametrize("size", [(16, 16), (64, 16), (1, 8)])
+@pytest.mark.parametrize("is_linear", [False, True])
+def test_every_level_has_averages_of_linear_light(ctx, size, is_linear):
+    pixels = noise(*size)
+    texture = picture_texture(ctx, pixels, [], is_linear)
+    coded = pixels[::-1] / 255.0
+    light = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    light = coded if is_linear else np.dstack([light[..., :3], coded[..., 3]])
+    for level in range(1, int(np.log2(max(size))) + 1):
+        rows, columns = (max(side >> level, 1) for side in size)
+        squares = light.reshape(rows, size[0] // rows, columns, size[1] // columns, 4)
+        seen = level_as_drawn(ctx, texture, level, (columns, rows))
+        # Steps of 8-bit sRGB are at most 0.009 in linear light, and drivers round at every level.
+        np.testing.assert_allclose(seen, squares.mean(axis=(1, 3)), rtol=0, atol=0.01 * level)
+    texture.release()
+
+
+def test_sides_of_any_length_have_all_levels(ctx):
+    texture = picture_texture(ctx, np.full((5, 3, 4), 128, dtype=np.uint8), [], is_linear=True)
+    for level, size in enumerate([(3, 5), (1, 2), (1, 1)]):
+        seen = level_as_drawn(ctx, texture, level, size)
+        np.testing.assert_allclose(seen, 128 / 255.0, rtol=0, atol=1e-3)  # 8 bits store it exactly
+    texture.release()
+
+
+ROWS = np.array([3, 40, 70, 101])
+STEPS = 240  # steps of the quadrature from pole to pole
+
+
+@pytest.fixture
+def generator(monkeypatch):
+    """Return the modules of the script."""
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[3] / "assets"))
+    import make_studio
+
+    return make_studio
+
+
+@pytest.fixture(scope="module")
+def bundled():
+    with np.load(resource("assets", "studio", "studio.npz")) as stored:
+        return {name: stored[name].astype(float) for name in stored.files}
+
+
+def sphere() -> tuple[np.ndarray, np.ndarray]:
+    """Return directions over the sphere about +z, and the solid angle of each."""
+    polar = (np.arange(STEPS) + 0.5) * math.pi / STEPS
+    around = (np.arange(2 * STEPS) + 0.5) * math.pi / STEPS
+    p, a = np.meshgrid(polar, around, indexing="ij")
+    points = np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], axis=-1)
+    return points.reshape(-1, 3), (np.sin(p) * (math.pi / STEPS) ** 2).ravel()
+
+
+def lobe(alpha: float, n_h: np.ndarray) -> np.ndarray:
+    """Return the GGX distribution of half vectors (Walter et al. 2007, eq. 33)."""
+    return alpha**2 / (math.pi * (n_h**2 * (alpha**2 - 1.0) + 1.0) ** 2)
+
+
+def test_bundled_light_is_the_output_of_the_script(generator, bundled):
+    directions = generator.octahedral_directions(generator.SIZE)[np.ix_(ROWS, ROWS)]
+    light, samples = generator.radiance, generator.SAMPLES
+    for layer in (0, 2, 7):
+        made = generator.specular(light, directions, (layer / 7) ** 2, samples)
+        stored = bundled["light"][layer][np.ix_(ROWS, ROWS)]
+        assert_allclose(stored, made, rtol=0.004)  # eight bits of the mantissa are stored
+    stored = bundled["light"][8][np.ix_(ROWS, ROWS)]
+    assert_allclose(stored, generator.irradiance(light, directions, samples), rtol=0.004)
+    with np.load(resource("assets", "studio", "matcaps.npz")) as matcaps:
+        assert sorted(matcaps.files) == sorted(generator.MATCAPS)
+        small = generator.matcap("clay", 64).astype(float)
+        stored = matcaps["clay"].reshape(64, 4, 64, 4, 3).mean(axis=(1, 3))
+    inside = np.hypot(*np.meshgrid(*2 * (np.linspace(-1, 1, 64),))) < 0.9
+    assert np.abs(stored - small)[inside].max() < 3.0
+
+
+def test_borders_continue_the_octahedral_map(generator):
+    """Beyond an edge is the texel of the edge, mirrored about the centre of the edge."""
+    points = generator.octahedral_directions(8)
+    assert_allclose(points[0, 1:-1], points[1, 1:-1][::-1], atol=1e-12)
+    assert_allclose(points[1:-1, -1], points[1:-1, -2][::-1], atol=1e-12)
+
+
+@pytest.mark.parametrize("layer", [3, 5, 7])
+def test_light_is_the_integral_of_the_lobe(generator, bundled, layer):
+    """The expected value is the mean radiance, weighted by D(h) (n . l), along the normal."""
+    points, angles = sphere()
+    light = generator.radiance(points)
+    for row, column in ((20, 20), (60, 75), (110, 40)):
+        normal = generator.octahedral_directions(generator.SIZE)[row, column]
+        n_l = points @ normal
+        above = n_l > 0.0
+        n_h = np.sqrt(0.5 + 0.5 * n_l[above])
+        weights = lobe((layer / 7) ** 2, n_h) * n_l[above] * angles[above]
+        wanted = weights @ light[above] / weights.sum()
+        assert_allclose(bundled["light"][layer][row, column], wanted, rtol=0.02)
+
+
+def test_last_layer_is_the_irradiance(generator, bundled):
+    points, angles = sphere()
+    light = generator.radiance(points)
+    for row, column in ((20, 20), (60, 75), (110, 40)):
+        normal = generator.octahedral_directions(generator.SIZE)[row, column]
+        weights = np.maximum(points @ normal, 0.0) * angles / math.pi
+        assert_allclose(bundled["light"][8][row, column], weights @ light, rtol=0.01)
+
+
+@pytest.mark.parametrize("roughness", [0.3, 0.5, 0.9])
+@pytest.mark.parametrize("n_v", [0.2, 0.7])
+def test_table_is_the_integral_of_the_brdf(bundled, roughness, n_v):
+    """The reflectance of F0 = 1 is factor + summand, that of F0 = 0 the summand; both are < 1."""
+    row, column = int(64 * roughness), int(64 * n_v)
+    alpha, n_v = ((row + 0.5) / 64) ** 2, (column + 0.5) / 64
+    points, angles = sphere()
+    points, angles = points[points[:, 2] > 0.0], angles[points[:, 2] > 0.0]
+    view = np.array([math.sqrt(1.0 - n_v**2), 0.0, n_v])
+    half = points + view
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    n_l, n_h, v_h = points[:, 2], half[:, 2], half @ view
+
+    def shadowing(cosine):
+        """Return Smith's Lambda of GGX (Heitz 2014, eq. 72)."""
+        return 0.5 * (np.sqrt(1.0 + alpha**2 * (1.0 / cosine**2 - 1.0)) - 1.0)
+
+    visible = 1.0 / (1.0 + shadowing(n_l) + shadowing(n_v))
+    reflected = lobe(alpha, n_h) * visible / (4.0 * n_l * n_v) * n_l * angles
+    factor, summand = bundled["split_sum"][row, column]
+    assert factor + summand == pytest.approx(reflected.sum(), rel=0.01)
+    assert summand == pytest.approx((reflected * (1.0 - v_h) ** 5).sum(), rel=0.02, abs=1e-3)
+    assert factor + summand <= 1.0

@@ -4,11 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rendering.drawn_figures import scene_of, square
-from rendering.front_view import PIXELS, alone, drawn, front_view, grid_figure
-from rendering.plain_pictures import N, front, lights, plain
+from rendering.drawn_figures import scene_of, skeleton, sphere, square
+from rendering.front_view import (
+    PIXELS,
+    WHITE,
+    alone,
+    dark,
+    drawn,
+    front_view,
+    grid_figure,
+    pixel,
+)
+from rendering.plain_pictures import N, draw, front, lights, plain
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.gpu import mesh_buffers
 from viewer.rendering.gpu.target import Target, picture_rows
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
@@ -16,8 +26,10 @@ from viewer.rendering.passes import instance_pass
 from viewer.rendering.passes.outline_pass import Outlined
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skin import skin_from_lists
 
 GROUND = np.array([[-2.0, -1.5, -2.0], [2.0, 1.5, 2.0]])  # at height -1.5
 
@@ -211,3 +223,132 @@ def test_mirrored_and_plain_actors_of_one_figure_are_drawn_together(offscreen, m
         actor.placement[0, 3] = number - 1.5
     shown = drawn(front_view(offscreen, Scene(actors)))
     assert shown[PIXELS // 2, [10, 30, 50, 70]].all()
+
+
+def layers(figure_of) -> Mesh:
+    """Return squares at z = 0 to 3 as one mesh, listed in the order 2, 0, 3, 1."""
+    squares = [figure_of(float(z)) for z in (2, 0, 3, 1)]
+    return Mesh(
+        np.concatenate([one.positions for one in squares]),
+        np.concatenate([one.normals for one in squares]),
+        np.concatenate([one.triangles + 4 * row for row, one in enumerate(squares)]),
+        colors=np.repeat([[1, 0, 0, 0.5], [0, 1, 0, 0.5], [0, 0, 1, 0.5], [1, 1, 1, 0.5]], 4, 0),
+        materials=(Material("", None, WHITE, alpha_mode="blend", unlit=True, is_physical=True),),
+        triangle_materials=np.zeros(8, np.int32),
+    )
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_blended_triangles_of_a_mesh_are_drawn_from_far_to_near(offscreen, is_turned):
+    """Each layer covers half of those behind it; the order is by depth, then as listed above."""
+    actor = Actor(Figure("layers", layers(square)))
+    if is_turned:
+        actor.placement = np.diag([-1.0, 1.0, -1.0, 1.0])
+    wanted = np.zeros(3)
+    by_depth = [(0, 255, 0), (255, 255, 255), (255, 0, 0), (0, 0, 255)]
+    for color in reversed(by_depth) if is_turned else by_depth:
+        wanted = 0.5 * wanted + 0.5 * np.array(color)
+    wanted /= 1.0 - 0.5**4  # opacity of all layers together
+    for _ in range(2):
+        shown = front_view(offscreen, Scene([actor]), lights=dark())
+        assert np.allclose(pixel(shown, 0.3, 0.2)[:3], wanted, atol=2)
+
+
+def test_blended_materials_are_drawn_from_far_to_near(offscreen):
+    """Four materials with one run each are in the order of the test above."""
+    mesh = layers(square)
+    one = mesh.materials[0]
+    colors = [(*mesh.colors[4 * row, :3].tolist(), 0.5) for row in range(4)]
+    split = replace(
+        mesh,
+        colors=None,
+        materials=tuple(replace(one, base_color=color) for color in colors),
+        triangle_materials=np.repeat([0, 1, 2, 3], 2),
+    )
+    pictures = [
+        front_view(offscreen, alone(Figure("s", shape)), lights=dark()) for shape in (mesh, split)
+    ]
+    assert np.abs(pictures[0].astype(int) - pictures[1]).max() <= 2
+
+
+LIT = plain(lights=lights(ambient=0.3, key=1.0, azimuth=30.0, inclination=40.0))
+
+
+def closed(rings=24) -> Mesh:
+    """Return a sphere of radius 1 with one vertex per position at the seam and the poles."""
+    mesh = sphere(rings)
+    return replace(mesh, positions=np.round(mesh.positions, 9))
+
+
+def opened(to=(0.0, 0.0, 1.0)) -> Mesh:
+    """Return the sphere without the eight triangles within 7.5 degrees of a direction."""
+    mesh = closed()
+    middles = mesh.positions[mesh.triangles].mean(axis=1)
+    cosines = middles @ np.array(to) / np.linalg.norm(middles, axis=1)
+    kept = mesh.triangles[cosines < np.cos(np.radians(7.5))]
+    return replace(mesh, triangles=kept, triangle_materials=None, triangle_parts=None)
+
+
+def regions(offscreen, scene: Scene, camera: Camera):
+    """Return the regions in which back faces are drawn; None for the whole image."""
+    with offscreen.context:
+        mesh = offscreen.renderer.buffers.posed_mesh(scene.actors[0])
+    view, projection = camera.view_matrix(), camera.projection_matrix(1.0, np.array([[-1], [1]]))
+    return mesh.back_faces.regions(view, projection @ np.eye(4), (0, 0, 100, 100))
+
+
+def drawn_both_ways(offscreen, monkeypatch, scene: Scene, camera: Camera):
+    """Return the picture, the regions with back faces, and the picture with all back faces."""
+    picture = draw(offscreen, scene, LIT, camera)
+    where = regions(offscreen, scene, camera)
+    monkeypatch.setattr(mesh_buffers, "shell_of", lambda *_: None)
+    again = Scene([Actor(replace(scene.actors[0].figure))])
+    whole = draw(offscreen, again, LIT, camera)
+    assert regions(offscreen, again, camera) is None
+    return picture, where, whole
+
+
+def test_closed_surface_looks_the_same_without_back_faces(offscreen, monkeypatch) -> None:
+    picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), front())
+    assert where == ()
+    np.testing.assert_array_equal(picture, whole)
+
+
+def test_opening_shows_the_inside(offscreen, monkeypatch) -> None:
+    picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(opened()), front())
+    np.testing.assert_array_equal(picture, whole)
+    # The border is 25 sin(7.5 degrees) = 3.3 pixels from the middle at 50, with a margin of two.
+    assert where == ((44, 44, 12, 12),)
+
+
+def test_opening_outside_the_image_draws_no_back_faces(offscreen) -> None:
+    scene, camera = scene_of(opened((1.0, 0.0, 0.0))), front(target=np.array([-3.0, 0.0, 0.0]))
+    draw(offscreen, scene, LIT, camera)
+    assert regions(offscreen, scene, camera) == ()
+
+
+def test_camera_inside_sees_the_back_faces(offscreen, monkeypatch) -> None:
+    camera = front(orthographic=False, distance=0.1)
+    picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), camera)
+    assert where is None
+    assert (picture[..., 3] == 255).all()
+    np.testing.assert_array_equal(picture, whole)
+
+
+@pytest.mark.parametrize("scale, is_hidden", [(0.5, True), (-0.5, True), (0.0, False)])
+def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is_hidden) -> None:
+    mesh = closed(8)
+    skin = skin_from_lists([[(0, 1.0)] for _ in mesh.positions], np.eye(4)[None])
+    scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), skin))])
+    pose = scene.actors[0].require_pose()
+    pose.scales[:] = 1.0, scale, 1.0
+    draw(offscreen, scene, LIT)
+    assert (regions(offscreen, scene, front()) == ()) is is_hidden
+
+
+def test_negative_weights_have_no_bound_so_all_back_faces_are_drawn(offscreen) -> None:
+    mesh = closed(8)
+    binding = skin_from_lists([[(0, 1.5), (0, -0.5)] for _ in mesh.positions], np.eye(4)[None])
+    scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), binding))])
+    draw(offscreen, scene, LIT)
+    assert regions(offscreen, scene, front()) is None

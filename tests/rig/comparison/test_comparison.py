@@ -8,10 +8,12 @@ from numpy.testing import assert_allclose
 from rig.hand_made import skeleton
 
 from viewer.errors import RigError
-from viewer.rig.comparison import compare
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.comparison import compare, content_notes
 from viewer.rig.comparison.pairs import rotation_distance
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.material import Material, Outline, Rim
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
@@ -110,9 +112,7 @@ def test_weights_without_effect_at_rest_differ_in_test_poses() -> None:
     assert moved["vertices"].item == "vertex 2"
 
 
-def test_meshes_with_different_triangles_are_compared_by_closest_points_in_both_directions() -> (
-    None
-):
+def test_meshes_with_different_triangles_are_compared_by_closest_points_in_both_directions():
     # The same square as four triangles around its centre, raised by 0.1, with interpolated weights.
     positions = np.array([*CORNERS, [0.5, 0.5, 0.0]]) + np.array([0.0, 0.0, 0.1])
     fan = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
@@ -241,3 +241,55 @@ def test_actors_report_the_worst_pose_even_if_it_is_their_own() -> None:
     for actor in (first, second):
         assert actor.pose is not None
         assert_allclose(actor.pose.dofs, [0.0])
+
+
+TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
+def made_of(*materials: Material, parts=("coat", "hat"), **more) -> Figure:
+    mesh = Mesh(
+        TRIANGLE,
+        np.tile([0.0, 0.0, 1.0], (3, 1)),
+        np.array([[0, 1, 2]], dtype=np.int32),
+        materials=materials,
+        triangle_materials=np.zeros(1, np.int32) if materials else None,
+        parts=parts,
+        triangle_parts=np.zeros(1, np.int32) if parts else None,
+    )
+    return Figure("a", mesh, **more)
+
+
+def test_changed_materials_and_unmatched_names_are_noted() -> None:
+    first = made_of(Material("skin"), Material("cloth"))
+    skin = Material("skin", base_color=(1.0, 0.0, 0.0, 1.0), roughness=0.2)
+    second = made_of(skin, Material("metal"), parts=("coat", "belt"))
+    found = [note.message for note in content_notes(first, second)]
+    assert found == [
+        "parts only in the first: hat",
+        "parts only in the second: belt",
+        "materials only in the first: cloth",
+        "materials only in the second: metal",
+        'material "skin" differs: base color, roughness',
+    ]
+    assert content_notes(first, first) == []
+    # Missing materials or parts in a format are not a difference.
+    assert content_notes(first, made_of(parts=())) == []
+
+
+def test_rim_lights_and_outlines_are_compared_by_value() -> None:
+    one, same, other = (
+        Material("a", rim=Rim((0.5, 0.0, 0.0)), outline=Outline(width), is_physical=True)
+        for width in (0.01, 0.01, 0.02)
+    )
+    assert content_notes(made_of(one), made_of(same)) == []
+    (note,) = content_notes(made_of(one), made_of(other))
+    assert note.message == 'material "a" differs: outline'
+
+
+def test_offsets_of_blend_shapes_are_compared() -> None:
+    offsets = np.zeros((1, 3, 3))
+    first = made_of(blend_shapes=BlendShapes(("smile",), offsets))
+    offsets[0, 2] = 0.0, 3.0, 4.0
+    second = replace(first, blend_shapes=BlendShapes(("smile",), offsets))
+    measures = {one.name: one for one in compare(Actor(first), Actor(second)).measures}
+    assert measures["blend shapes"].maximum == 5.0

@@ -1,5 +1,6 @@
 """Scalar quantities of a few points, calculated by hand."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from rig.hand_made import mesh, skeleton
 from viewer.errors import RigError
 from viewer.rig import scalars
 from viewer.rig.annotations import BodyParts, VertexField
-from viewer.rig.blendshapes import Correctives
+from viewer.rig.blendshapes import BlendShapes, Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.pose import rest_pose
 from viewer.rig.scalars import (
@@ -316,3 +317,189 @@ def test_titles_include_the_influence_limit():
     assert menu_title("pruning", Skinning(max_influences=1)) == "Distance to 1 influence"
     assert menu_title("pruning", Skinning(max_influences=8)) == "Distance to 8 influences"
     assert menu_title("entropy", Skinning(max_influences=8)) == "Entropy of weights"
+
+
+# 3 --- 2   Corners 0 and 3 follow joint 0, corners 1 and 2 joint 1, which slides along x;
+# |   / |   vertex 4 is in no triangle.
+# 0 --- 1
+CORNERS = [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 5, 5]]
+TRIANGLES = [[0, 1, 2], [0, 2, 3]]
+
+
+def square(**parts) -> Figure:
+    bones = skeleton([-1, -1], [(1, "tx", 0.0), (1, "x", 0.0), (0, "z", 0.0), (1, "z", 0.0)])
+    rows = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)], []]
+    skin = skin_from_lists(rows, np.tile(np.eye(4), (2, 1, 1)))
+    return Figure("square", mesh(CORNERS, triangles=TRIANGLES), bones, skin, **parts)
+
+
+def strain(name, slide=0.0, figure=None, change=lambda pose: None):
+    figure = figure or square()
+    pose = rest_pose(figure.skeleton)
+    pose.dofs[0] = slide
+    change(pose)
+    return compute(name, figure, pose, Skinning())
+
+
+@pytest.mark.parametrize("name", ["stretch", "stretch-mean", "area"])
+def test_figure_at_rest_is_not_strained(name):
+    assert strain(name).tolist() == [0] * 5
+
+
+@pytest.mark.parametrize("name", ["stretch", "stretch-mean", "area"])
+def test_placement_scale_and_rotation_cause_no_strain(name):
+    def change(pose):
+        pose.figure_scale, pose.figure_translation[:] = 3.0, (7, 8, 9)
+        pose.dofs[2:] = 1.2
+
+    assert strain(name, change=change).tolist() == [0] * 5
+
+
+def test_stretch_is_that_of_the_edge_with_the_largest_change():
+    # At twice the width, horizontal edges double, the diagonal grows from sqrt 2 to sqrt 5, and
+    # vertical edges keep their lengths.
+    assert_allclose(strain("stretch", 1.0), [100, 100, 100, 100, 0])
+    # At half the width, the stretch is -50 %, more than sqrt(1.25 / 2) - 1 = -21 % of the diagonal.
+    assert_allclose(strain("stretch", -0.5), [-50, -50, -50, -50, 0])
+
+
+def test_stretch_keeps_its_sign_where_edges_differ():
+    # Vertices 1 and 2 move up by 0.5 and joint 1 rotates about x by 60 degrees: y of 2 halves.
+    def change(pose):
+        pose.dofs[1] = np.pi / 3
+
+    # Corner 2 moves from (1, 1, 0) to (1, 0.5, 0.866). Edge 2-3 grows from 1 to sqrt(1 + 0.25 +
+    # 0.75) = sqrt 2; all other edges keep their lengths, as 0-2 is still sqrt 2.
+    expected = [0, 0, 100 * (np.sqrt(2) - 1), 100 * (np.sqrt(2) - 1), 0]
+    assert_allclose(strain("stretch", change=change), expected, atol=1e-9)
+
+
+def test_mean_stretch_is_the_mean_over_all_edges_around_a_vertex():
+    diagonal = 100 * (np.sqrt(2.5) - 1)
+    # Corner 0 has the edges 0-1, 0-2 and 0-3; corner 1 has 1-0 and 1-2.
+    expected = [(100 + diagonal) / 3, 50, (100 + diagonal) / 3, 50, 0]
+    assert_allclose(strain("stretch-mean", 1.0), expected)
+
+
+def test_area_change_is_the_mean_over_all_triangles_around_a_vertex():
+    assert_allclose(strain("area", 1.0), [100, 100, 100, 100, 0])
+    assert_allclose(strain("area", -0.75), [-75, -75, -75, -75, 0])
+    assert_allclose(strain("area", -1.0), [-100, -100, -100, -100, 0], atol=1e-9)
+
+
+def test_area_change_is_weighted_by_triangle_area():
+    # A triangle of area 1.5 is next to one of area 0.5; only the smaller one doubles.
+    corners = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-3, 0, 0]]
+    skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(0, 1.0)], [(0, 1.0)]],
+                           np.tile(np.eye(4), (2, 1, 1)))  # fmt: skip
+    shape = mesh(corners, triangles=[[0, 1, 2], [0, 2, 3]])
+    figure = Figure("two", shape, square().skeleton, skin)
+    # Corner 0: (1 + 1.5) / 2 = 1.25.
+    assert_allclose(strain("area", 1.0, figure), [25, 100, 25, 0])
+
+
+def test_strain_is_relative_to_the_shaped_rest_mesh():
+    offsets = np.zeros((1, 5, 3))
+    offsets[0, 1:3, 0] = 1.0  # the shape is twice as wide
+    figure = square(blend_shapes=BlendShapes(("wide",), offsets))
+
+    def change(pose):
+        pose.shape_weights = np.ones(1)
+
+    for name in ("stretch", "stretch-mean", "area"):
+        assert strain(name, figure=figure, change=change).tolist() == [0] * 5
+    # The width changes from 2 to 3.
+    assert_allclose(strain("area", 1.0, figure, change), [50, 50, 50, 50, 0])
+
+
+def test_degenerate_edges_and_triangles_are_ignored():
+    corners = [[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]]
+    rows = [[(0, 1.0)], [(0, 1.0)], [(1, 1.0)], [(0, 1.0)]]
+    skin = skin_from_lists(rows, np.tile(np.eye(4), (2, 1, 1)))
+    shape = mesh(corners, triangles=[[0, 1, 3], [1, 2, 1], [1, 2, 2]])
+    figure = Figure("flat", shape, square().skeleton, skin)
+    # Corner 2 moves away from corner 1; an edge with a rest length of 0 has no ratio.
+    for name in ("stretch", "stretch-mean", "area"):
+        assert strain(name, 1.0, figure).tolist() == [0] * 4
+
+
+ROWS = [
+    [(0, 0.5), (1, 0.25), (2, 0.25)],
+    [(2, 1.0)],
+    [],
+    [(0, 0.0)],
+    [(1, 0.3), (0, 0.4), (1, 0.3)],  # joint 1 is listed twice with a sum of 0.6
+    [(0, 1.5), (1, -0.5)],
+    [(3, 0.5)],
+]
+
+
+def of_weights(name, rows=ROWS, **how):
+    count = len(rows)
+    bones = skeleton([-1, 0, 1, 2])
+    skin = skin_from_lists(rows, np.tile(np.eye(4), (4, 1, 1)))
+    figure = Figure("rows", mesh(np.zeros((count, 3))), bones, skin)
+    return compute(name, figure, None, Skinning(**how)).tolist()
+
+
+def test_weight_of_a_joint_is_the_sum_of_its_entries():
+    assert of_weights("weight:j0") == [0.5, 0, 0, 0, 0.4, 1.5, 0]
+    assert of_weights("weight:j1") == [0.25, 0, 0, 0, 0.6, -0.5, 0]
+    assert of_weights("weight:#3") == [0, 0, 0, 0, 0, 0, 0.5]
+
+
+def test_weights_follow_the_skinning_settings():
+    # With two influences, 0.5 and 0.25 are scaled to a sum of 1; of equal weights the first is
+    # kept.
+    assert of_weights("weight:j0", max_influences=2)[0] == pytest.approx(2 / 3)
+    assert of_weights("weight:j1", max_influences=2)[0] == pytest.approx(1 / 3)
+    assert of_weights("weight:j2", max_influences=2)[0] == 0.0
+    assert of_weights("weight:j3", normalize=True)[6] == 1.0
+
+
+def test_dominant_joint_has_the_largest_weight_of_all_its_entries():
+    assert of_weights("dominant") == [0, 2, -1, -1, 1, 0, 3]
+
+
+def test_dominant_joint_of_a_tie_is_the_first():
+    assert of_weights("dominant", [[(2, 0.5), (1, 0.5)]]) == [2]
+
+
+def test_influences_are_counted_as_joints_with_a_weight():
+    assert of_weights("influences") == [3, 1, 0, 0, 2, 2, 1]
+    assert of_weights("influences", max_influences=2) == [2, 1, 0, 0, 2, 2, 1]
+
+
+def test_sums_are_compared_with_one():
+    assert of_weights("sums") == [0, 0, 1, 1, 0, 0, 0.5]
+    assert of_weights("sums", normalize=True) == [0, 0, 1, 1, 0, 0, 0]
+
+
+def test_sums_that_differ_from_one_only_by_rounding_are_one():
+    tenths = [[(0, 0.1)] * 10]
+    total = 0.0
+    for _, weight in tenths[0]:
+        total += weight
+    assert total != 1.0
+    assert of_weights("sums", tenths) == [0.0]
+    assert of_weights("sums", [[(0, 1.0 + 1e-9)]])[0] == pytest.approx(1e-9, rel=1e-6)
+
+
+def test_entropy_of_equal_weights_is_the_logarithm_of_their_number():
+    rows = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(0, 0.2), (1, 0.2), (2, 0.2), (3, 0.2)], []]
+    np.testing.assert_allclose(of_weights("entropy", rows), [0, 1, 2, 0], atol=1e-15)
+
+
+def test_entropy_matches_hand_calculation():
+    # 1/2 * 1 + 1/4 * 2 + 1/4 * 2 bits; then the entropies of 0.4 and 0.6, and of 3/4 and 1/4.
+    binary = -0.4 * math.log2(0.4) - 0.6 * math.log2(0.6)
+    quarter = -0.75 * math.log2(0.75) + 0.25 * 2
+    np.testing.assert_allclose(
+        of_weights("entropy"), [1.5, 0, 0, 0, binary, quarter, 0], atol=1e-15
+    )
+
+
+def test_figure_without_triangles_or_weights_has_finite_values():
+    for name in ("weight:j1", "influences", "entropy"):
+        assert of_weights(name, [[], []]) == [0, 0]
+    assert of_weights("dominant", [[], []]) == [-1, -1]
