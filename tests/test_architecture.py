@@ -163,7 +163,7 @@ def part_of(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-def test_imports_follow_the_allowed_directions() -> None:
+def test_imports_follow_the_allowed_directions():
     for path in SOURCES:
         allowed = ALLOWED.get(part_of(path))
         if allowed is None:
@@ -177,7 +177,7 @@ def part_of_app(name: str) -> str:
     return name.split(".")[2]
 
 
-def test_window_features_follow_the_allowed_directions() -> None:
+def test_window_features_follow_the_allowed_directions():
     folders = {path.name for path in (PACKAGE / "app").iterdir() if path.is_dir()}
     assert folders - {"__pycache__"} <= set(ALLOWED_IN_APP)
     for path in (PACKAGE / "app").rglob("*.py"):
@@ -188,7 +188,7 @@ def test_window_features_follow_the_allowed_directions() -> None:
         assert "viewer.app" not in names, path
 
 
-def test_folders_of_tests_mirror_the_sources() -> None:
+def test_folders_of_tests_mirror_the_sources():
     folders = {path.parent.relative_to(TESTS).as_posix() for path in TEST_FILES}
     for folder in folders:
         mirrored = PACKAGE / folder
@@ -202,7 +202,7 @@ def test_folders_of_tests_mirror_the_sources() -> None:
         assert folder in OTHER_FOLDERS or known, folder
 
 
-def test_tests_are_in_the_mirrored_folder() -> None:
+def test_tests_are_in_the_mirrored_folder():
     """A test file that imports only one folder's modules must be in that folder's tests."""
     for path in TEST_FILES:
         used = set(re.findall(r"^ *(?:from|import) viewer\.(\w+)", path.read_text(), re.MULTILINE))
@@ -210,7 +210,7 @@ def test_tests_are_in_the_mirrored_folder() -> None:
             assert path.parent == TESTS / "media", path
 
 
-def test_third_party_modules_are_imported_by_one_part_only() -> None:
+def test_third_party_modules_are_imported_by_one_part_only():
     for path in SOURCES:
         inside = path.relative_to(PACKAGE).as_posix()
         for name in imports(path):
@@ -218,7 +218,7 @@ def test_third_party_modules_are_imported_by_one_part_only() -> None:
             assert homes is None or any(inside.startswith(home) for home in homes), (path, name)
 
 
-def test_standard_dataclass_decorator_is_not_used() -> None:
+def test_standard_dataclass_decorator_is_not_used():
     """The decorator of the standard library delays every start by 0.5 ms for each class."""
     for path in SOURCES:
         found = re.search(
@@ -227,12 +227,12 @@ def test_standard_dataclass_decorator_is_not_used() -> None:
         assert not found, path
 
 
-def test_every_public_module_documents_itself() -> None:
+def test_every_public_module_documents_itself():
     for path in SOURCES:
         assert ast.get_docstring(tree(path)), path
 
 
-def test_shaders_state_their_version_and_use_name_prefixes() -> None:
+def test_shaders_state_their_version_and_use_name_prefixes():
     for path in (ROOT / "shaders").glob("*.*"):
         text = path.read_text()
         assert text.startswith("#version 330\n"), path
@@ -250,7 +250,7 @@ def loaded_modules(script: str) -> set[str]:
     return {name.split(".")[0] for name in result.stderr.splitlines()[-1].split()}
 
 
-def test_importing_viewer_loads_few_modules() -> None:
+def test_importing_viewer_loads_few_modules():
     loaded = loaded_modules("import viewer")
     assert not loaded & {
         "numpy",
@@ -264,12 +264,12 @@ def test_importing_viewer_loads_few_modules() -> None:
     }
 
 
-def test_reading_a_figure_needs_no_opengl() -> None:
+def test_reading_a_figure_needs_no_opengl():
     loaded = loaded_modules("import viewer; viewer.deform(viewer.load().actors[0].figure)")
     assert not loaded & {"moderngl", "imgui_bundle", "glfw", "scipy", "pyrr"}
 
 
-def test_printing_a_skeleton_loads_few_modules() -> None:
+def test_printing_a_skeleton_loads_few_modules():
     """Modules that take long to import: shutil for archives, hashlib for OpenSSL, numpy.random."""
     command = ["info", str(ROOT / "assets" / "samples" / "fox.skel")]
     loaded = loaded_modules(f"from viewer.cli import run; run({command})")
@@ -278,14 +278,14 @@ def test_printing_a_skeleton_loads_few_modules() -> None:
 
 
 @pytest.mark.slow
-def test_drawing_headlessly_needs_no_window_library() -> None:
+def test_drawing_headlessly_needs_no_window_library():
     loaded = loaded_modules("import viewer; viewer.render(viewer.load(), size=(32, 32))")
     assert "moderngl" in loaded
     # numpy.random loads secrets.
     assert not loaded & {"imgui_bundle", "glfw", "scipy", "secrets", "hashlib"}
 
 
-def test_no_module_changes_environment_variables() -> None:
+def test_no_module_changes_environment_variables():
     """A library must not set environment variables of the program that uses it.
 
     Exceptions: one for OpenBLAS, set by the program, and one for EGL, set to draw without a window.
@@ -320,7 +320,7 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def test_modules_have_no_circular_imports() -> None:
+def test_modules_have_no_circular_imports():
     """Circular imports are errors at run time, within functions, and for type checking."""
     graph = import_graph()
     behind = {name: reached(graph, name) for name in graph}
@@ -332,7 +332,7 @@ def test_modules_have_no_circular_imports() -> None:
     assert not circles
 
 
-def test_assertions_only_tell_readers_and_type_checkers_what_a_value_is() -> None:
+def test_assertions_only_tell_readers_and_type_checkers_what_a_value_is():
     def narrows(test: ast.expr) -> bool:
         if isinstance(test, ast.BoolOp):
             return isinstance(test.op, ast.And) and all(map(narrows, test.values))
@@ -351,7 +351,7 @@ def test_assertions_only_tell_readers_and_type_checkers_what_a_value_is() -> Non
     assert not wrong
 
 
-def test_broad_handlers_raise_again_or_hand_the_problem_on() -> None:
+def test_broad_handlers_raise_again_or_hand_the_problem_on():
     """One that tries the next of several devices says so on its line."""
     wrong = []
     for path in SOURCES:

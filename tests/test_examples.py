@@ -77,7 +77,7 @@ def written_weights() -> np.ndarray:
     return table
 
 
-def test_open_and_pose_rotates_the_head_by_30_degrees(script: Script) -> None:
+def test_open_and_pose_rotates_the_head_by_30_degrees(script):
     names = script("open_and_pose")
     assert "fox.obj: 7561 vertices" in script.text
     assert pixels("fox.png").shape == (360, 640, 3)
@@ -92,7 +92,7 @@ def test_open_and_pose_rotates_the_head_by_30_degrees(script: Script) -> None:
     np.testing.assert_array_equal(after[paws], before[paws])
 
 
-def test_own_arrays_bend_the_tube_to_the_side(script: Script) -> None:
+def test_own_arrays_bend_the_tube_to_the_side(script):
     script("own_arrays")
     # The end, 1 above the elbow at (0, 1, 0), rotates by 90 degrees about z.
     assert floats(script.text) == [-1.0, 1.0, 0.0]
@@ -101,7 +101,7 @@ def test_own_arrays_bend_the_tube_to_the_side(script: Script) -> None:
     assert figure.require_mesh().n_triangles == 64
 
 
-def test_joint_weights_are_those_of_the_file(script: Script) -> None:
+def test_joint_weights_are_those_of_the_file(script):
     head = script("joint_weights")["skeleton"].names.index("head")
     weights = written_weights()[:, head]
     first, *rest = script.text.splitlines()
@@ -112,7 +112,7 @@ def test_joint_weights_are_those_of_the_file(script: Script) -> None:
     assert pixels("head.png").shape == (360, 640, 3)
 
 
-def test_retargeted_hand_moves_on_a_circle(script: Script) -> None:
+def test_retargeted_hand_moves_on_a_circle(script):
     script("retarget_bvh")
     assert "left_shoulder by LeftArm" in script.text
     frames = [floats(line)[1:] for line in script.text.splitlines() if line.startswith("frame")]
@@ -126,13 +126,13 @@ def test_retargeted_hand_moves_on_a_circle(script: Script) -> None:
     assert whole / first == pytest.approx(ratio, abs=0.06)  # the script prints centimetres
 
 
-def test_retarget_takes_a_motion_and_a_character(script: Script) -> None:
+def test_retarget_takes_a_motion_and_a_character(script):
     script("retarget_bvh")
     script("retarget_bvh", "lift.bvh", resource("assets", "samples", "body.npz"))
     assert script.text.count("\nframe") == 3
 
 
-def test_capture_becomes_a_bvh_with_the_bent_knee(script: Script) -> None:
+def test_capture_becomes_a_bvh_with_the_bent_knee(script):
     script("capture_to_bvh")
     assert script.code == 0
     hierarchy, _, motion = Path("bvh/capture.bvh").read_text().partition("MOTION")
@@ -142,7 +142,7 @@ def test_capture_becomes_a_bvh_with_the_bent_knee(script: Script) -> None:
     assert changed == pytest.approx([np.degrees(0.5)], abs=1e-3)
 
 
-def test_lint_in_ci_fails_for_a_bad_rig_only(script: Script, tmp_path: Path) -> None:
+def test_lint_in_ci_fails_for_a_bad_rig_only(script, tmp_path):
     script("lint_in_ci")
     assert script.code == 0 and "body.npz: done, exit code 0" in script.text
     _, skin = write_rig(tmp_path)
@@ -154,7 +154,7 @@ def test_lint_in_ci_fails_for_a_bad_rig_only(script: Script, tmp_path: Path) -> 
     assert row["name"] == "tiny.skin" and "W001" in row["codes"]
 
 
-def test_compare_rigs_prints_the_distance_of_an_independent_sum(script: Script) -> None:
+def test_compare_rigs_prints_the_distance_of_an_independent_sum(script):
     names = script("compare_rigs")
     figure = names["reference"]
     mesh, skeleton, skin = figure.attached()
@@ -178,7 +178,7 @@ def test_compare_rigs_prints_the_distance_of_an_independent_sum(script: Script) 
     assert length == pytest.approx(np.ptp(a[:, :3], axis=0).max(), abs=0.003)
 
 
-def test_paper_figure_is_a_silhouette_on_white(script: Script) -> None:
+def test_paper_figure_is_a_silhouette_on_white(script):
     figure = script("paper_figure")["scene"].actors[0].figure
     drawn = pixels("figure.png")
     assert drawn.shape == (600, 800, 3)
@@ -188,7 +188,7 @@ def test_paper_figure_is_a_silhouette_on_white(script: Script) -> None:
     assert wide > 400 and wide / high == pytest.approx(along / up, rel=0.02)
 
 
-def test_batch_runs_the_function_in_workers(tmp_path: Path) -> None:
+def test_batch_runs_the_function_in_workers(tmp_path):
     """Workers import the script again, so it runs as a program."""
     path = resource("examples", "batch.py")
     done = subprocess.run(
@@ -203,7 +203,7 @@ def test_batch_runs_the_function_in_workers(tmp_path: Path) -> None:
     assert float(row["height"]) == pytest.approx(body[:, 1].max(), abs=1e-3)
 
 
-def test_own_scalar_is_brightest_at_the_tip_of_the_tail(script: Script) -> None:
+def test_own_scalar_is_brightest_at_the_tip_of_the_tail(script):
     script("own_scalar")
     drawn = pixels("distance.png")
     yellow = (drawn[..., 0] > 225) & (drawn[..., 1] > 150) & (drawn[..., 2] < 120)
@@ -217,22 +217,22 @@ def test_own_scalar_is_brightest_at_the_tip_of_the_tail(script: Script) -> None:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_help_prints_the_script_as_it_is(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_prints_the_script_as_it_is(name, capsys):
     assert run(["help", "examples", name]) == 0
     assert capsys.readouterr().out == resource("examples", f"{name}.py").read_text()
 
 
-def test_help_lists_all_scripts(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_all_scripts(capsys):
     assert run(["help", "examples"]) == 0
     printed = capsys.readouterr().out
     assert all(f"  {name} " in printed and text in printed for name, text in EXAMPLES.items())
 
 
-def test_example_after_another_topic_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+def test_example_after_another_topic_is_an_error(capsys):
     assert run(["help", "keys", "batch"]) == 2
     assert "expected one topic, found keys and batch" in capsys.readouterr().err
 
 
-def test_unknown_example_suggests_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_example_suggests_the_nearest(capsys):
     assert run(["help", "examples", "retarget"]) == 2
     assert "retarget_bvh" in capsys.readouterr().err

@@ -40,7 +40,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(folder.glob("*.whl"))
 
 
-def test_wheel_ships_shaders_assets_and_manual_but_no_generators(wheel: Path) -> None:
+def test_wheel_ships_shaders_assets_and_manual_but_no_generators(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert "viewer/shaders/skin.vert" in names
     assert "viewer/shaders/skin/lbs.glsl" in names
@@ -52,9 +52,7 @@ def test_wheel_ships_shaders_assets_and_manual_but_no_generators(wheel: Path) ->
     assert not [name for name in names if name.startswith(("tests/", "shaders/", "assets/"))]
 
 
-def test_wheel_draws_the_bundled_figure_in_an_empty_environment(
-    wheel: Path, tmp_path: Path
-) -> None:
+def test_wheel_draws_the_bundled_figure_in_an_empty_environment(wheel, tmp_path):
     venv.create(tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
     # The pip of this environment installs into it without compilation, which takes much less time.

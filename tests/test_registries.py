@@ -40,43 +40,43 @@ def modules(folder: str) -> set[str]:
     ],
     ids=["formats", "skinning", "commands", "export", "engines", "examples"],
 )
-def test_registry_matches_its_folder(folder: str, registry: dict[str, object]) -> None:
+def test_registry_matches_its_folder(folder, registry):
     assert modules(folder) == set(registry)
 
 
 @pytest.mark.parametrize(
     ("folder", "registry"), [("skin", METHODS), ("shade", SHADING)], ids=["skin", "shade"]
 )
-def test_shader_registry_matches_its_folder(folder: str, registry: dict[str, object]) -> None:
+def test_shader_registry_matches_its_folder(folder, registry):
     assert {path.stem for path in resource("shaders", folder).glob("*.glsl")} == set(registry)
 
 
-def test_formats_can_read_and_write_as_declared() -> None:
+def test_formats_can_read_and_write_as_declared():
     for name in FORMATS:
         module = import_module(f"viewer.formats.{name}")
         assert callable(module.read)
         assert hasattr(module, "write") == FORMATS[name].writes
 
 
-def test_exporters_write_what_they_declare() -> None:
+def test_exporters_write_what_they_declare():
     for name, kind in EXPORTERS.items():
         module = import_module(f"viewer.export.{name}")
         assert callable(module.export) and kind.stores
         assert hasattr(module, "require") == bool(kind.joints)
 
 
-def test_panel_table_lists_the_panels_of_all_features() -> None:
+def test_panel_table_lists_the_panels_of_all_features():
     found = {(path.parent.name, path.stem) for path in (PACKAGE / "app").rglob("*_panel.py")}
     assert found == {(panel.feature, f"{name}_panel") for name, panel in PANELS.items()}
     assert all(path.parent.parent == PACKAGE / "app" for path in PACKAGE.rglob("*_panel.py"))
 
 
-def test_panels_can_draw() -> None:
+def test_panels_can_draw():
     for name in PANELS:
         assert callable(panel_module(name).draw)
 
 
-def test_keys_and_actions_are_functions_of_the_state() -> None:
+def test_keys_and_actions_are_functions_of_the_state():
     for names in (
         [key.label for key in KEYS],
         [key.name for key in KEYS],
@@ -88,13 +88,13 @@ def test_keys_and_actions_are_functions_of_the_state() -> None:
         signature(one.run).bind(None)
 
 
-def test_commands_can_run() -> None:
+def test_commands_can_run():
     for name in COMMANDS:
         module = import_module(f"viewer.commands.{name}")
         assert callable(module.run) and callable(module.add_arguments)
 
 
-def test_public_names_exist_and_are_documented() -> None:
+def test_public_names_exist_and_are_documented():
     for name in viewer.__all__:
         value = getattr(viewer, name)
         assert value.__doc__ and value.__doc__.strip(), name

@@ -205,7 +205,7 @@ def test_inputs_are_refused_as_outputs(tmp_path):
             check_outputs(items_of(inputs, output), more)
 
 
-def test_outputs_that_differ_only_in_case_are_explained() -> None:
+def test_outputs_that_differ_only_in_case_are_explained():
     items = [Item(0, ("a",), "out/Walk.bvh", "a"), Item(1, ("b",), "out/walk.bvh", "b")]
     with pytest.raises(ViewerError) as caught:
         check_outputs(items)

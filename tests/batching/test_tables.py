@@ -28,7 +28,7 @@ def saved(path, job, results):
         return list(csv.DictReader(stream))
 
 
-def test_rows_of_diff_list_the_worst_vertex_and_pose(tmp_path) -> None:
+def test_rows_of_diff_list_the_worst_vertex_and_pose(tmp_path):
     worse = measure("vertices", 0.5, 0.125, 0.25, "vertex 7", "pose 3")
     better = measure("surface, from the first", 0.25, 0.0, 0.125, "vertex 1", "pose 1")
     rotated = measure("joint orientations", math.pi / 2, math.pi / 4, 0.0, "elbow", "own pose")
@@ -59,14 +59,14 @@ def test_rows_of_diff_list_the_worst_vertex_and_pose(tmp_path) -> None:
     assert (bob["size"], bob["unit"], bob["seconds"]) == ("2", "m", "0.25")
 
 
-def test_input_that_cannot_be_compared_has_its_message(tmp_path) -> None:
+def test_input_that_cannot_be_compared_has_its_message(tmp_path):
     values = compared(error="a.skin:3: expected 3 numbers") | {}
     values["comparisons"][0]["actors"] = []
     result = Result(Item(0, (), "", "x"), "failed", 2, message="last line", values=values)
     assert saved(tmp_path / "t.csv", "diff", [result])[0]["message"].startswith("a.skin:3")
 
 
-def test_names_are_not_written_as_formulas_and_keep_their_characters(tmp_path) -> None:
+def test_names_are_not_written_as_formulas_and_keep_their_characters(tmp_path):
     names = ["=cmd|'/c calc'!A0", "-2+3", "@x", 'Zoë, "Z"']
     results = [Result(Item(n, (), "", name), "done") for n, name in enumerate(names)]
     rows = saved(tmp_path / "t.csv", "convert", results)
@@ -74,7 +74,7 @@ def test_names_are_not_written_as_formulas_and_keep_their_characters(tmp_path) -
     assert (tmp_path / "t.csv").read_bytes().startswith(b"\xef\xbb\xbf")
 
 
-def test_rows_of_lint_count_findings(tmp_path) -> None:
+def test_rows_of_lint_count_findings(tmp_path):
     findings = [{"code": "W002"}, {"code": "S004"}, {"code": "W002"}]
     values = {"findings": findings, "counts": {"error": 2, "warning": 1, "note": 0}}
     result = Result(Item(0, (), "", "x"), "done", 1, values=values)
@@ -83,7 +83,7 @@ def test_rows_of_lint_count_findings(tmp_path) -> None:
     assert row["codes"] == "S004 W002"
 
 
-def test_rows_of_info_are_figures_and_each_cell_is_one_value(tmp_path) -> None:
+def test_rows_of_info_are_figures_and_each_cell_is_one_value(tmp_path):
     base = {"size": 2.5, "unit": "m", "model": {}}
     clip = {"range": [1.0, 3.5], "frames": 6, "present_frames": 4, "frame_rate": 2.0,
             "gender": "female", "model": "SMPL-H"}  # fmt: skip
@@ -112,7 +112,7 @@ def test_rows_of_info_are_figures_and_each_cell_is_one_value(tmp_path) -> None:
     assert (failed["name"], failed["figures"], failed["message"]) == ("y", "", "cannot be read")
 
 
-def test_values_of_a_function_are_columns_with_all_digits(tmp_path, monkeypatch) -> None:
+def test_values_of_a_function_are_columns_with_all_digits(tmp_path, monkeypatch):
     returned = {
         "a.txt": {"height": 0.1234567890123, "n": np.int64(3), "seconds": 9, "list": [1, 2],
                   "inner": {"x": np.float32(0.5), "word": "=1"}},
@@ -130,7 +130,7 @@ def test_values_of_a_function_are_columns_with_all_digits(tmp_path, monkeypatch)
     assert "list" not in first and float(first["seconds"]) < 9.0
 
 
-def test_infinite_values_are_the_same_after_a_resumed_run(tmp_path, monkeypatch) -> None:
+def test_infinite_values_are_the_same_after_a_resumed_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.txt").write_text("x")
     for is_resumed in (False, True):

@@ -89,21 +89,19 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_help_without_a_topic_lists_all_topics_and_commands(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_help_without_a_topic_lists_all_topics_and_commands(capsys):
     assert run(["help"]) == 0
     printed = capsys.readouterr().out
     assert all(f"  {topic} " in printed and text in printed for topic, text in PAGES.items())
     assert ", ".join(COMMANDS) in printed
 
 
-def test_pages_are_written_verbatim_to_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pages_are_written_verbatim_to_a_pipe(capsys):
     assert run(["help", "keys"]) == 0
     assert capsys.readouterr().out == page_text("keys")
 
 
-def test_tables_are_formatted_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_are_formatted_in_a_terminal(monkeypatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -115,24 +113,20 @@ def test_tables_are_formatted_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> 
     assert "reset the pose to the file's pose" in printed
 
 
-def test_help_for_a_command_lists_its_options(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_for_a_command_lists_its_options(capsys):
     assert run(["help", "diff"]) == 0
     assert capsys.readouterr().out.startswith("usage: viewer diff")
 
 
 @pytest.mark.parametrize("width", [60, 140])
-def test_help_for_a_command_is_as_wide_as_the_terminal(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, width: int
-) -> None:
+def test_help_for_a_command_is_as_wide_as_the_terminal(capsys, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     assert run(["help", "diff"]) == 0
     lengths = [len(line) for line in capsys.readouterr().out.splitlines()]
     assert width - 20 < max(lengths) < width
 
 
-def test_unknown_topic_suggests_the_nearest_in_one_line(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_unknown_topic_suggests_the_nearest_in_one_line(capsys):
     assert run(["help", "captres"]) == 2
     printed = capsys.readouterr()
     assert printed.out == "" and printed.err.count("\n") == 1

@@ -21,7 +21,7 @@ def rig(tmp_path: Path) -> list[str]:
     return [str(tmp_path / "a.skel"), str(tmp_path / "a.skin")]
 
 
-def test_finding_is_printed_as_a_line_with_location_and_hint(rig, capsys) -> None:
+def test_finding_is_printed_as_a_line_with_location_and_hint(rig, capsys):
     assert run(["lint", *rig]) == 0
     lines = capsys.readouterr().out.splitlines()
     at = next(index for index, line in enumerate(lines) if " W001: " in line)
@@ -38,11 +38,11 @@ def test_finding_is_printed_as_a_line_with_location_and_hint(rig, capsys) -> Non
 @pytest.mark.parametrize(
     ("fail_on", "code"), [("error", 0), ("warning", 1), ("note", 1), ("never", 0)]
 )
-def test_option_fail_on_sets_the_exit_code(rig, capsys, fail_on: str, code: int) -> None:
+def test_option_fail_on_sets_the_exit_code(rig, capsys, fail_on, code):
     assert run(["lint", *rig, "--fail-on", fail_on]) == code
 
 
-def test_errors_fail_by_default_and_are_listed_first(rig, tmp_path: Path, capsys) -> None:
+def test_errors_fail_by_default_and_are_listed_first(rig, tmp_path, capsys):
     missing = str(tmp_path / "none.skel")
     assert run(["lint", *rig, missing]) == 1
     out = capsys.readouterr().out
@@ -51,7 +51,7 @@ def test_errors_fail_by_default_and_are_listed_first(rig, tmp_path: Path, capsys
     assert run(["lint", missing, "--fail-on", "never"]) == 0
 
 
-def test_ignored_codes_do_not_affect_the_exit_code(rig, capsys) -> None:
+def test_ignored_codes_do_not_affect_the_exit_code(rig, capsys):
     arguments = ["lint", *rig, "--fail-on", "warning", "--ignore"]
     found = json_of(["lint", *rig], capsys)["findings"]
     heavy = sorted({f["code"] for f in found if f["severity"] != "note"})
@@ -68,7 +68,7 @@ def json_of(arguments: list[str], capsys) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
-def test_json_contains_every_location(rig, capsys) -> None:
+def test_json_contains_every_location(rig, capsys):
     found = json_of(["lint", *rig], capsys)
     (weights,) = [f for f in found["findings"] if f["code"] == "W001"]
     assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 13, 0)
@@ -78,43 +78,43 @@ def test_json_contains_every_location(rig, capsys) -> None:
     assert found["counts"]["warning"] == sum(f["severity"] == "warning" for f in found["findings"])
 
 
-def test_codes_are_listed(capsys) -> None:
+def test_codes_are_listed(capsys):
     assert run(["lint", "--codes"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(CODES)
     assert lines[0] == "F001  error    unreadable file: check its path and permissions"
 
 
-def test_missing_files_argument_is_refused(capsys) -> None:
+def test_missing_files_argument_is_refused(capsys):
     assert run(["lint", "--fail-on", "never"]) == 2
     said = capsys.readouterr()
     assert "FILES" in said.err and said.err.count("\n") == 1 and not said.out
     assert run(["lint", "--body", "--fail-on", "never"]) == 0
 
 
-def test_bundled_figure_has_no_warnings(capsys) -> None:
+def test_bundled_figure_has_no_warnings(capsys):
     assert run(["lint", *map(str, bundled_files()), "--fail-on", "warning"]) == 0
     assert capsys.readouterr().out.endswith("0 errors, 0 warnings, 3 notes in 2 files\n")
 
 
-def test_valid_rig_and_body_have_no_findings(tmp_path: Path, capsys) -> None:
+def test_valid_rig_and_body_have_no_findings(tmp_path, capsys):
     assert run(["lint", *map(str, write_rig(tmp_path)), "--body"]) == 0
 
 
-def test_largest_speed_can_be_set(shared: Path, capsys) -> None:
+def test_largest_speed_can_be_set(shared, capsys):
     files = [str(shared / name) for name in ("wasp.skel", "wasp.skin", "wasp_walk.anim")]
     assert run(["lint", *files, "--fail-on", "warning"]) == 0
     assert run(["lint", *files, "--fail-on", "warning", "--max-speed", "0.01"]) == 1
     assert " C003: " in capsys.readouterr().out
 
 
-def test_exceeded_size_limit_is_a_finding(rig, capsys) -> None:
+def test_exceeded_size_limit_is_a_finding(rig, capsys):
     assert run(["lint", *rig, "--max-size", "10"]) == 1
     assert "expected at most 10 bytes" in capsys.readouterr().out
     assert run(["lint", *rig, "--max-size", "ten"]) == 2
 
 
-def test_people_in_one_file_are_distinguished(shared_data: Path, capsys) -> None:
+def test_people_in_one_file_are_distinguished(shared_data, capsys):
     points = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     assert run(["lint", str(points)]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if " C012: " in line]
@@ -122,7 +122,7 @@ def test_people_in_one_file_are_distinguished(shared_data: Path, capsys) -> None
     assert lines == [f"{points}: note C012: easymocap body25 {person}: {what}" for person in (0, 1)]
 
 
-def test_ground_height_can_be_set(tmp_path: Path, capsys) -> None:
+def test_ground_height_can_be_set(tmp_path, capsys):
     """A body at 2 m is not below the default ground, but below a ground at 2.5 m."""
     motion = tmp_path / "still.npz"
     rest = np.tile([0.0, 2.0, 0.0], (20, 1))
@@ -136,7 +136,7 @@ def test_ground_height_can_be_set(tmp_path: Path, capsys) -> None:
     assert "--ground" in capsys.readouterr().err
 
 
-def test_keyed_frames_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
+def test_keyed_frames_are_counted_by_fps(rig, tmp_path, capsys):
     still = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
     jump = "0 0 linear linear 1 0 linear linear 1.01 90 linear linear 2 90 linear linear"
     first = f"channel {{ extrapolate constant constant keys 4 {{ {jump} }} }}\n"
@@ -151,7 +151,7 @@ def test_keyed_frames_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
     assert "1 of 49 frames: root moves" in out and "at frame 24, 1.014 s" in out
 
 
-def test_hints_differ_for_findings_without_a_line(tmp_path: Path, capsys) -> None:
+def test_hints_differ_for_findings_without_a_line(tmp_path, capsys):
     (tmp_path / "empty.skel").write_text("")
     (tmp_path / "bad.skel").write_text("balljoint a { offset 1 }")
     run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])

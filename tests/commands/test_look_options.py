@@ -102,7 +102,7 @@ def test_colours_are_those_of_the_named_map(drawn):
 
 
 @pytest.mark.slow
-def test_legend_on_white_is_light(drawn, tmp_path: Path):
+def test_legend_on_white_is_light(drawn, tmp_path):
     """The upper left corner is the panel: nearly white on white, nearly black on the gradient."""
     options = "--scalar", "weight:arm", "--legend", "--size", "320x240"
     corner = drawn(*options)[4:8, 5:9]
@@ -169,7 +169,7 @@ def overlaid(tmp_path: Path, *options: str) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_people_are_drawn_over_their_video(files: tuple[str, str], tmp_path: Path) -> None:
+def test_people_are_drawn_over_their_video(files, tmp_path):
     pixels = overlaid(tmp_path, files[0], "--overlay", files[1])
     assert pixels.shape == (SIZE[1], SIZE[0], 3)
     is_body = np.abs(pixels - GREY).max(axis=2) > 12
@@ -182,24 +182,20 @@ def test_people_are_drawn_over_their_video(files: tuple[str, str], tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_a_video_implies_the_view_of_its_camera(files: tuple[str, str], tmp_path: Path) -> None:
+def test_a_video_implies_the_view_of_its_camera(files, tmp_path):
     options = (files[0], "--space", "camera", "--video", files[1], "--no-grid", "--size", "128x72")
     pixels = overlaid(tmp_path, *options)
     assert abs(pixels[2, 2] - 0.6 * GREY).max() <= 3  # dimmed to 60 %
 
 
 @pytest.mark.slow
-def test_a_video_without_its_view_is_reported(
-    files: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_video_without_its_view_is_reported(files, tmp_path, capsys):
     overlaid(tmp_path, files[0], "--video", files[1], "--azimuth", "30", "--size", "32x32")
     assert "--video: not drawn, because --azimuth asks for another view" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("other", ["--video=v.mp4", "--view=1", "--images=a", "--distance=3"])
-def test_options_that_contradict_an_overlay_are_refused(
-    other: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_options_that_contradict_an_overlay_are_refused(other, tmp_path, capsys):
     command = ["render", "a.pt", "--overlay", "v.mp4", other, "-o", str(tmp_path / "a.png")]
     assert run(command) == 2
     name = other.partition("=")[0]
@@ -208,9 +204,7 @@ def test_options_that_contradict_an_overlay_are_refused(
     )
 
 
-def test_overlay_of_people_in_the_world_only_is_refused(
-    files: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_overlay_of_people_in_the_world_only_is_refused(files, tmp_path, capsys):
     path = tmp_path / "world.pkl"
     path.write_bytes(joblib_file({"rotmat": np.tile(np.eye(3), (2, 24, 1, 1)),
                                   "trans": np.zeros((2, 3))}))  # fmt: skip
@@ -220,9 +214,7 @@ def test_overlay_of_people_in_the_world_only_is_refused(
 
 
 @pytest.mark.slow
-def test_people_in_camera_space_only_get_an_assumed_camera(
-    files: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_people_in_camera_space_only_get_an_assumed_camera(files, tmp_path, capsys):
     path = tmp_path / "camera.pkl"
     turned = np.tile(np.diag([1.0, -1.0, -1.0]), (4, 1, 1, 1))
     poses = np.concatenate([turned, np.tile(np.eye(3), (4, 23, 1, 1))], axis=1)

@@ -31,24 +31,24 @@ def parsed(*words: str) -> Kite:
     return settings_of(Kite, parser.parse_args(words))
 
 
-def test_settings_without_options_are_the_defaults() -> None:
+def test_settings_without_options_are_the_defaults():
     assert parsed() == Kite()
 
 
-def test_options_become_settings() -> None:
+def test_options_become_settings():
     words = "--tail 2 --knots 3 --colour red --no-flies --loops --lines a --lines b --tilt 90"
     wanted = Kite(2.0, 3, "red", flies=False, loops=True, lines=["a", "b"], angle=1.5)
     assert parsed(*words.split()) == wanted
 
 
-def test_fields_without_an_option_are_given() -> None:
+def test_fields_without_an_option_are_given():
     parser = Parser()
     add_settings(parser, Kite, "tail")
     arguments = parser.parse_args(["--tail", "3"])
     assert settings_of(Kite, arguments, spare=8) == Kite(3.0, spare=8)
 
 
-def test_help_states_each_default_once() -> None:
+def test_help_states_each_default_once():
     parser = Parser()
     add_settings(parser, Kite)
     text = parser.format_help()
@@ -66,12 +66,12 @@ def test_help_states_each_default_once() -> None:
         (("--colour", "green"), "expected one of red, blue"),
     ],
 )
-def test_wrong_values_are_refused(words: tuple[str, str], text: str) -> None:
+def test_wrong_values_are_refused(words, text):
     with pytest.raises(ViewerError, match=text):
         parsed(*words)
 
 
-def test_stated_fields_are_those_whose_option_was_given() -> None:
+def test_stated_fields_are_those_whose_option_was_given():
     parser = Parser()
     add_settings(parser, Kite)
     assert stated(Kite, parser.parse_args([])) == set()

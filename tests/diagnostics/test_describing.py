@@ -10,7 +10,7 @@ from viewer.diagnostics import Diagnostic, Phrase, described
 from viewer.phrases import counted
 
 
-def test_description_contains_all_data_of_a_diagnostic() -> None:
+def test_description_contains_all_data_of_a_diagnostic():
     values = {"n": np.int64(2), "joint": "hip", "weight": np.float32(-0.5), "vertex": 7}
     places = np.array([3, 7], dtype=np.int32)
     found = Diagnostic(
@@ -41,7 +41,7 @@ def test_description_contains_all_data_of_a_diagnostic() -> None:
     }
 
 
-def test_values_of_every_kind_can_be_written_as_json() -> None:
+def test_values_of_every_kind_can_be_written_as_json():
     inner = Diagnostic("F001.no-file: found {found}", values={"found": "a folder"})
     values = {
         "found": b"up\xff\n",
@@ -62,7 +62,7 @@ def test_values_of_every_kind_can_be_written_as_json() -> None:
     assert told["problem"]["code"] == "F001"
 
 
-def test_long_location_lists_are_truncated_but_counted() -> None:
+def test_long_location_lists_are_truncated_but_counted():
     found = Diagnostic(
         "C013.no-height: no height", part="joints", places=np.arange(300, dtype=np.int32)
     )
@@ -70,12 +70,12 @@ def test_long_location_lists_are_truncated_but_counted() -> None:
     assert told["places"] == list(range(100)) and told["n_places"] == 300
 
 
-def test_json_pointer_is_the_location_of_a_diagnostic() -> None:
+def test_json_pointer_is_the_location_of_a_diagnostic():
     found = Diagnostic("F002.unknown-folder: no files", Path("a.glb"), pointer="/skins/0/joints/3")
     assert found.place == "a.glb#/skins/0/joints/3"
     assert described(found)["pointer"] == "/skins/0/joints/3"
 
 
-def test_message_without_a_sentence_is_refused() -> None:
+def test_message_without_a_sentence_is_refused():
     with pytest.raises(ValueError, match=r"F002\.unknown-folder"):
         Diagnostic("F002.unknown-folder")

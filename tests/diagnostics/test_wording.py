@@ -47,7 +47,7 @@ def names_in(sentence: str) -> set[str]:
     return {name for _, name, _, _ in Formatter().parse(sentence) if name is not None}
 
 
-def test_every_message_has_a_known_code() -> None:
+def test_every_message_has_a_known_code():
     keys = set()
     for place, key, sentence in sentences():
         assert key.partition(".")[0] in CODES, place
@@ -56,7 +56,7 @@ def test_every_message_has_a_known_code() -> None:
     assert len(keys) > 800
 
 
-def test_every_call_has_a_sentence() -> None:
+def test_every_call_has_a_sentence():
     bare = re.compile(r"[A-Z]\d{3}\.[a-z0-9-]+")
     wrong = [
         f"{path}:{call.lineno}"
@@ -69,7 +69,7 @@ def test_every_call_has_a_sentence() -> None:
     assert wrong == []
 
 
-def test_every_call_supplies_the_values_of_its_sentence() -> None:
+def test_every_call_supplies_the_values_of_its_sentence():
     wrong, n_checked = [], 0
     for path, tree in trees().items():
         for call in ast.walk(tree):
@@ -108,7 +108,7 @@ def _names_of(call: ast.Call) -> set[str] | None:
     return {getattr(name, "value", "") for name in values.keys}
 
 
-def test_messages_name_controls_in_the_window_and_options_elsewhere() -> None:
+def test_messages_name_controls_in_the_window_and_options_elsewhere():
     note = Diagnostic(
         wording.NO_RATE, values={"rate": 30, "remedy": Remedy("the Timeline", "--fps")}
     )
@@ -119,7 +119,7 @@ def test_messages_name_controls_in_the_window_and_options_elsewhere() -> None:
     assert note.values == {"rate": 30}
 
 
-def test_data_names_options_even_while_a_window_is_open() -> None:
+def test_data_names_options_even_while_a_window_is_open():
     note = Diagnostic(
         wording.NO_RATE, values={"rate": 30, "remedy": Remedy("the Timeline", "--fps")}
     )
@@ -139,7 +139,7 @@ def test_data_names_options_even_while_a_window_is_open() -> None:
     assert finding["hint"] == found.hint == CODES["W001"].hint and "--normalize" in found.hint
 
 
-def test_remedies_of_codes_name_no_options_in_the_window() -> None:
+def test_remedies_of_codes_name_no_options_in_the_window():
     for code in CODES.values():
         with in_window():
             hints = (code.hint, code.other_hint)
@@ -148,7 +148,7 @@ def test_remedies_of_codes_name_no_options_in_the_window() -> None:
         )
 
 
-def test_values_are_text_in_the_sentence_and_data_elsewhere() -> None:
+def test_values_are_text_in_the_sentence_and_data_elsewhere():
     found = Diagnostic(
         "W006.joints: {n} no influence: {names}{more}",
         values={
@@ -163,12 +163,12 @@ def test_values_are_text_in_the_sentence_and_data_elsewhere() -> None:
     assert found.sentence == "{n} no influence: {names}{more}"
 
 
-def test_text_from_files_is_escaped_in_sentences() -> None:
+def test_text_from_files_is_escaped_in_sentences():
     phrase = Phrase("joint {name}", name="a\nb")
     assert str(phrase) == "joint a\\nb" and phrase == "joint a\\nb"
     found = Diagnostic("F002.item: {item}: {found:g}", values={"item": phrase, "found": 2.0})
     assert found.message == "joint a\\nb: 2"
 
 
-def test_empty_name_list_reads_as_none() -> None:
+def test_empty_name_list_reads_as_none():
     assert listed([]) == "none" and listed([]).value == []

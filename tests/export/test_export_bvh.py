@@ -3,7 +3,6 @@
 import itertools
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import faults
 import numpy as np
@@ -50,11 +49,11 @@ def body(tmp_path_factory) -> Figure:
     return family_figure("smpl", tmp_path_factory.mktemp("model"))
 
 
-def test_bvh_is_registered() -> None:
+def test_bvh_is_registered():
     assert exporters_of("walk.bvh", "frames") == ["bvh"]
 
 
-def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -> None:
+def test_body_joints_match_an_independent_reader(body, tmp_path):
     animation = body_animation(body)
     found, notes = write(animation, tmp_path)
     assert_places(found, animation, 100.0)
@@ -64,7 +63,7 @@ def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -
     assert len(notes) == 1  # no loss is reported
 
 
-def test_constraints_move_joints_but_not_the_offsets_of_the_file(tmp_path: Path) -> None:
+def test_constraints_move_joints_but_not_the_offsets_of_the_file(tmp_path):
     # The aimed joint points at the arm also at rest, where its own child is turned with it.
     parents = np.array([-1, 0, 1, 1, 3], dtype=np.int32)
     places = np.array([[0.0, 1, 0], [0, 2, 0], [1, 2, 0], [0, 2, 2], [0, 2, 3]])
@@ -83,7 +82,7 @@ def test_constraints_move_joints_but_not_the_offsets_of_the_file(tmp_path: Path)
     assert len(notes) == 1  # no loss is reported
 
 
-def test_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
+def test_file_uses_the_common_syntax(body, tmp_path):
     found, _ = write(body_animation(body), tmp_path)  # the second reader checks the grammar
     assert found.offsets[0] == [0.0, 0.0, 0.0]
     positions = ["Xposition", "Yposition", "Zposition"]
@@ -98,7 +97,7 @@ def test_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
-def test_every_rotation_order_is_written(body: Figure, order: str, tmp_path: Path) -> None:
+def test_every_rotation_order_is_written(body, order, tmp_path):
     animation = body_animation(body, seed=3)
     found, notes = write(animation, tmp_path, rotation_order=order)
     assert_places(found, animation, 100.0)
@@ -108,9 +107,7 @@ def test_every_rotation_order_is_written(body: Figure, order: str, tmp_path: Pat
 
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])
 @pytest.mark.parametrize("kind", ["smpl", "smplx"])
-def test_units_hands_and_face_are_written(
-    kind: str, unit: str, factor: float, tmp_path: Path
-) -> None:
+def test_units_hands_and_face_are_written(kind, unit, factor, tmp_path):
     figure = family_figure(kind, tmp_path)
     animation = body_animation(figure)
     found, notes = write(animation, tmp_path, unit=unit)
@@ -129,9 +126,7 @@ def test_units_hands_and_face_are_written(
         ("z", "", TO_Y),
     ],
 )
-def test_up_axis_of_the_file_rotates_the_motion(
-    body: Figure, world: str, up: str, turn: np.ndarray, tmp_path: Path
-) -> None:
+def test_up_axis_of_the_file_rotates_the_motion(body, world, up, turn, tmp_path):
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, world_up=world, up=up)
     assert_places(found, animation, 100.0, turn)
@@ -141,7 +136,7 @@ def test_up_axis_of_the_file_rotates_the_motion(
     assert f" {up or 'y'} up," in notes[0]
 
 
-def test_figure_with_z_up_is_upright_at_rest_in_a_y_up_file(tmp_path: Path) -> None:
+def test_figure_with_z_up_is_upright_at_rest_in_a_y_up_file(tmp_path):
     animation = rig_animation(chain())
     animation = replace(animation, figure=replace(animation.figure, up="z"))
     found, _ = write(animation, tmp_path, world_up="z")
@@ -150,7 +145,7 @@ def test_figure_with_z_up_is_upright_at_rest_in_a_y_up_file(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("rate", [24.0, 25.0, 29.97, 30.0, 59.94, 60.0, 120.0, 240.0, 1000.0, 0.25])
-def test_frame_time_is_exact(body: Figure, rate: float, tmp_path: Path) -> None:
+def test_frame_time_is_exact(body, rate, tmp_path):
     animation = replace(body_animation(body), frame_rate=rate)
     found, _ = write(animation, tmp_path)
     assert found.frame_time * rate == pytest.approx(1.0, abs=1e-8)
@@ -158,7 +153,7 @@ def test_frame_time_is_exact(body: Figure, rate: float, tmp_path: Path) -> None:
     assert again.clip.timing.frame_rate == pytest.approx(rate, rel=1e-8)
 
 
-def test_rest_frame_is_first(body: Figure, tmp_path: Path) -> None:
+def test_rest_frame_is_first(body, tmp_path):
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, rest_frame=True)
     assert_places(found, animation, 100.0, skip=1)
@@ -166,7 +161,7 @@ def test_rest_frame_is_first(body: Figure, tmp_path: Path) -> None:
     assert "the rest pose and 12 frames (0 to 11)" in notes[0]
 
 
-def test_offsets_are_those_of_the_shape(body: Figure, tmp_path: Path) -> None:
+def test_offsets_are_those_of_the_shape(body, tmp_path):
     animation = body_animation(body)
     found, _ = write(animation, tmp_path)
     shaped = viewer.rig.shape.shaped(body, animation.frames.shape_weights[0]).skeleton
@@ -175,7 +170,7 @@ def test_offsets_are_those_of_the_shape(body: Figure, tmp_path: Path) -> None:
         np.testing.assert_allclose(offset, 100 * shaped.rest_translations[joint], atol=1e-6)
 
 
-def test_error_of_a_changing_shape_is_reported(tmp_path: Path) -> None:
+def test_error_of_a_changing_shape_is_reported(tmp_path):
     figure = family_figure("smpl", tmp_path)
     animation = body_animation(figure)
     weights = np.repeat(animation.frames.shape_weights, 12, axis=0)
@@ -211,7 +206,7 @@ def test_error_of_a_changing_shape_is_reported(tmp_path: Path) -> None:
 GAPS = [0, 1, -1, -1, 2, 3, -1, 4, -1]
 
 
-def test_last_pose_is_held_in_gaps(body: Figure, tmp_path: Path) -> None:
+def test_last_pose_is_held_in_gaps(body, tmp_path):
     animation = body_animation(body, 5, GAPS)
     found, notes = write(animation, tmp_path)
     assert_places(found, animation, 100.0)
@@ -221,13 +216,13 @@ def test_last_pose_is_held_in_gaps(body: Figure, tmp_path: Path) -> None:
     assert len(notes) == 2
 
 
-def test_first_pose_is_held_in_a_gap_at_the_start(body: Figure, tmp_path: Path) -> None:
+def test_first_pose_is_held_in_a_gap_at_the_start(body, tmp_path):
     found, notes = write(body_animation(body, 2, [-1, -1, 0, 1]), tmp_path)
     assert found.frames[0] == found.frames[1] == found.frames[2] != found.frames[3]
     assert notes[1] == "missing frames 0 to 1: the first pose is held"
 
 
-def test_gaps_are_interpolated_on_the_shorter_arc(tmp_path: Path) -> None:
+def test_gaps_are_interpolated_on_the_shorter_arc(tmp_path):
     turns = quaternions(np.array([[[0, 0, 0.2]], [[0, 0, 0.8]]]))
     turns[1] *= -1.0
     shifts = np.array([[[0.0, 0, 0]], [[3.0, 0, 6]]])
@@ -239,7 +234,7 @@ def test_gaps_are_interpolated_on_the_shorter_arc(tmp_path: Path) -> None:
     assert notes[1] == "missing frames 1 to 2: interpolated, held at both ends"
 
 
-def test_gaps_split_into_files(body: Figure, tmp_path: Path) -> None:
+def test_gaps_split_into_files(body, tmp_path):
     animation = body_animation(body, 5, GAPS)
     notes = faults.lines(
         export_frames(animation, tmp_path / "out.bvh", "bvh", ExportOptions(gaps="split"))
@@ -256,7 +251,7 @@ def test_gaps_split_into_files(body: Figure, tmp_path: Path) -> None:
     assert notes[-1] == "missing frames 2 to 3, 6, 8: one file for each run of frames"
 
 
-def test_failure_of_one_file_removes_all_files(body: Figure, tmp_path: Path) -> None:
+def test_failure_of_one_file_removes_all_files(body, tmp_path):
     (tmp_path / "out-1.bvh").write_text("old")
     (tmp_path / "out-3.bvh").mkdir()
     with pytest.raises(OutputError):
@@ -268,14 +263,14 @@ def test_failure_of_one_file_removes_all_files(body: Figure, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("unit", ["m", "cm"])
-def test_bundled_body_is_exact(unit: str, tmp_path: Path) -> None:
+def test_bundled_body_is_exact(unit, tmp_path):
     animation = body_animation(viewer.load(bundled_body()).actors[0].figure, 20, seed=7)
     found, notes = write(animation, tmp_path, unit=unit)
     assert_places(found, animation, {"m": 1.0, "cm": 100.0}[unit])
     assert len(notes) == 1
 
 
-def test_motion_of_the_wasp_round_trips(shared: Path, tmp_path: Path) -> None:
+def test_motion_of_the_wasp_round_trips(shared, tmp_path):
     actor = viewer.load(shared / "wasp.skel", shared / "wasp_walk.anim").actors[0]
     animation = sample_animation(actor)
     found, _ = write(animation, tmp_path)
@@ -286,7 +281,7 @@ def test_motion_of_the_wasp_round_trips(shared: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(joints_of(again), joints_of(animation), atol=1e-6)
 
 
-def test_bvh_round_trips_with_its_end_sites(tmp_path: Path) -> None:
+def test_bvh_round_trips_with_its_end_sites(tmp_path):
     first, _ = write(rig_animation(chain(4)), tmp_path)
     motion = bvh.read(Source.open(tmp_path / "out.bvh"))
     animation = sample_animation(Actor(motion.figure, clip=motion.clip))
@@ -296,7 +291,7 @@ def test_bvh_round_trips_with_its_end_sites(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_keyed_clips_with_root_translation_are_written(tmp_path: Path) -> None:
+def test_keyed_clips_with_root_translation_are_written(tmp_path):
     figure = viewer.load().actors[0].figure
     rng = np.random.default_rng(2)
     channels = tuple(
@@ -311,7 +306,7 @@ def test_keyed_clips_with_root_translation_are_written(tmp_path: Path) -> None:
     assert not [note for note in notes[1:] if " between frames " not in note]
 
 
-def test_fewer_digits_lose_precision_with_a_note(body: Figure, tmp_path: Path) -> None:
+def test_fewer_digits_lose_precision_with_a_note(body, tmp_path):
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, digits=2)
     wanted = joints_of(animation) * 100
@@ -325,7 +320,7 @@ def test_fewer_digits_lose_precision_with_a_note(body: Figure, tmp_path: Path) -
     assert said > 0.01
 
 
-def test_file_drives_the_body_from_which_it_was_written(body: Figure, tmp_path: Path) -> None:
+def test_file_drives_the_body_from_which_it_was_written(body, tmp_path):
     animation = body_animation(body)
     flat = replace(animation.frames, shape_weights=np.zeros((1, body.n_shapes)))
     animation = replace(animation, frames=flat)
@@ -352,13 +347,13 @@ def test_file_drives_the_body_from_which_it_was_written(body: Figure, tmp_path: 
         ({"digits": 0}, "digits: expected 1 to 15, found 0"),
     ],
 )
-def test_unknown_options_are_refused(options: dict, message: str, tmp_path: Path) -> None:
+def test_unknown_options_are_refused(options, message, tmp_path):
     with pytest.raises(RigError) as caught:
         write(rig_animation(chain()), tmp_path, **options)
     assert str(caught.value) == message
 
 
-def test_absent_or_non_finite_motion_is_refused(body: Figure, tmp_path: Path) -> None:
+def test_absent_or_non_finite_motion_is_refused(body, tmp_path):
     animation = body_animation(body)
     none = replace(animation, frames=replace(animation.frames, present=np.zeros(12, dtype=bool)))
     with pytest.raises(RigError, match="no person is present in frame"):
@@ -372,7 +367,7 @@ def test_absent_or_non_finite_motion_is_refused(body: Figure, tmp_path: Path) ->
     assert not (tmp_path / "out.bvh").exists()
 
 
-def test_deep_chains_are_written(tmp_path: Path) -> None:
+def test_deep_chains_are_written(tmp_path):
     count = 3000
     names = tuple(f"j{i}" for i in range(count))
     deep = ball_skeleton(names, np.arange(count) - 1, np.arange(count)[:, None] * [0.0, 0.001, 0.0])
@@ -382,7 +377,7 @@ def test_deep_chains_are_written(tmp_path: Path) -> None:
     assert len(found.text) < 2e6
 
 
-def test_rest_rotations_are_removed_from_the_rest_pose(tmp_path: Path) -> None:
+def test_rest_rotations_are_removed_from_the_rest_pose(tmp_path):
     rng = np.random.default_rng(5)
     skeleton = chain(4)
     skeleton = replace(skeleton, rest_rotations=quaternions(rng.uniform(-2, 2, (4, 3))))
@@ -395,7 +390,7 @@ def test_rest_rotations_are_removed_from_the_rest_pose(tmp_path: Path) -> None:
     assert_places(write(moving, tmp_path)[0], moving)
 
 
-def test_scales_at_rest_are_baked(tmp_path: Path) -> None:
+def test_scales_at_rest_are_baked(tmp_path):
     skeleton = replace(chain(4), rest_scales=np.array([[2.0] * 3, [0.5] * 3, [3.0] * 3, [1.0] * 3]))
     animation = rig_animation(skeleton)
     found, notes = write(animation, tmp_path)
@@ -404,7 +399,7 @@ def test_scales_at_rest_are_baked(tmp_path: Path) -> None:
     assert all(len(channels) == 3 for channels in found.channels[1:]) and len(notes) == 1
 
 
-def test_non_uniform_scales_are_written_as_position_channels(tmp_path: Path) -> None:
+def test_non_uniform_scales_are_written_as_position_channels(tmp_path):
     skeleton = replace(chain(4), rest_scales=np.array([[2.0, 1.0, 0.5], *[[1.0] * 3] * 3]))
     animation = rig_animation(skeleton)
     found, notes = write(animation, tmp_path)
@@ -413,7 +408,7 @@ def test_non_uniform_scales_are_written_as_position_channels(tmp_path: Path) -> 
     assert notes[1] == ("2 joints below the root translate and have position channels: c, d")
 
 
-def test_moving_joints_get_position_channels_and_shifted_joints_an_offset(tmp_path: Path) -> None:
+def test_moving_joints_get_position_channels_and_shifted_joints_an_offset(tmp_path):
     shifts = np.zeros((6, 4, 3))
     shifts[:, 1] = 0.25, 0.5, -1.0
     shifts[3:, 3, 0] = 2.0
@@ -425,7 +420,7 @@ def test_moving_joints_get_position_channels_and_shifted_joints_an_offset(tmp_pa
     assert notes[1] == ("1 joint below the root translates and has position channels: d")
 
 
-def test_constant_scale_is_exact_and_changing_scale_is_reported(tmp_path: Path) -> None:
+def test_constant_scale_is_exact_and_changing_scale_is_reported(tmp_path):
     animation = rig_animation(
         chain(), figure_scales=np.full(6, 2.5), figure_translations=np.ones((6, 3))
     )
@@ -440,7 +435,7 @@ def test_constant_scale_is_exact_and_changing_scale_is_reported(tmp_path: Path) 
     assert notes[2] == ("the figure's scale changes from 1 to 2: bone lengths are written with 1")
 
 
-def test_several_roots_get_a_common_parent(tmp_path: Path) -> None:
+def test_several_roots_get_a_common_parent(tmp_path):
     skeleton = replace(chain(4), parents=np.array([-1, 0, -1, 2]), names=("root", "b", "c", "d"))
     shifts = np.zeros((6, 4, 3))
     shifts[:, 2, 1] = np.arange(6)
@@ -455,7 +450,7 @@ def test_several_roots_get_a_common_parent(tmp_path: Path) -> None:
 ODD = ("left leg", "", "left leg", "é:x", "mixamorig:Hips", "spine.001", "センター", "a  b")
 
 
-def test_names_are_written_as_they_are(tmp_path: Path) -> None:
+def test_names_are_written_as_they_are(tmp_path):
     animation = rig_animation(replace(chain(8), names=ODD))
     found, notes = write(animation, tmp_path)
     assert found.names == [*ODD]
@@ -473,7 +468,7 @@ def test_names_are_written_as_they_are(tmp_path: Path) -> None:
     assert len(notes) == 2
 
 
-def test_safe_names_are_unique_and_ascii_and_each_change_is_said(tmp_path: Path) -> None:
+def test_safe_names_are_unique_and_ascii_and_each_change_is_said(tmp_path):
     animation = rig_animation(replace(chain(8), names=ODD))
     found, notes = write(animation, tmp_path, safe_names=True)
     assert found.names == ["left_leg", "joint1", "left_leg_2", "e_x", "mixamorig_Hips",
@@ -482,14 +477,14 @@ def test_safe_names_are_unique_and_ascii_and_each_change_is_said(tmp_path: Path)
     assert "センター to joint6" in notes[1]
 
 
-def test_names_that_the_format_cannot_hold_are_changed_and_said(tmp_path: Path) -> None:
+def test_names_that_the_format_cannot_hold_are_changed_and_said(tmp_path):
     names = ("a{b}", "c\nd", " e ", "offset 3", "f\ud800")
     found, notes = write(rig_animation(replace(chain(5), names=names)), tmp_path)
     assert found.names == ["a_b_", "c_d", "e", "offset_3", "f_"]
     assert notes[1].startswith("5 joint names changed: a{b} to a_b_, ")
 
 
-def test_lengths_of_a_figure_without_a_unit_are_unscaled(tmp_path: Path) -> None:
+def test_lengths_of_a_figure_without_a_unit_are_unscaled(tmp_path):
     animation = rig_animation(chain())
     found, notes = write(animation, tmp_path, unit="cm")
     assert_places(found, animation)
@@ -497,7 +492,7 @@ def test_lengths_of_a_figure_without_a_unit_are_unscaled(tmp_path: Path) -> None
     assert notes[1] == "lengths are unchanged: the unit of rig is unknown"
 
 
-def test_end_sites_are_half_the_last_bone_or_end_at_the_skin(tmp_path: Path) -> None:
+def test_end_sites_are_half_the_last_bone_or_end_at_the_skin(tmp_path):
     found, _ = write(rig_animation(chain()), tmp_path)
     np.testing.assert_allclose(found.ends[2], [0, 0.5, 0.25])
     boxes = np.zeros((3, 2, 3))
@@ -508,7 +503,7 @@ def test_end_sites_are_half_the_last_bone_or_end_at_the_skin(tmp_path: Path) -> 
     np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone determines the direction
 
 
-def test_end_sites_of_the_bundled_body_are_on_its_skin(tmp_path: Path) -> None:
+def test_end_sites_of_the_bundled_body_are_on_its_skin(tmp_path):
     figure = viewer.load(bundled_body()).actors[0].figure
     found, _ = write(body_animation(figure, 2), tmp_path, unit="m")
     head = found.ends[found.names.index("head")]
@@ -533,7 +528,7 @@ angle = quarter | st.floats(-7, 7)
     st.sampled_from(ROTATION_ORDERS),
     st.lists(st.tuples(angle, angle, angle), min_size=1, max_size=8),
 )
-def test_angles_reproduce_rotations_even_at_gimbal_lock(order: str, rows: list) -> None:
+def test_angles_reproduce_rotations_even_at_gimbal_lock(order, rows):
     turns = np.array([angle_product(order, row) for row in rows])
     for angles in (euler_angles(turns, order), unrolled(euler_angles(turns, order), order)):
         for row, turn in zip(angles, turns, strict=True):
@@ -542,7 +537,7 @@ def test_angles_reproduce_rotations_even_at_gimbal_lock(order: str, rows: list) 
 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
 @pytest.mark.parametrize("which", [0, 1, 2])
-def test_angles_are_unwrapped(order: str, which: int) -> None:
+def test_angles_are_unwrapped(order, which):
     # One axis rotates by several revolutions, and the middle angle passes 90 degrees.
     wanted = np.tile([0.3, 0.2, -0.4], (400, 1))
     wanted[:, which] += np.linspace(0, 15, 400)
@@ -551,25 +546,25 @@ def test_angles_are_unwrapped(order: str, which: int) -> None:
     np.testing.assert_allclose(np.diff(found, axis=0), np.diff(wanted, axis=0), atol=1e-9)
 
 
-def test_gimbal_locked_frame_keeps_the_previous_angles() -> None:
+def test_gimbal_locked_frame_keeps_the_previous_angles():
     wanted = np.array([[1.0, 1.2, 0.5], [1.0, np.pi / 2, 0.5], [1.0, 1.3, 0.5]])
     for order in ROTATION_ORDERS:
         turns = np.array([angle_product(order, row) for row in wanted])
         np.testing.assert_allclose(unrolled(euler_angles(turns, order), order), wanted, atol=1e-8)
 
 
-def test_all_rotation_orders_are_supported() -> None:
+def test_all_rotation_orders_are_supported():
     assert sorted(ROTATION_ORDERS) == sorted("".join(p) for p in itertools.permutations("xyz"))
 
 
-def test_repeated_empty_and_foreign_names_become_safe() -> None:
+def test_repeated_empty_and_foreign_names_become_safe():
     names = ["hip", "hip", "hip_2", "", "left knee", "Zähler", "日本", "a:b", "a_b"]
     expected = ("hip", "hip_3", "hip_2", "joint3", "left_knee", "Zahler", "joint6", "a_b_2", "a_b")
     assert safe_names(names) == expected
 
 
 @given(st.lists(st.text(max_size=6) | st.sampled_from(["a", "a_2", "a_3", "joint1"]), max_size=12))
-def test_safe_names_of_arbitrary_names_are_valid_and_unique(names: list[str]) -> None:
+def test_safe_names_of_arbitrary_names_are_valid_and_unique(names):
     found = safe_names(names)
     assert len(set(found)) == len(names)
     assert all(name and set(name) <= set(PLAIN) for name in found)

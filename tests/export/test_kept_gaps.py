@@ -1,7 +1,6 @@
 """Missing frames in formats that can omit them, which stay missing unless requested otherwise."""
 
 import json
-from pathlib import Path
 
 import faults
 import numpy as np
@@ -168,7 +167,7 @@ def keyed(times: np.ndarray) -> File:
 
 
 @pytest.mark.parametrize("suffix", [".bvh", ".glb"])
-def test_frames_are_the_keys(tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture) -> None:
+def test_frames_are_the_keys(tmp_path, suffix, capsys):
     source, path = tmp_path / "keys.glb", tmp_path / f"frames{suffix}"
     source.write_bytes(keyed(np.arange(13) / 120.0).glb())
     assert run(["convert", str(source), "-o", str(path), "--frames", "0:"]) == 0
@@ -179,9 +178,7 @@ def test_frames_are_the_keys(tmp_path: Path, suffix: str, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize(("options", "said"), [((), True), (("--fps", "50"), False)])
-def test_rate_of_irregular_keys_is_reported(
-    tmp_path: Path, options: tuple[str, ...], said: bool, capsys: pytest.CaptureFixture
-) -> None:
+def test_rate_of_irregular_keys_is_reported(tmp_path, options, said, capsys):
     source, path = tmp_path / "keys.glb", tmp_path / "frames.npz"
     source.write_bytes(keyed(np.array([0.0, 0.1, 0.1234, 0.2])).glb())
     assert run(["convert", str(source), "-o", str(path), *options]) == 0

@@ -1,10 +1,8 @@
 """The .anim reader and writer: grammar, quirks, and messages."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from faults import Fault, fault_of, refusal_of
+from faults import fault_of, refusal_of
 from formats.anim_text import GOOD, parse
 from formats.synthetic_smpl import model
 
@@ -17,7 +15,7 @@ from viewer.rig.motion.clip import Channel, Clip
 SKEL = "balljoint root { offset 0 0 0 }"
 
 
-def test_all_values_are_read() -> None:
+def test_all_values_are_read():
     clip, warnings = parse(GOOD)
     assert (clip.name, clip.start, clip.end, warnings) == ("walk", -1.0, 4.0, [])
     (channel,) = clip.channels
@@ -39,12 +37,12 @@ def test_all_values_are_read() -> None:
     ],
     ids=["crlf", "cr", "tabs", "numbered", "glued", "byte order mark"],
 )
-def test_quirks_load_without_warnings(text: str) -> None:
+def test_quirks_load_without_warnings(text):
     clip, warnings = parse(text)
     assert len(clip.channels) == 1 and warnings == []
 
 
-def test_clip_round_trips(tmp_path: Path) -> None:
+def test_clip_round_trips(tmp_path):
     clip, _ = parse(GOOD)
     write(clip, tmp_path / "copy.anim")
     again = read(Source.open(tmp_path / "copy.anim"))
@@ -56,7 +54,7 @@ def test_clip_round_trips(tmp_path: Path) -> None:
         assert (old.tangents, old.extrapolation) == (new.tangents, new.extrapolation)
 
 
-def test_tangents_may_mix_rules_and_slopes_on_both_sides() -> None:
+def test_tangents_may_mix_rules_and_slopes_on_both_sides():
     keys = "0 1 13.7 -0.22 1 2 flat -.75 2 3 +1e-1 linear 3 4 smooth 5."
     channel = f"channel {{ extrapolate linear cycle keys 4 {{ {keys} }} }}"
     clip, warnings = parse(f"animation {{ range 0 1 numchannels 1 {channel} }}")
@@ -69,7 +67,7 @@ def test_tangents_may_mix_rules_and_slopes_on_both_sides() -> None:
     )
 
 
-def test_range_may_differ_from_the_keys_and_between_channels() -> None:
+def test_range_may_differ_from_the_keys_and_between_channels():
     channels = (
         "channel 0{extrapolate constant cycle keys 2{-1 1 flat flat 1 2 flat flat}}"
         "channel 1{extrapolate linear bounce keys 1{2 7 flat flat}}"
@@ -80,28 +78,28 @@ def test_range_may_differ_from_the_keys_and_between_channels() -> None:
     assert [channel.target for channel in clip.channels] == [0, 1]
 
 
-def test_keys_at_the_same_time_are_both_kept() -> None:
+def test_keys_at_the_same_time_are_both_kept():
     clip, warnings = parse(GOOD.replace("{ 0 1", "{ 2 1"))
     assert warnings == [] and clip.channels[0].times.tolist() == [2.0, 2.0]
 
 
-def test_reversed_range_is_swapped_with_a_warning() -> None:
+def test_reversed_range_is_swapped_with_a_warning():
     clip, warnings = parse(GOOD.replace("range -1 4", "range 4 -1"))
     assert (clip.start, clip.end) == (-1.0, 4.0)
     assert warnings == [("F007.anim-reversed", 1, {"start": "-1", "end": "4"})]
 
 
-def test_text_after_the_animation_is_ignored_with_a_warning() -> None:
+def test_text_after_the_animation_is_ignored_with_a_warning():
     assert parse(f"{GOOD} more")[1] == [("F006.anim-after", 1, {"found": b"more"})]
 
 
-def test_missing_range_is_taken_from_the_keys() -> None:
+def test_missing_range_is_taken_from_the_keys():
     clip, warnings = parse(GOOD.replace("range -1 4 ", ""))
     assert (clip.start, clip.end) == (0.0, 2.0)
     assert warnings == [("F007.anim-no-range", None, {"start": "0", "end": "2"})]
 
 
-def test_numpy_scalars_are_written_as_numbers(tmp_path: Path) -> None:
+def test_numpy_scalars_are_written_as_numbers(tmp_path):
     tangents = ((np.float64(0.1), "flat"),)
     channel = Channel(0, np.array([1 / 3]), np.array([2 / 3]), tangents)
     write(Clip("c", (channel,), np.float64(0.1), np.float64(1e-17 + 0.3)), tmp_path / "c.anim")
@@ -111,7 +109,7 @@ def test_numpy_scalars_are_written_as_numbers(tmp_path: Path) -> None:
     )
 
 
-def test_write_refuses_channels_out_of_order(tmp_path: Path) -> None:
+def test_write_refuses_channels_out_of_order(tmp_path):
     channel = Channel(3, np.zeros(1), np.zeros(1), (("flat", "flat"),))
     clip = Clip("odd", (channel,), 0, 1)
     with pytest.raises(UnsupportedFormatError) as caught:
@@ -119,7 +117,7 @@ def test_write_refuses_channels_out_of_order(tmp_path: Path) -> None:
     assert fault_of(caught.value.diagnostic) == ("F002.anim-order", None, {})
 
 
-def test_write_refuses_a_figure(tmp_path: Path) -> None:
+def test_write_refuses_a_figure(tmp_path):
     figure = read(Source("a.skel", SKEL.encode()))
     assert isinstance(figure, Figure)
     with pytest.raises(UnsupportedFormatError) as caught:
@@ -127,11 +125,11 @@ def test_write_refuses_a_figure(tmp_path: Path) -> None:
     assert fault_of(caught.value.diagnostic) == ("F002.anim-figure", None, {})
 
 
-def test_clip_is_recognised_by_content() -> None:
+def test_clip_is_recognised_by_content():
     assert detect(Source("walk.txt", GOOD.encode())) == "anim"
 
 
-def test_clip_of_another_skeleton_is_refused_with_both_dof_counts(tmp_path: Path) -> None:
+def test_clip_of_another_skeleton_is_refused_with_both_dof_counts(tmp_path):
     (tmp_path / "a.skel").write_text(SKEL)
     (tmp_path / "a.anim").write_text(GOOD)
     with pytest.raises(RigError) as caught:
@@ -141,7 +139,7 @@ def test_clip_of_another_skeleton_is_refused_with_both_dof_counts(tmp_path: Path
     )
 
 
-def test_clip_for_a_body_is_refused_with_the_reason(tmp_path: Path) -> None:
+def test_clip_for_a_body_is_refused_with_the_reason(tmp_path):
     """The wasp's 72 channels and SMPL's 72 values have different meanings."""
     np.savez(tmp_path / "smpl.npz", **model("smpl", 32))
     channel = "channel { extrapolate linear linear keys 1 { 0 0 flat flat } } "
@@ -155,13 +153,13 @@ def test_clip_for_a_body_is_refused_with_the_reason(tmp_path: Path) -> None:
     )
 
 
-def test_clip_without_a_skeleton_is_refused(tmp_path: Path) -> None:
+def test_clip_without_a_skeleton_is_refused(tmp_path):
     (tmp_path / "a.anim").write_text(GOOD)
     with pytest.raises(RigError, match=r"open it together with its \.skel"):
         load(tmp_path / "a.anim")
 
 
-def test_clip_poses_its_actor_at_the_start_of_the_range(tmp_path: Path) -> None:
+def test_clip_poses_its_actor_at_the_start_of_the_range(tmp_path):
     key = "channel {{ extrapolate linear linear keys 2 {{ 0 0 flat {0} 1 {0} {0} flat }} }}"
     channels = " ".join(key.format(value) for value in (1, 2, 3, 0.1, 0.2, 0.3))
     (tmp_path / "a.skel").write_text(SKEL.replace("offset", "rotylimit 0 0.05 offset"))
@@ -172,13 +170,13 @@ def test_clip_poses_its_actor_at_the_start_of_the_range(tmp_path: Path) -> None:
     np.testing.assert_allclose(actor.pose.dofs, [1, 2, 3, 0.1, 0.05, 0.3], atol=1e-12)
 
 
-def test_unsorted_keys_are_sorted_with_a_warning() -> None:
+def test_unsorted_keys_are_sorted_with_a_warning():
     clip, warnings = parse(GOOD.replace("0 1 flat smooth 2", "3 1 flat smooth 2"))
     np.testing.assert_array_equal(clip.channels[0].times, [2, 3])
     assert warnings == [("C001.anim-sorted", 1, {"channel": 0, "late": 1, "before": 0})]
 
 
-def test_channel_without_keys_is_reported_as_a_warning() -> None:
+def test_channel_without_keys_is_reported_as_a_warning():
     _, warnings = parse("animation { range 0 1 numchannels 1 channel { keys 0 { } } }")
     assert warnings == [("C010.anim-no-keys", None, {"channel": 0})]
 
@@ -390,11 +388,11 @@ def test_channel_without_keys_is_reported_as_a_warning() -> None:
         ),
     ],
 )
-def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) -> None:
+def test_malformed_files_are_refused_with_their_line(text, fault):
     assert refusal_of(lambda: parse(text)) == fault
 
 
-def test_truncation_anywhere_is_an_error_or_a_warning() -> None:
+def test_truncation_anywhere_is_an_error_or_a_warning():
     for length in range(len(GOOD)):
         try:
             _, warnings = parse(GOOD[:length])

@@ -4,7 +4,6 @@ import os
 import random
 import subprocess
 import sys
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,45 +21,45 @@ from viewer.media.saving import Replacement, save_parts
 from viewer.media.unfinished import new_prefix, remove_leftovers, remove_unfinished
 
 
-def test_invalid_vertex_is_placed_between_its_neighbours() -> None:
+def test_invalid_vertex_is_placed_between_its_neighbours():
     figure, _ = gone_on(skin, SKIN.replace("2 0 0", "2 nan 0", 1), "a.skin")
     # This is the middle of (0, 0, 0) and (0, 2, 0).
     assert figure.mesh.positions.tolist() == [[0, 0, 0], [0, 1, 0], [0, 2, 0]]
     assert figure.mesh.n_triangles == 1 and figure.skin.weights.tolist() == [1, 0.25, 0.75, 1]
 
 
-def test_invalid_weight_becomes_0_and_other_weights_are_unchanged() -> None:
+def test_invalid_weight_becomes_0_and_other_weights_are_unchanged():
     figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "2 0 nan 1", 1), "a.skin")
     assert figure.skin.weights.tolist() == [1, 0, 0.75, 1]
     assert figure.skin.joints.tolist() == [0, 0, 1, 1]
 
 
-def test_invalid_line_of_weights_does_not_affect_other_lines() -> None:
+def test_invalid_line_of_weights_does_not_affect_other_lines():
     figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "3 0 0.25 1", 1), "a.skin")
     assert figure.skin.starts.tolist() == [0, 1, 1, 2]
     assert figure.skin.weights.tolist() == [1, 1]
 
 
-def test_invalid_corner_repeats_another_corner() -> None:
+def test_invalid_corner_repeats_another_corner():
     figure, _ = gone_on(skin, SKIN.replace("0 1 2\n}", "0 1 7\n}", 1), "a.skin")
     assert figure.mesh.triangles.tolist() == [[0, 1, 0]]
     figure, _ = gone_on(obj, OBJ.replace("f 1 2 3", "f x 2 3"), "a.obj")
     assert figure.mesh.triangles[2].tolist() == [1, 1, 2]
 
 
-def test_singular_bind_matrix_keeps_the_bind_position_of_the_joint() -> None:
+def test_singular_bind_matrix_keeps_the_bind_position_of_the_joint():
     broken = SKIN.replace("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5")
     figure, _ = gone_on(skin, broken, "a.skin")
     assert figure.skin.inverse_bind[0, :3, 3].tolist() == [-5, -6, -7]
     assert figure.skin.inverse_bind[0, :3, :3].tolist() == np.eye(3).tolist()
 
 
-def test_invalid_normals_are_computed() -> None:
+def test_invalid_normals_are_computed():
     figure, _ = gone_on(obj, OBJ.replace("vn 0 0 1", "vn 0 inf 1"), "a.obj")
     assert figure.mesh.normals.tolist() == [[0, 0, 1]] * 4
 
 
-def test_several_errors_of_one_block_are_reported_once_per_code() -> None:
+def test_several_errors_of_one_block_are_reported_once_per_code():
     text = SKIN.replace("0 0 0\n  2 0 0", "nan inf 0\n  up 0 0")
     first, second = (
         Phrase("{section} of vertex {index}", section="positions", index=vertex)
@@ -85,7 +84,7 @@ def frames(*rows: str) -> str:
      ("boxmin nan\nnan\n0", 2), ("boxmin 0 x 0 and more", 0)],
 )  # fmt: skip
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_invalid_skeleton_item_does_not_affect_other_lines(item: str, below: int, end: str) -> None:
+def test_invalid_skeleton_item_does_not_affect_other_lines(item, below, end):
     text = f"balljoint a {{\n{item}\ncolour red\nballjoint b {{ }} }}".replace("\n", end)
     source = Source("a.skel", text.encode(), diagnostics=Collector(keeps_errors=True))
     figure = skel.read(source)
@@ -93,7 +92,7 @@ def test_invalid_skeleton_item_does_not_affect_other_lines(item: str, below: int
     assert warnings_of(source.diagnostics) == [("F006.unknown", 3 + below, {"found": b"colour"})]
 
 
-def test_invalid_frame_repeats_the_previous_frame() -> None:
+def test_invalid_frame_repeats_the_previous_frame():
     good = [f"{k} 1 0" + " 0" * 12 for k in range(5)]
     bad = [good[0], good[1].replace("1", "up", 1), good[2], good[3] + " 7", good[4]]
     motion, faults = gone_on(bvh, frames(*bad), "a.bvh")
@@ -102,12 +101,12 @@ def test_invalid_frame_repeats_the_previous_frame() -> None:
     assert motion.clip.translations[:, 0, 0].tolist() == [0, 0, 2, 2, 4]
 
 
-def test_invalid_key_is_left_out() -> None:
+def test_invalid_key_is_left_out():
     clip, _ = gone_on(anim, ANIM.replace("0.5 1", "0.5 nan"), "a.anim")
     assert clip.channels[0].times.tolist() == [0, 1]
 
 
-def test_errors_of_body_models_state_vertex_and_joint(tmp_path: Any) -> None:
+def test_errors_of_body_models_state_vertex_and_joint(tmp_path):
     arrays = model("smpl")
     arrays = {key: np.array(values) for key, values in arrays.items()}
     arrays["v_template"][3, 0] = np.nan
@@ -138,7 +137,7 @@ def test_errors_of_body_models_state_vertex_and_joint(tmp_path: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_readers_continue_only_after_recoverable_errors(seed: int) -> None:
+def test_readers_continue_only_after_recoverable_errors(seed):
     """Files refused by the strict reader have an error; files accepted by it have none."""
     rng = random.Random(seed)
     texts = {**FILES, "dir/b.skin": SKIN.encode(), "dir/a.obj": OBJ.encode(),
@@ -160,7 +159,7 @@ def test_readers_continue_only_after_recoverable_errors(seed: int) -> None:
 
 
 @pytest.mark.parametrize("word", ["nan", "-inf", "Infinity", "1e39", "1.#QNAN", "-nan(ind)"])
-def test_non_finite_values_have_a_separate_code(word: str) -> None:
+def test_non_finite_values_have_a_separate_code(word):
     source = Source(
         "a.skin",
         SKIN.replace("2 0 0", f"2 {word} 0", 1).encode(),
@@ -170,7 +169,7 @@ def test_non_finite_values_have_a_separate_code(word: str) -> None:
     assert [fault.code for fault in source.diagnostics.errors] == ["F003"]
 
 
-def test_locations_in_skin_files_are_lines() -> None:
+def test_locations_in_skin_files_are_lines():
     source = Source("a.skin", SKIN.encode())
     skin.read(source)
     found = {kind: source.place(kind, 1) for kind in ("positions", "normals", "weights")}

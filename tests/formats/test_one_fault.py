@@ -1,7 +1,5 @@
 """Readers that continue after errors, with one error of each kind, its location and its effect."""
 
-from typing import Any
-
 import pytest
 from formats.broken_text import ANIM, OBJ, PLY, gone_on
 from formats.bvh_text import GOOD as BVH
@@ -17,7 +15,7 @@ from viewer.formats import Source, anim, bvh, obj, ply, skel, skin
 @pytest.mark.parametrize(
     "case", MESH_FAULTS + MOTION_FAULTS, ids=lambda case: f"{case[1]}, {case[4]!r}"[:40]
 )
-def test_each_error_is_reported_with_its_location(case: tuple[Any, ...]) -> None:
+def test_each_error_is_reported_with_its_location(case):
     module, name, text, old, new, fault, part, places = case
     assert old in text
     broken = text.replace(old, new, 1)
@@ -31,5 +29,5 @@ def test_each_error_is_reported_with_its_location(case: tuple[Any, ...]) -> None
     [(skin, "a.skin", SKIN), (obj, "a.obj", OBJ), (ply, "a.ply", PLY), (skel, "a.skel", SKEL),
      (bvh, "a.bvh", BVH), (anim, "a.anim", ANIM)],
 )  # fmt: skip
-def test_valid_files_have_no_errors(module: Any, name: str, text: str) -> None:
+def test_valid_files_have_no_errors(module, name, text):
     assert gone_on(module, text, name)[1] == []

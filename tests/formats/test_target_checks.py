@@ -117,7 +117,7 @@ def test_free_path_avoids_dangling_links(tmp_path):
     assert free_path(tmp_path, "fox", ".png") == tmp_path / "fox-2.png"
 
 
-def test_outputs_of_an_earlier_try_are_replaced_but_nothing_older(tmp_path) -> None:
+def test_outputs_of_an_earlier_try_are_replaced_but_nothing_older(tmp_path):
     new, old = tmp_path / "new.obj", tmp_path / "old.obj"
     folder = tmp_path / "smpl"
     folder.mkdir()

@@ -22,24 +22,24 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skin import skin_from_lists
 
 
-def test_registry_matches_its_folder() -> None:
+def test_registry_matches_its_folder():
     folder = Path(viewer.lint.__file__).parent
     assert {p.stem for p in folder.glob("*.py") if not p.name.startswith("_")} == set(CHECKS)
     for name in CHECKS:
         assert callable(import_module(f"viewer.lint.{name}").check)
 
 
-def test_codes_have_a_severity_a_title_and_a_hint() -> None:
+def test_codes_have_a_severity_a_title_and_a_hint():
     for name, code in CODES.items():
         assert name[0] in "FGWBSMYC" and name[1:].isdecimal() and len(name) == 4
         assert code.severity in SEVERITIES and code.title and code.hint
 
 
-def test_titles_are_unique() -> None:
+def test_titles_are_unique():
     assert len({code.title for code in CODES.values()}) == len(CODES)
 
 
-def test_progress_counts_every_check() -> None:
+def test_progress_counts_every_check():
     steps: list[tuple[int, int, str]] = []
     with receiving(lambda done, total, unit, what: steps.append((done, total, what))):
         lint_scene(scene_of(column()))
@@ -47,7 +47,7 @@ def test_progress_counts_every_check() -> None:
     assert steps[0][2] == "column: weights"
 
 
-def test_progress_may_cancel() -> None:
+def test_progress_may_cancel():
     def stop(done: int, total: int, unit: str, what: str) -> None:
         if done == 2:
             raise Cancelled
@@ -56,14 +56,14 @@ def test_progress_may_cancel() -> None:
         lint_scene(scene_of(column()))
 
 
-def test_figure_shared_by_actors_is_checked_once() -> None:
+def test_figure_shared_by_actors_is_checked_once():
     figure = weighted({5: [(0, 0.9)]})
     scene = Scene([Actor(figure), Actor(figure), Actor(column())])
     scene.actors[1].pose.dofs[7] = 4.0
     assert [(f.code, f.actor) for f in lint_scene(scene)] == [("W001", 0), ("S004", 1)]
 
 
-def test_checks_do_not_change_the_scene() -> None:
+def test_checks_do_not_change_the_scene():
     figure = column()
     scene = scene_of(figure, standing(figure))
     pose = scene.actors[0].pose.copy()
@@ -72,7 +72,7 @@ def test_checks_do_not_change_the_scene() -> None:
     assert np.array_equal(scene.actors[0].pose.translations, pose.translations)
 
 
-def test_locations_of_vertices_triangles_and_joints_are_their_points() -> None:
+def test_locations_of_vertices_triangles_and_joints_are_their_points():
     scene = scene_of(column())
     scene.actors[0].placement[:3, 3] = 10.0, 0.0, 0.0
     vertex = Finding(Diagnostic("W001.some: text"), actor=0, vertices=np.array([5]))
@@ -83,7 +83,7 @@ def test_locations_of_vertices_triangles_and_joints_are_their_points() -> None:
     assert points_of(joint, scene).tolist() == [[10, 2, 0]]
 
 
-def test_locations_in_captures_are_points_and_may_be_empty() -> None:
+def test_locations_in_captures_are_points_and_may_be_empty():
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0]
@@ -94,7 +94,7 @@ def test_locations_in_captures_are_points_and_may_be_empty() -> None:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_every_finding_can_be_framed(name: str) -> None:
+def test_every_finding_can_be_framed(name):
     scene = made(FAULTS[name][0])
     for finding in lint_scene(scene):
         points = points_of(finding, scene)
@@ -102,7 +102,7 @@ def test_every_finding_can_be_framed(name: str) -> None:
             assert np.isfinite(points).all()
 
 
-def test_placement_scale_is_applied() -> None:
+def test_placement_scale_is_applied():
     """The speed of a figure in centimetres that is placed in metres is that of the drawn figure."""
     scene = made(FAULTS["jump"][0])
     before = [f.message for f in lint_scene(scene)]
@@ -111,7 +111,7 @@ def test_placement_scale_is_applied() -> None:
     assert [f.message for f in lint_scene(scene)] == before
 
 
-def test_singularity_does_not_depend_on_scale() -> None:
+def test_singularity_does_not_depend_on_scale():
     matrices = np.tile(np.eye(4), (5, 1, 1))
     matrices[1, :3, :3] *= 1e-30
     matrices[2, 2, 2] = 1e-11
@@ -120,7 +120,7 @@ def test_singularity_does_not_depend_on_scale() -> None:
     assert are_singular(matrices).tolist() == [False, False, False, True, True]
 
 
-def test_other_joints_are_compared_despite_a_singular_matrix() -> None:
+def test_other_joints_are_compared_despite_a_singular_matrix():
     """The knee is bound at y = 3 and at rest at y = 2."""
     figure = column()
     matrices = figure.skin.inverse_bind.copy()
@@ -134,7 +134,7 @@ def test_other_joints_are_compared_despite_a_singular_matrix() -> None:
     assert told([found["B004"].diagnostic]) == [("B004.joints", values)]
 
 
-def test_stray_vertex_does_not_hide_joints_with_a_different_bind_position() -> None:
+def test_stray_vertex_does_not_hide_joints_with_a_different_bind_position():
     """0.1 is 2 % of the column's size, but negligible relative to a box of 1700."""
     figure = column()
     mesh, skin = figure.mesh, figure.skin
@@ -164,18 +164,18 @@ def found(scene: Scene):
     return [finding for finding in lint_scene(scene) if finding.code == "C015"]
 
 
-def test_exchange_is_reported_with_the_other_person_and_the_distance() -> None:
+def test_exchange_is_reported_with_the_other_person_and_the_distance():
     (finding,) = found(exchanged())
     assert finding.message == ("swaps positions with person 1, 2 m away, in 1 frame: 120")
 
 
-def test_exchange_and_its_reversal_are_reported_in_two_frames() -> None:
+def test_exchange_and_its_reversal_are_reported_in_two_frames():
     step = np.where((FRAME >= 20) & (FRAME < 30), 2.0, 0.0)
     (finding,) = found(people(step, 2.0 - step))
     assert finding.frames.tolist() == [120, 130]
 
 
-def test_exchange_during_a_short_gap_is_found() -> None:
+def test_exchange_during_a_short_gap_is_found():
     step = np.where(FRAME < 20, 0.0, 2.0)
     other = 2.0 - step
     step[18:21] = np.nan
@@ -183,16 +183,16 @@ def test_exchange_during_a_short_gap_is_found() -> None:
     assert finding.frames.tolist() == [121]
 
 
-def test_people_who_pass_each_other_are_not_exchanged() -> None:
+def test_people_who_pass_each_other_are_not_exchanged():
     walk = 0.05 * (FRAME - 30.0)  # 1.5 m/s
     assert found(people(walk, -walk)) == []
 
 
-def test_single_person_who_jumps_is_not_exchanged() -> None:
+def test_single_person_who_jumps_is_not_exchanged():
     assert found(people(np.where(FRAME < 20, 0.0, 2.0), np.full(FRAMES, 2.0))) == []
 
 
-def test_track_that_continues_with_a_different_number_is_a_note() -> None:
+def test_track_that_continues_with_a_different_number_is_a_note():
     first = np.where(FRAME < 20, 0.0, np.nan)
     second = np.where(FRAME < 25, np.nan, 0.1)
     (finding,) = found(people(first, second))
@@ -202,13 +202,13 @@ def test_track_that_continues_with_a_different_number_is_a_note() -> None:
     assert "--merge-ids 0,1" in finding.message
 
 
-def test_person_who_appears_elsewhere_or_much_later_is_a_different_person() -> None:
+def test_person_who_appears_elsewhere_or_much_later_is_a_different_person():
     first = np.where(FRAME < 10, 0.0, np.nan)
     assert found(people(first, np.where(FRAME < 12, np.nan, 1.0))) == []
     assert found(people(first, np.where(FRAME < 50, np.nan, 0.0))) == []
 
 
-def test_people_of_different_recordings_are_not_compared() -> None:
+def test_people_of_different_recordings_are_not_compared():
     scene = exchanged()
     scene.actors[1] = replace(scene.actors[1], called="other")
     assert found(scene) == []
@@ -281,7 +281,7 @@ def border(n: int) -> tuple[list[int], list[int]]:
 
 @pytest.mark.parametrize("height", [0.1, -0.1, 0.02, -0.02])
 @pytest.mark.parametrize("n", [4, 6, 12])
-def test_open_sheet_without_its_border_is_not_closed(tmp_path: Path, n: int, height: float) -> None:
+def test_open_sheet_without_its_border_is_not_closed(tmp_path, n, height):
     triangles, vertices = border(n)
     mesh = bowl(n, height)
     assert codes(tmp_path, mesh) == {"M005"}
@@ -290,7 +290,7 @@ def test_open_sheet_without_its_border_is_not_closed(tmp_path: Path, n: int, hei
     assert "M003" not in codes(tmp_path, mesh, lost=range(0, len(mesh[1]), 2))
 
 
-def test_closed_surface_with_few_lost_triangles_is_still_inside_out(tmp_path: Path) -> None:
+def test_closed_surface_with_few_lost_triangles_is_still_inside_out(tmp_path):
     mesh = ring(12)  # the square of 8 open edges is less than a quarter of the 288 triangles
     assert codes(tmp_path, mesh) == {"M003"}
     assert codes(tmp_path, mesh, lost=[7]) == {"M003", "F002"}
@@ -298,7 +298,7 @@ def test_closed_surface_with_few_lost_triangles_is_still_inside_out(tmp_path: Pa
     assert codes(tmp_path, mesh, nowhere=[50]) == {"M003", "F003"}
 
 
-def test_closed_surface_with_many_lost_triangles_is_not_checked(tmp_path: Path) -> None:
+def test_closed_surface_with_many_lost_triangles_is_not_checked(tmp_path):
     mesh = ring(12)
     assert codes(tmp_path, mesh, lost=[7, 99, 150]) == {"F002"}
     assert codes(tmp_path, mesh, lost=range(0, 288, 2)) == {"F002"}
@@ -347,7 +347,7 @@ def values_of(n: int, cost: str) -> tuple[str, dict[str, object]]:
     return "W007.influences", {"n": n, "most": 5, "cost": cost}
 
 
-def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
+def test_vertices_of_a_singular_joint_are_left_out_and_counted():
     found = cost(scene({8: CROWDED, 5: LAST}))
     known = f"{COST}; {without(1)}"
     assert told([found.diagnostic]) == [values_of(2, known)]
@@ -357,25 +357,25 @@ def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
     assert told([found.diagnostic]) == [values_of(3, known)]
 
 
-def test_joint_of_weight_0_leaves_out_no_vertex() -> None:
+def test_joint_of_weight_0_leaves_out_no_vertex():
     found = cost(scene({8: [*CROWDED, (5, 0.0)]}))
     assert told([found.diagnostic]) == [values_of(1, COST)]
 
 
-def test_unknown_error_is_not_reported_as_0() -> None:
+def test_unknown_error_is_not_reported_as_0():
     unknown = f"the effect of pruning to 4 is unknown: {without(1)}"
     assert told([cost(scene({5: LAST})).diagnostic]) == [values_of(1, unknown)]
 
 
 @pytest.mark.parametrize(("part", "places"), [("bindings", [5]), ("positions", [5])])
-def test_vertices_not_from_the_file_are_left_out(part: str, places: list[int]) -> None:
+def test_vertices_not_from_the_file_are_left_out(part, places):
     lost = np.array(places, dtype=np.int32)
     found = cost(scene({8: CROWDED, 5: LAST}, singular=False), **{part: lost})
     known = f"{COST}; {without(1)}"
     assert told([found.diagnostic]) == [values_of(2, known)]
 
 
-def test_overflowing_errors_are_left_out() -> None:
+def test_overflowing_errors_are_left_out():
     whole = scene({8: CROWDED, 5: LAST}, singular=False)
     figure = whole.actors[0].figure
     matrices = figure.skin.inverse_bind.copy()

@@ -50,7 +50,7 @@ def cube(*strays: list[float]) -> Figure:
     return Figure("cube", make_mesh(np.array([*points, *strays]), [[0, 1, 5]]))
 
 
-def test_size_is_the_diagonal_of_the_mesh_or_of_the_joints() -> None:
+def test_size_is_the_diagonal_of_the_mesh_or_of_the_joints():
     assert Subject(Actor(column())).size() == pytest.approx(np.sqrt(4 + 16 + 4))
     # The hips are 0.2 apart, the ankles 0.9 below the pelvis, all at one depth.
     assert Subject(Actor(legs())).size() == pytest.approx(np.hypot(0.2, 0.9))
@@ -58,18 +58,18 @@ def test_size_is_the_diagonal_of_the_mesh_or_of_the_joints() -> None:
     assert Subject(Actor(marks)).size() == 0.0
 
 
-def test_stray_vertices_do_not_affect_the_size() -> None:
+def test_stray_vertices_do_not_affect_the_size():
     assert Subject(Actor(cube([500.0, 500.0, 500.0]))).size() == pytest.approx(4 * np.sqrt(3))
     # A vertex at a small distance is included, because it may be intended.
     assert Subject(Actor(cube([20.0, 0.0, 0.0]))).size() == pytest.approx(np.sqrt(400 + 16 + 16))
 
 
-def test_relative_lengths_ignore_stray_vertices() -> None:
+def test_relative_lengths_ignore_stray_vertices():
     subject = Subject(Actor(cube([500.0, 500.0, 500.0])))
     assert subject.length(0.4 * np.sqrt(3)) == "0.693 units (10 % of its size)"
 
 
-def test_largest_rotation_is_reported_in_degrees() -> None:
+def test_largest_rotation_is_reported_in_degrees():
     assert MAX_ROTATION == 3400.0
     assert np.degrees(LintOptions().max_rotation) == pytest.approx(MAX_ROTATION)
 
@@ -96,11 +96,11 @@ def heavy(findings: list[Finding]) -> list[tuple[str, int | None]]:
     return [(f.code, f.line) for f in findings if f.severity != "note"]
 
 
-def test_valid_column_has_no_findings(tmp_path: Path) -> None:
+def test_valid_column_has_no_findings(tmp_path):
     assert heavy(linted(tmp_path, saved(tmp_path, column()))) == []
 
 
-def test_ten_errors_in_one_skin_are_ten_findings(tmp_path: Path) -> None:
+def test_ten_errors_in_one_skin_are_ten_findings(tmp_path):
     lines = saved(tmp_path, column())
     positions, weights = section(lines, "positions"), section(lines, "skinweights")
     triangles, bindings = section(lines, "triangles"), section(lines, "bindings")
@@ -130,7 +130,7 @@ def test_ten_errors_in_one_skin_are_ten_findings(tmp_path: Path) -> None:
     ]
 
 
-def test_findings_of_one_code_have_a_count_and_locations(tmp_path: Path) -> None:
+def test_findings_of_one_code_have_a_count_and_locations(tmp_path):
     lines = saved(tmp_path, column())
     positions = section(lines, "positions")
     for vertex in (3, 8, 9):
@@ -143,7 +143,7 @@ def test_findings_of_one_code_have_a_count_and_locations(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("vertex", range(20))
-def test_invalid_position_causes_no_other_finding(tmp_path: Path, vertex: int) -> None:
+def test_invalid_position_causes_no_other_finding(tmp_path, vertex):
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + vertex] = "nan nan nan"
     assert [f.code for f in linted(tmp_path, lines) if f.severity != "note"] == ["F003"]
@@ -151,20 +151,20 @@ def test_invalid_position_causes_no_other_finding(tmp_path: Path, vertex: int) -
 
 
 @pytest.mark.parametrize("triangle", [0, 7, 33, 35])
-def test_invalid_triangle_causes_no_border_finding(tmp_path: Path, triangle: int) -> None:
+def test_invalid_triangle_causes_no_border_finding(tmp_path, triangle):
     lines = saved(tmp_path, column())
     place = section(lines, "triangles") + triangle
     lines[place] = " ".join([*lines[place].split()[:2], "1000"])
     assert [f.code for f in linted(tmp_path, lines)] == ["F002"]
 
 
-def test_invalid_weight_causes_no_other_finding(tmp_path: Path) -> None:
+def test_invalid_weight_causes_no_other_finding(tmp_path):
     lines = saved(tmp_path, column())
     lines[section(lines, "skinweights") + 9] = "2 0 nan 1 0.5"
     assert [f.code for f in linted(tmp_path, lines)] == ["W003"]
 
 
-def test_singular_matrix_does_not_hide_other_findings(tmp_path: Path) -> None:
+def test_singular_matrix_does_not_hide_other_findings(tmp_path):
     lines = saved(tmp_path, column())
     bindings = section(lines, "bindings")
     lines[bindings + 1 : bindings + 4] = ["0 0 0"] * 3
@@ -172,7 +172,7 @@ def test_singular_matrix_does_not_hide_other_findings(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, lines)) == [("B002", bindings + 1), ("B005", bindings + 7)]
 
 
-def test_skin_without_bind_matrices_is_checked_without_its_skeleton(tmp_path: Path) -> None:
+def test_skin_without_bind_matrices_is_checked_without_its_skeleton(tmp_path):
     lines = saved(tmp_path, column())
     weights = section(lines, "skinweights")
     lines[weights] = "1 0 0.5"
@@ -180,7 +180,7 @@ def test_skin_without_bind_matrices_is_checked_without_its_skeleton(tmp_path: Pa
     assert heavy(linted(tmp_path, lines)) == [("B001", weights), ("W001", weights + 1)]
 
 
-def test_unparsable_file_is_reported_as_unchecked(tmp_path: Path) -> None:
+def test_unparsable_file_is_reported_as_unchecked(tmp_path):
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + 3] = "normals 4 {"
     (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]
@@ -189,7 +189,7 @@ def test_unparsable_file_is_reported_as_unchecked(tmp_path: Path) -> None:
     assert told([found.diagnostic]) == [("F002.unclosed", values)] and found.diagnostic.is_final
 
 
-def test_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> None:
+def test_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path):
     texts = {"a.skel": skel_text.GOOD.replace("offset 0 1 0", "offset 0 nan 0"),
              "a.skin": skin_text.GOOD}  # fmt: skip
     for name, text in texts.items():
@@ -203,7 +203,7 @@ def test_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> Non
     assert bound.joints.tolist() == [0] and bound.line == 20
 
 
-def test_all_errors_in_a_rig_file_are_found(tmp_path: Path) -> None:
+def test_all_errors_in_a_rig_file_are_found(tmp_path):
     """The files of a .rig are checked one by one, so that errors in one do not hide others."""
     (tmp_path / "a.rig").write_text("rig a { skeleton a.skel skin a.skin }")
     (tmp_path / "a.skel").write_text(skel_text.GOOD.replace("{", "[", 1))
@@ -213,7 +213,7 @@ def test_all_errors_in_a_rig_file_are_found(tmp_path: Path) -> None:
     assert ("F002", "a.skel", 2) in files and ("W001", "a.skin", 13) in files
 
 
-def test_body_errors_are_found_including_lazily_read_ones(tmp_path: Path) -> None:
+def test_body_errors_are_found_including_lazily_read_ones(tmp_path):
     arrays = {key: np.array(values) for key, values in synthetic_smpl.model("smpl").items()}
     arrays["v_template"][3] = np.nan
     arrays["weights"][4, 0] = np.nan
@@ -230,7 +230,7 @@ def test_body_errors_are_found_including_lazily_read_ones(tmp_path: Path) -> Non
     assert [f.diagnostic.values["item"] for f in found[2:4]] == ["shapedirs", "posedirs"]
 
 
-def test_invalid_frames_are_not_jumps(tmp_path: Path) -> None:
+def test_invalid_frames_are_not_jumps(tmp_path):
     head = bvh_text.GOOD[: bvh_text.GOOD.index("MOTION")]
     rows = [f"{k} 100 0" + " 0" * 12 for k in range(30)]
     rows[10] = rows[10].replace("100", "nan")
@@ -244,7 +244,7 @@ def test_invalid_frames_are_not_jumps(tmp_path: Path) -> None:
     assert jump.line in (first + 20, first + 21) and sorted(jump.frames.tolist()) == [20, 21]
 
 
-def test_lengths_without_a_unit_are_in_figure_units(tmp_path: Path) -> None:
+def test_lengths_without_a_unit_are_in_figure_units(tmp_path):
     lines = saved(tmp_path, column())
     skel = (tmp_path / "a.skel").read_text()
     assert "offset 0.0 2.0 0.0" in skel
@@ -256,7 +256,7 @@ def test_lengths_without_a_unit_are_in_figure_units(tmp_path: Path) -> None:
     assert bound.line == section(lines, "bindings") + 7
 
 
-def test_messages_have_the_expected_values() -> None:
+def test_messages_have_the_expected_values():
     messages = {name: findings_of(FAULTS[name][0]) for name in ("sum too large", "jump", "sliding")}
     values = {f.diagnostic.key: f.diagnostic.values for found in messages.values() for f in found}
     assert values["W001.sums"] == {
@@ -275,7 +275,7 @@ def test_messages_have_the_expected_values() -> None:
     assert (slid["joint"], slid["distance"], slid["speed"]) == ("left_ankle", "983 mm", "0.5 m/s")
 
 
-def test_mesh_and_gap_findings_have_the_expected_values() -> None:
+def test_mesh_and_gap_findings_have_the_expected_values():
     """The values are both ends of an edge, the first vertex of a normal, and the missing frames."""
     names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
     found = [f.diagnostic for name in names for f in findings_of(FAULTS[name][0])]
@@ -291,7 +291,7 @@ def test_mesh_and_gap_findings_have_the_expected_values() -> None:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_message_about_one_item_uses_the_singular(name: str) -> None:
+def test_message_about_one_item_uses_the_singular(name):
     """A count of 1 is not followed by a plural, "are" or "have"."""
     for finding in findings_of(FAULTS[name][0]):
         text = re.sub(r"[\d.]+ of ", "", finding.message)  # the total may be larger, as in 1 of 60
@@ -301,13 +301,13 @@ def test_message_about_one_item_uses_the_singular(name: str) -> None:
         assert one is None, finding.message
 
 
-def test_gap_has_the_location_of_the_frame_before_it() -> None:
+def test_gap_has_the_location_of_the_frame_before_it():
     (gap,) = findings_of(FAULTS["gaps"][0])
     # Frame 109 is the tenth, 9 / 30 s after the first.
     assert gap.seek == pytest.approx(0.3)
 
 
-def test_long_absences_are_counted_as_absences() -> None:
+def test_long_absences_are_counted_as_absences():
     """Person 1 is present in frames 100 to 119, except 2 of them."""
     rows = np.arange(FRAMES)
     rows[20:] = rows[5] = rows[6] = -1
@@ -318,7 +318,7 @@ def test_long_absences_are_counted_as_absences() -> None:
     assert told([gap.diagnostic]) == [("C005.gaps", values)]
 
 
-def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
+def test_thin_sheets_and_creases_have_no_opposed_normals():
     """Each side of a sheet has separate normals; shared normals agree with one side."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     front = np.array([[0, 1, 2], [0, 2, 3]])
@@ -337,7 +337,7 @@ def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
     assert found[0].vertices.tolist() == list(range(8))
 
 
-def test_influence_limit_error_is_the_vertex_displacement() -> None:
+def test_influence_limit_error_is_the_vertex_displacement():
     """Only the root and e move; 0.05 of the translation of e is lost."""
     figure = five_joints()
     scene = scene_of(figure)
@@ -356,21 +356,21 @@ def test_influence_limit_error_is_the_vertex_displacement() -> None:
     assert told([found.diagnostic]) == [("W007.influences", values)]
 
 
-def test_swinging_foot_is_not_reported_as_sliding() -> None:
+def test_swinging_foot_is_not_reported_as_sliding():
     def step(root: np.ndarray, _: np.ndarray) -> None:
         root[:, 2] = 2.5 * np.arange(FRAMES) / RATE  # 2.5 m/s, as a foot passes the ground
 
     assert [finding.code for finding in lint_scene(moving(step))] == []
 
 
-def test_person_who_appears_later_has_no_gap() -> None:
+def test_person_who_appears_later_has_no_gap():
     rows = np.arange(FRAMES)
     rows[:20] = rows[50:] = -1
     timing = Timing(RATE, rows, first_frame=100, holds=False)
     assert lint_scene(moving(lambda root, turns: None, timing)) == []
 
 
-def test_seams_are_not_borders() -> None:
+def test_seams_are_not_borders():
     """Vertices at one position count as one, so a closed mesh with a seam is closed."""
     figure = column()
     positions = np.vstack([figure.mesh.positions, figure.mesh.positions[0::4]])
@@ -382,7 +382,7 @@ def test_seams_are_not_borders() -> None:
     assert codes == set()
 
 
-def test_low_confidence_is_counted_over_frames_with_the_keypoint() -> None:
+def test_low_confidence_is_counted_over_frames_with_the_keypoint():
     """Confidence is low in 3 of 10 frames with the keypoint, in 3 of 60 or 5 %, and in 1 of 2."""
 
     def change(points: np.ndarray) -> None:
@@ -424,7 +424,7 @@ def shown_frame(scene: Scene, time: float) -> int:
 
 
 @pytest.mark.parametrize(("start", "offset"), [(0.0, 0.0), (2.5, 0.0), (1.0, 3.2)])
-def test_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -> None:
+def test_jump_is_reported_at_the_timeline_frame(start, offset):
     scene = Scene([jumping(start, 2.0, offset=offset)])
     found = jump_of(scene)
     # The clip is sampled at 60 fps from 0 to 4 s, so the jump is between frame 60, at 2 s, and half
@@ -438,21 +438,21 @@ def test_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -> 
     assert shown_frame(scene, float(found.times[0])) == 60
 
 
-def test_frames_use_the_requested_rate() -> None:
+def test_frames_use_the_requested_rate():
     found = jump_of(Scene([jumping(0.0, 2.0)]), LintOptions(frame_rate=24.0))
     # The clip is sampled at 72 fps.
     assert found.frames.tolist() == [48] and found.times == pytest.approx([2.0 + 1 / 72])
     assert (found.diagnostic.values["n"], found.diagnostic.values["all"]) == (1, 97)
 
 
-def test_frames_of_several_clips_count_from_the_earliest_start() -> None:
+def test_frames_of_several_clips_count_from_the_earliest_start():
     scene = Scene([jumping(0.0, 1.0), jumping(2.0, 1.0)])
     first, second = (f for f in lint_scene(scene) if f.code == "C003")
     assert (first.frames.tolist(), second.frames.tolist()) == ([30], [90])
     assert shown_frame(scene, float(second.times[0])) == 90
 
 
-def test_capture_frames_take_precedence_for_numbering() -> None:
+def test_capture_frames_take_precedence_for_numbering():
     figure = legs()
     scene = Scene([jumping(0.0, 1.0, length=1.5), Actor(figure, clip=standing(figure))])
     found = jump_of(scene)
@@ -460,7 +460,7 @@ def test_capture_frames_take_precedence_for_numbering() -> None:
     assert found.frames.tolist() == [130] == [shown_frame(scene, float(found.times[0]))]
 
 
-def test_curves_beyond_limits_report_frame_and_degrees() -> None:
+def test_curves_beyond_limits_report_frame_and_degrees():
     figure = column()
     channel = Channel(7, [0.0, 1.0], [0.0, 4.0], (("linear", "linear"),) * 2)
     scene = scene_of(figure, Clip("keys", (channel,), 0.0, 1.0))
@@ -471,7 +471,7 @@ def test_curves_beyond_limits_report_frame_and_degrees() -> None:
     assert found.seek == pytest.approx(1.0)
 
 
-def test_file_frame_numbers_are_kept() -> None:
+def test_file_frame_numbers_are_kept():
     figure = legs()
     clip = standing(figure)
     places = np.array(clip.translations)
@@ -480,7 +480,7 @@ def test_file_frame_numbers_are_kept() -> None:
     assert sorted(jump_of(scene).frames.tolist()) == [120, 121]
 
 
-def test_frames_of_keyed_transforms_have_the_rate_of_the_keys() -> None:
+def test_frames_of_keyed_transforms_have_the_rate_of_the_keys():
     keys = [[0.0, 0, 0], [0, 0, 0], [90, 0, 0]]
     jump = clip_of(channel(0, "translation", np.array([0, 12, 13]) / 24.0, keys))
     scene = Scene([Actor(leg(), clip=jump)])
@@ -497,14 +497,14 @@ def about(**places: list[int]) -> Finding:
     )
 
 
-def test_locations_of_all_kinds_are_combined() -> None:
+def test_locations_of_all_kinds_are_combined():
     places = places_of(about(vertices=[5, 0], triangles=[0], joints=[1]), scene_of(column()))
     assert places.vertices.tolist() == [[-1, 1, 1], [1, 0, 1]]
     assert places.triangles.tolist() == [[[1, 0, 1], [1, 1, 1], [-1, 0, 1]]]
     assert places.joints.tolist() == [[0, 2, 0]]
 
 
-def test_locations_follow_pose_and_placement() -> None:
+def test_locations_follow_pose_and_placement():
     scene = scene_of(column())
     actor = scene.actors[0]
     actor.pose.dofs[0] = 3.0  # the root, along x
@@ -517,7 +517,7 @@ def test_locations_follow_pose_and_placement() -> None:
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.01, 250.0])
-def test_facing_direction_is_the_mean_normal_in_the_scene(scale: float) -> None:
+def test_facing_direction_is_the_mean_normal_in_the_scene(scale):
     scene = scene_of(column())
     turn = rotation_vector_to_matrix(np.array([0.0, np.pi / 2, 0.0]))  # z becomes x
     scene.actors[0].placement[:3, :3] = scale * turn
@@ -530,13 +530,13 @@ def test_facing_direction_is_the_mean_normal_in_the_scene(scale: float) -> None:
     assert facing[0] > 0.5
 
 
-def test_surrounding_locations_have_no_facing_direction() -> None:
+def test_surrounding_locations_have_no_facing_direction():
     facing = places_of(about(vertices=[4, 5, 6, 7]), scene_of(column())).facing
     assert np.linalg.norm(facing) < 0.35
     assert not places_of(about(joints=[1]), scene_of(column())).facing.any()
 
 
-def test_undetected_captured_points_have_no_location() -> None:
+def test_undetected_captured_points_have_no_location():
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0].copy()
@@ -546,7 +546,7 @@ def test_undetected_captured_points_have_no_location() -> None:
     assert points_of(about(joints=[2]), scene).tolist() == [[0, 1, 0], [0, 0.5, 0]]
 
 
-def test_missing_actors_have_no_location() -> None:
+def test_missing_actors_have_no_location():
     nowhere = Finding(Diagnostic("W001.some: text"), actor=3, vertices=np.array([0]))
     assert points_of(nowhere, scene_of(column())).shape == (0, 3)
     assert len(places_of(nowhere, scene_of(column())).vertices) == 0

@@ -46,21 +46,21 @@ def slides(scene: Scene) -> list[str]:
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_planted_feet_do_not_slide(name: str, tmp_path: Path) -> None:
+def test_planted_feet_do_not_slide(name, tmp_path):
     scene = load(path_of(name, tmp_path), bundled_body())
     assert any(note.key == "F007.feet-planted" for note in scene.diagnostics)
     assert slides(scene) == []
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_locked_feet_of_a_capture_do_not_slide(name: str, tmp_path: Path) -> None:
+def test_locked_feet_of_a_capture_do_not_slide(name, tmp_path):
     scene = load(path_of(name, tmp_path), bundled_body(), motion=MotionSettings(feet=False))
     assert "X006.locked" in {note.key for note in clean_up(scene, CleanUp(locks_feet=True))}
     assert slides(scene) == []
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_feet_on_a_treadmill_are_held_under_noise(seed: int, tmp_path: Path) -> None:
+def test_feet_on_a_treadmill_are_held_under_noise(seed, tmp_path):
     scene = load(path_of("treadmill", tmp_path), bundled_body(), motion=MotionSettings(feet=False))
     (actor,), rng = scene.actors, np.random.default_rng(seed)
     clip = actor.clip
@@ -75,7 +75,7 @@ def test_feet_on_a_treadmill_are_held_under_noise(seed: int, tmp_path: Path) -> 
     assert slides(scene) == []
 
 
-def test_feet_that_do_not_follow_their_legs_are_not_planted(tmp_path: Path) -> None:
+def test_feet_that_do_not_follow_their_legs_are_not_planted(tmp_path):
     """Of a rig for animators, whose feet are controls below the root."""
     figure = load(bundled_body()).actors[0].figure
     parents = figure.skeleton.parents.copy()
@@ -86,5 +86,5 @@ def test_feet_that_do_not_follow_their_legs_are_not_planted(tmp_path: Path) -> N
     assert plant_feet(found, figure) == (found.clip, None)
 
 
-def test_planted_feet_of_shared_motions_do_not_slide(shared_data: Path) -> None:
+def test_planted_feet_of_shared_motions_do_not_slide(shared_data):
     assert slides(load(shared_data / "motion" / "makehuman" / "walk1.bvh", bundled_body())) == []

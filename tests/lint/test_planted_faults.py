@@ -10,7 +10,7 @@ from viewer.lint import CODES
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_planted_fault_is_found_at_its_location(name: str) -> None:
+def test_planted_fault_is_found_at_its_location(name):
     maker, code, where, expected = FAULTS[name]
     found = [finding for finding in findings_of(maker) if finding.code == code]
     assert len(found) == 1, name
@@ -38,14 +38,14 @@ COMPANIONS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_planted_fault_causes_no_other_serious_finding(name: str) -> None:
+def test_planted_fault_causes_no_other_serious_finding(name):
     """Errors and warnings must be those of the introduced error or its listed consequences."""
     maker, code, _, _ = FAULTS[name]
     heavy = {finding.code for finding in findings_of(maker) if finding.severity != "note"}
     assert heavy - {code} <= COMPANIONS.get(name, set()), name
 
 
-def test_there_are_more_than_40_planted_faults() -> None:
+def test_there_are_more_than_40_planted_faults():
     assert len(FAULTS) >= 40
 
 
@@ -55,5 +55,5 @@ def test_there_are_more_than_40_planted_faults() -> None:
      lambda: keyed({7: ([0.0, 1.0], [0.0, 2.0])})],
     ids=["column", "legs", "points", "keys"],
 )  # fmt: skip
-def test_base_figures_of_planted_faults_are_valid(maker) -> None:
+def test_base_figures_of_planted_faults_are_valid(maker):
     assert findings_of(maker) == []

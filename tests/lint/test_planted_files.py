@@ -102,21 +102,21 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_planted_fault_is_found_with_its_file_and_line(tmp_path: Path, name: str) -> None:
+def test_planted_fault_is_found_with_its_file_and_line(tmp_path, name):
     texts, code, severity, file, line = FAULTS[name]
     found = [finding for finding in linted(tmp_path, texts) if finding.code == code]
     assert [(f.severity, f.file, f.line) for f in found] == [(severity, tmp_path / file, line)]
     assert "\n" not in found[0].message and str(tmp_path / file) + ":" not in found[0].message
 
 
-def test_base_files_of_planted_faults_are_valid(tmp_path: Path) -> None:
+def test_base_files_of_planted_faults_are_valid(tmp_path):
     clip = {"a.skel": skel_text.GOOD, "a.anim": CLIP}
     for texts in (RIG, clip, {"a.bvh": bvh_text.GOOD}):
         heavy = [f.message for f in linted(tmp_path, texts) if f.severity == "error"]
         assert heavy == []
 
 
-def test_other_files_are_still_checked(tmp_path: Path) -> None:
+def test_other_files_are_still_checked(tmp_path):
     texts = {
         "bad.skel": "balljoint a { offset 1 }",
         **skin("2 0 0.25", "2 0 0.5"),
@@ -131,7 +131,7 @@ def test_other_files_are_still_checked(tmp_path: Path) -> None:
     assert [f.code for f in found if f.code == "W001"] == ["W001"]
 
 
-def test_missing_file_is_a_finding(tmp_path: Path) -> None:
+def test_missing_file_is_a_finding(tmp_path):
     scene, found = lint_files([tmp_path / "none.npz"])
     assert [(f.code, f.severity, f.message) for f in found] == [
         ("F001", "error", "cannot be read: No such file or directory")
@@ -139,7 +139,7 @@ def test_missing_file_is_a_finding(tmp_path: Path) -> None:
     assert scene.actors == []
 
 
-def test_skin_that_does_not_match_is_checked_without_its_skeleton(tmp_path: Path) -> None:
+def test_skin_that_does_not_match_is_checked_without_its_skeleton(tmp_path):
     texts, *_ = FAULTS["too few bindings"]
     texts = {**texts, "a.skin": texts["a.skin"].replace("2 0 0.25", "2 0 0.5", 1)}
     assert {"B001", "W001"} <= {finding.code for finding in linted(tmp_path, texts)}
@@ -184,7 +184,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_planted_faults_of_body_models_are_found(tmp_path: Path, name: str) -> None:
+def test_planted_faults_of_body_models_are_found(tmp_path, name):
     write, code = MODELS[name]
     path = write(tmp_path)
     found = [f for f in lint_files([path])[1] if (name, f.code) != ("negative weight", "W001")]
@@ -195,15 +195,13 @@ def test_planted_faults_of_body_models_are_found(tmp_path: Path, name: str) -> N
 @pytest.mark.parametrize(
     ("parents_text", "code", "line"), [("-1\n2\n1\n", "S002", 2), ("-1\n2\n0\n", "S001", 2)]
 )
-def test_invalid_parents_in_pig_are_found(
-    tmp_path: Path, parents_text: str, code: str, line: int
-) -> None:
+def test_invalid_parents_in_pig_are_found(tmp_path, parents_text, code, line):
     folder = pig_text.write(tmp_path / "pig", parents=parents_text)
     found = [f for f in lint_files([folder])[1] if f.severity == "error"]
     assert [(f.code, f.file, f.line) for f in found] == [(code, folder / "parents.txt", line)]
 
 
-def test_motion_of_another_gender_is_found(tmp_path: Path) -> None:
+def test_motion_of_another_gender_is_found(tmp_path):
     model, motion = tmp_path / "SMPLH_MALE.npz", tmp_path / "walk.npz"
     np.savez(model, **synthetic_smpl.model("smplh"))
     still = {"poses": np.zeros((2, 156)), "trans": np.zeros((2, 3)), "betas": np.zeros(10)}
@@ -212,7 +210,7 @@ def test_motion_of_another_gender_is_found(tmp_path: Path) -> None:
     assert (found.code, found.severity, found.file) == ("C019", "warning", motion)
 
 
-def test_gaps_and_low_confidence_in_captures_are_found(tmp_path: Path) -> None:
+def test_gaps_and_low_confidence_in_captures_are_found(tmp_path):
     frames = {frame: [capture_files.points(0)] for frame in range(20)}
     del frames[7], frames[8]
     folder = capture_files.write_frames(tmp_path / "keypoints3d", frames)
@@ -235,7 +233,7 @@ def test_gaps_and_low_confidence_in_captures_are_found(tmp_path: Path) -> None:
     assert rest.values["n"] == len(rest.values["points"]) == len(low) - 6
 
 
-def test_damaged_frame_is_a_gap_and_is_reported(tmp_path: Path) -> None:
+def test_damaged_frame_is_a_gap_and_is_reported(tmp_path):
     frames: dict[int | str, object] = {frame: [capture_files.points(0)] for frame in range(9)}
     folder = capture_files.write_frames(tmp_path / "keypoints3d", {**frames, 4: "[{"})
     found = lint_files([folder])[1]
@@ -243,7 +241,7 @@ def test_damaged_frame_is_a_gap_and_is_reported(tmp_path: Path) -> None:
     assert any("000004" in f"{f.file} {f.message}" for f in found)
 
 
-def test_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
+def test_model_that_cannot_be_read_is_a_finding(tmp_path):
     from viewer.loading import MotionSettings
 
     frames = {frame: [capture_files.body(0)] for frame in range(3)}
@@ -254,7 +252,7 @@ def test_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
     ]
 
 
-def test_files_given_as_motions_are_checked(tmp_path: Path) -> None:
+def test_files_given_as_motions_are_checked(tmp_path):
     from viewer.loading import MotionSettings
 
     good, bad = tmp_path / "good.bvh", tmp_path / "bad.bvh"
@@ -264,7 +262,7 @@ def test_files_given_as_motions_are_checked(tmp_path: Path) -> None:
     assert ("F003", bad, 8) in [(f.code, f.file, f.line) for f in found]
 
 
-def test_every_code_is_produced_by_a_planted_fault() -> None:
+def test_every_code_is_produced_by_a_planted_fault():
     from formats.gltf.planted_gltf import PLANTED as GLTF
     from lint.planted import FAULTS as FIGURES
 

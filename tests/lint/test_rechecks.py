@@ -39,7 +39,7 @@ def checked(files: list[Path], scene: Scene | None = None) -> list[Finding]:
     return recheck(scene or viewer.load(*files), files).findings
 
 
-def test_errors_repaired_by_readers_are_found_as_by_the_command(files: list[Path]) -> None:
+def test_errors_repaired_by_readers_are_found_as_by_the_command(files):
     again = recheck(viewer.load(*files), files)
     assert again.n_files == 3 and again.notes == ()
     texts = [*map(finding_text, again.findings)]
@@ -50,14 +50,14 @@ def test_errors_repaired_by_readers_are_found_as_by_the_command(files: list[Path
     } <= places  # fmt: skip
 
 
-def test_no_finding_is_reported_twice(files: list[Path]) -> None:
+def test_no_finding_is_reported_twice(files):
     codes = [f.code for f in checked(files)]
     assert [code for code in codes if code in ("W001", "M007", "S003", "C001")] == [
         "S003", "M007", "C001", "W001"
     ]  # fmt: skip
 
 
-def test_reader_findings_have_the_location_they_state(files: list[Path]) -> None:
+def test_reader_findings_have_the_location_they_state(files):
     found = {f.code: f for f in checked(files)}
     assert (found["M007"].actor, found["M007"].vertices.tolist()) == (0, [1])
     assert (found["S003"].actor, found["S003"].joints.tolist()) == (0, [0])
@@ -65,7 +65,7 @@ def test_reader_findings_have_the_location_they_state(files: list[Path]) -> None
     assert (found["C001"].actor, found["C001"].joints.tolist()) == (0, [1])
 
 
-def test_edited_data_has_no_line(files: list[Path]) -> None:
+def test_edited_data_has_no_line(files):
     scene = viewer.load(*files)
     figure = scene.actors[0].figure
     weights = np.array(figure.skin.weights)
@@ -80,7 +80,7 @@ def test_edited_data_has_no_line(files: list[Path]) -> None:
     assert found["M007"].file.name == "a.skin" and found["M007"].actor is None
 
 
-def test_missing_files_are_reported(files: list[Path]) -> None:
+def test_missing_files_are_reported(files):
     scene = viewer.load(*files)
     files[1].unlink()
     again = recheck(scene, files)
@@ -92,7 +92,7 @@ def test_missing_files_are_reported(files: list[Path]) -> None:
     assert found["S003"].line == 5
 
 
-def test_changed_files_are_reported(files: list[Path]) -> None:
+def test_changed_files_are_reported(files):
     scene, opened_at = viewer.load(*files), time.time()
     assert recheck(scene, files, since=opened_at + 60.0).notes == ()
     os.utime(files[0], (opened_at + 100.0,) * 2)
@@ -106,7 +106,7 @@ def test_changed_files_are_reported(files: list[Path]) -> None:
     assert again.notes[0].startswith("a.skel, a.skin, a.anim were changed")
 
 
-def test_changed_file_in_a_folder_is_detected(tmp_path: Path) -> None:
+def test_changed_file_in_a_folder_is_detected(tmp_path):
     from formats import pig_text
 
     folder = pig_text.write(tmp_path / "pig")
@@ -115,21 +115,21 @@ def test_changed_file_in_a_folder_is_detected(tmp_path: Path) -> None:
     assert recheck(scene, [folder], since=opened_at + 60.0).notes[0].startswith("pig was")
 
 
-def test_new_error_in_a_changed_file_is_reported(files: list[Path]) -> None:
+def test_new_error_in_a_changed_file_is_reported(files):
     scene = viewer.load(*files)
     files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 up 0", 1))
     found = checked(files, scene)
     assert ("F002", files[1], 3) in [(f.code, f.file, f.line) for f in found]
 
 
-def test_scene_knows_its_files() -> None:
+def test_scene_knows_its_files():
     bundled = list(bundled_files())
     again = recheck(viewer.load())
     assert again.n_files == 2 and all(f.file in bundled for f in again.findings)
     assert recheck(scene_of(column())).n_files == 0
 
 
-def test_findings_about_captured_people_refer_to_the_folder(shared_data: Path) -> None:
+def test_findings_about_captured_people_refer_to_the_folder(shared_data):
     folder = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     found = checked([folder])
     assert [(f.code, f.actor, f.file) for f in found if f.code == "C012"] == [
@@ -137,7 +137,7 @@ def test_findings_about_captured_people_refer_to_the_folder(shared_data: Path) -
     ]  # fmt: skip
 
 
-def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
+def test_progress_may_cancel_while_frames_are_read(shared_data):
     folder = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     scene = viewer.load(folder)
 
@@ -161,7 +161,7 @@ def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
         (("F007.anim-range", "", None), "clip", None, None),
     ],
 )
-def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> None:
+def test_reader_findings_keep_their_locations(found, part, vertices, joints):
     key, data, places = found
     remark = Diagnostic(
         f"{key}: text", Path("a.skin"), 8, data, None if places is None else np.array(places)
@@ -173,7 +173,7 @@ def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> 
         assert (aimed.vertices.tolist(), aimed.joints.tolist()) == (vertices, joints)
 
 
-def test_vertex_stated_only_in_a_value_is_found() -> None:
+def test_vertex_stated_only_in_a_value_is_found():
     remark = Diagnostic("W010.vertex: vertex {vertex}", Path("a.npz"), values={"vertex": 3})
     aimed = located_in(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
     assert aimed.vertices.tolist() == [3]

@@ -1,7 +1,5 @@
 """Valid figures without errors or warnings, and the known errors in real files."""
 
-from pathlib import Path
-
 import pytest
 from app.tiny import write_rig
 
@@ -25,18 +23,18 @@ def notes(findings: list[Finding]) -> set[str]:
     return {finding.code for finding in findings if finding.severity == "note"}
 
 
-def test_bundled_fox_has_no_findings() -> None:
+def test_bundled_fox_has_no_findings():
     _, findings = lint_files(bundled_files())
     assert heavy(findings) == []
     assert notes(findings) == {"W007", "W008", "S005"}  # the fox has up to 14 influences and hinges
 
 
-def test_bundled_body_has_no_findings() -> None:
+def test_bundled_body_has_no_findings():
     _, findings = lint_files([bundled_body()])
     assert findings == []
 
 
-def test_tiny_rig_has_no_findings(tmp_path: Path) -> None:
+def test_tiny_rig_has_no_findings(tmp_path):
     _, findings = lint_files(write_rig(tmp_path))
     assert [finding for finding in findings if finding.severity == "error"] == []
 
@@ -51,12 +49,12 @@ COURSE = {
 
 
 @pytest.mark.parametrize("names", COURSE)
-def test_skel_and_skin_files_have_only_known_findings(shared: Path, names: tuple[str, ...]) -> None:
+def test_skel_and_skin_files_have_only_known_findings(shared, names):
     _, findings = lint_files([shared / name for name in names])
     assert {code for code, _ in heavy(findings)} == COURSE[names]
 
 
-def test_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> None:
+def test_pig_has_two_pairs_of_joints_with_equal_names(shared_data):
     for name in ("PIG_core.pkl", "core_txt_files"):
         _, findings = lint_files([shared_data / "pig" / name])
         assert heavy(findings) == [
@@ -67,14 +65,14 @@ def test_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> None
 
 
 @pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
-def test_synthetic_models_and_captures_have_no_findings(shared_data: Path, name: str) -> None:
+def test_synthetic_models_and_captures_have_no_findings(shared_data, name):
     _, findings = lint_files([shared_data / "smpl_synthetic" / name])
     # One of the two captured people has an unrelated pose in every frame.
     assert {code for code, _ in heavy(findings)} == ({"C014"} if name == "easymocap" else set())
 
 
 @pytest.mark.usefixtures("quick_fits")
-def test_automatically_rigged_mesh_has_no_findings(tmp_path: Path) -> None:
+def test_automatically_rigged_mesh_has_no_findings(tmp_path):
     body = viewer.load(bundled_body()).actors[0]
     moved = 1.3 * viewer.deform(body.figure, body.pose)[0] + [0.2, 0.0, 0.1]
     triangles = body.figure.mesh.triangles

@@ -123,14 +123,14 @@ FAULTS: dict[str, tuple[Callable[[Path], list[Path]], list[str]]] = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_fault_is_a_warning_of_load_with_its_place(tmp_path: Path, name: str) -> None:
+def test_fault_is_a_warning_of_load_with_its_place(tmp_path, name):
     write, wanted = FAULTS[name]
     found = viewer.load(*write(tmp_path)).warnings
     assert [line.replace(f"{tmp_path}/", "").replace("pig/", "") for line in found] == wanted
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_lint_and_other_commands_print_the_same_text(tmp_path: Path, name: str, capsys) -> None:
+def test_lint_and_other_commands_print_the_same_text(tmp_path, name, capsys):
     write, wanted = FAULTS[name]
     files = [str(path) for path in write(tmp_path)]
     assert run(["convert", *files, "-o", str(tmp_path / "a.obj")]) == 0
@@ -147,7 +147,7 @@ def test_lint_and_other_commands_print_the_same_text(tmp_path: Path, name: str, 
         assert same.startswith(f"{place}: ")
 
 
-def test_figures_that_load_accepts_have_no_error_in_lint(tmp_path: Path) -> None:
+def test_figures_that_load_accepts_have_no_error_in_lint(tmp_path):
     """Negative weights of a body model are used as stored, like those of any other file."""
     files = smpl(negative(11))(tmp_path)
     (warning,) = viewer.load(*files).warnings

@@ -123,7 +123,7 @@ def opened_result(folder: Path, **values: Any) -> Any:
 
 
 @pytest.mark.parametrize("is_whole", [True, False])
-def test_pose_of_smpl_is_shown_on_the_bundled_body(tmp_path: Path, is_whole: bool) -> None:
+def test_pose_of_smpl_is_shown_on_the_bundled_body(tmp_path, is_whole):
     whole = np.concatenate([ROOT, BENT.ravel()])
     parts = {"global_orient": ROOT[None], "body_pose": BENT.reshape(1, 69)}
     scene = opened_result(
@@ -136,7 +136,7 @@ def test_pose_of_smpl_is_shown_on_the_bundled_body(tmp_path: Path, is_whole: boo
     assert_allclose(turned, wanted, rtol=0, atol=1e-9)  # rounding of rotations
 
 
-def test_fingers_and_face_keep_their_joints(tmp_path: Path) -> None:
+def test_fingers_and_face_keep_their_joints(tmp_path):
     hand = np.linspace(-0.2, 0.2, 45)
     scene = opened_result(
         tmp_path,
@@ -161,14 +161,14 @@ def test_fingers_and_face_keep_their_joints(tmp_path: Path) -> None:
         {"body_pose": np.zeros(63), "left_hand_pose": np.zeros(45), "flat_hand_mean": False},
     ],
 )
-def test_other_poses_need_a_figure(tmp_path: Path, values: dict[str, Any]) -> None:
+def test_other_poses_need_a_figure(tmp_path, values):
     with pytest.raises(RigError) as refused:
         opened_result(tmp_path, **values)
     expected = "F004.shape-alone" if set(values) == {"betas"} else "F004.pose-alone"
     assert refused.value.diagnostic.key == expected
 
 
-def test_poses_with_a_figure_are_applied_to_it(tmp_path: Path) -> None:
+def test_poses_with_a_figure_are_applied_to_it(tmp_path):
     path = tmp_path / "result.npz"
     np.savez(path, pose=np.concatenate([ROOT, BENT.ravel()]))
     (actor,) = viewer.load(bundled_body(), path).actors

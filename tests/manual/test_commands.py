@@ -89,13 +89,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("line", RUN)
-def test_command_runs(
-    line: str,
-    files: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_command_runs(line, files, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "work"
     shutil.copytree(files, folder, copy_function=os.link)
     monkeypatch.chdir(folder)
@@ -122,9 +116,7 @@ def test_command_runs(
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_python_examples_run_as_printed(
-    path: Path, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_python_examples_run_as_printed(path, files, tmp_path, monkeypatch):
     examples = blocks(path, "python")
     if not examples:
         return
@@ -174,7 +166,7 @@ def remove(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def test_lines_that_are_not_run_exist() -> None:
+def test_lines_that_are_not_run_exist():
     """A reason without a line is out of date."""
     assert [
         begin for begin in NOT_RUN if not any(line.startswith(begin) for _, line in lines())

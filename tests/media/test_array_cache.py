@@ -42,7 +42,7 @@ def forbid(monkeypatch: pytest.MonkeyPatch, module: object, name: str) -> None:
     monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail(f"{name} was called"))
 
 
-def test_second_run_uses_the_cached_array(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_second_run_uses_the_cached_array(folder, monkeypatch):
     data = b"positions " + TEXT + b"}"
     for _ in range(2):
         values, bad = parse_numbers(data, 10, 10 + len(TEXT))
@@ -53,34 +53,34 @@ def test_second_run_uses_the_cached_array(folder: Path, monkeypatch: pytest.Monk
     assert parse_numbers(TEXT, 0, len(TEXT))[0][0] == 0.5
 
 
-def test_changed_text_is_parsed_again(folder: Path) -> None:
+def test_changed_text_is_parsed_again(folder):
     parse_numbers(TEXT, 0, len(TEXT))
     changed = TEXT.replace(b"17.5", b"18.5", 1)
     assert len(changed) == len(TEXT)
     assert parse_numbers(changed, 0, len(changed))[0][34] == 18.5
 
 
-def test_equal_checksum_and_length_are_not_sufficient(folder: Path) -> None:
+def test_equal_checksum_and_length_are_not_sufficient(folder):
     slot().store(VALUES)
     other = slot(TEXT.replace(b"17.5", b"18.5", 1))
     other.path = entry(folder)  # as if the checksums of both texts were equal
     assert other.load("<f8", 1) is None
 
 
-def test_invalid_text_is_not_cached(folder: Path) -> None:
+def test_invalid_text_is_not_cached(folder):
     faulty = TEXT + b"x 1"
     for _ in range(2):
         assert parse_numbers(faulty, 0, len(faulty))[1] == len(VALUES)
     assert not folder.exists()
 
 
-def test_short_texts_are_not_cached(folder: Path) -> None:
+def test_short_texts_are_not_cached(folder):
     parse_numbers(b"1 2 3", 0, 5)
     assert not folder.exists()
 
 
 @pytest.mark.parametrize("place", [0, 17, 24, 33, 40, 60, -9, -1])
-def test_damaged_entry_is_ignored_and_replaced(folder: Path, place: int) -> None:
+def test_damaged_entry_is_ignored_and_replaced(folder, place):
     slot().store(VALUES)
     data = bytearray(entry(folder).read_bytes())
     data[place] ^= 1
@@ -91,15 +91,13 @@ def test_damaged_entry_is_ignored_and_replaced(folder: Path, place: int) -> None
 
 
 @pytest.mark.parametrize("size", [0, 10, 56, 1000, -1])
-def test_truncated_entry_is_ignored(folder: Path, size: int) -> None:
+def test_truncated_entry_is_ignored(folder, size):
     slot().store(VALUES)
     entry(folder).write_bytes(entry(folder).read_bytes()[:size])
     assert slot().load("<f8", 1) is None
 
 
-def test_entry_of_a_different_version_type_or_shape_is_ignored(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_entry_of_a_different_version_type_or_shape_is_ignored(folder, monkeypatch):
     slot().store(VALUES)
     assert slot().load("|u1", 1) is None
     assert slot().load("<f8", 2) is None
@@ -107,7 +105,7 @@ def test_entry_of_a_different_version_type_or_shape_is_ignored(
     assert slot().load("<f8", 1) is None
 
 
-def test_only_the_user_may_read_or_write_entries(folder: Path) -> None:
+def test_only_the_user_may_read_or_write_entries(folder):
     slot().store(VALUES)
     assert folder.stat().st_mode & 0o777 == 0o700
     assert entry(folder).stat().st_mode & 0o777 == 0o600
@@ -115,7 +113,7 @@ def test_only_the_user_may_read_or_write_entries(folder: Path) -> None:
     assert slot().load("<f8", 1) is None
 
 
-def test_different_shapes_of_equal_size_are_ignored(folder: Path) -> None:
+def test_different_shapes_of_equal_size_are_ignored(folder):
     slot().store(VALUES.reshape(4000, 2))
     data = entry(folder).read_bytes()
     for axes in ((2, 4000), (1 << 62, 0)):
@@ -127,13 +125,13 @@ def test_different_shapes_of_equal_size_are_ignored(folder: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_pipes_are_ignored_without_waiting(folder: Path) -> None:
+def test_pipes_are_ignored_without_waiting(folder):
     folder.mkdir()
     os.mkfifo(slot().path)
     assert slot().load("<f8", 1) is None
 
 
-def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
+def test_links_are_not_followed(folder, tmp_path):
     slot().store(VALUES)
     path = entry(folder)
     path.rename(tmp_path / "moved")
@@ -142,9 +140,7 @@ def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["file", "below a file", "no room"])
-def test_unusable_folder_silently_disables_the_cache(
-    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tiny_disk: Path
-) -> None:
+def test_unusable_folder_silently_disables_the_cache(what, tmp_path, monkeypatch, tiny_disk):
     (tmp_path / "file").write_text("")
     places = {"file": tmp_path / "file", "below a file": tmp_path / "file/x", "no room": tiny_disk}
     monkeypatch.setenv("VIEWER_CACHE", str(places[what]))
@@ -154,9 +150,7 @@ def test_unusable_folder_silently_disables_the_cache(
     assert cache_use() == (0, 0)
 
 
-def test_oldest_entries_are_removed_if_there_are_too_many(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_oldest_entries_are_removed_if_there_are_too_many(folder, monkeypatch):
     size = 56 + len(TEXT) + VALUES.nbytes
     monkeypatch.setattr(array_cache, "LIMIT", 4 * size)
     texts = [TEXT[:-5] + b"%04d\n" % number for number in range(5)]
@@ -170,7 +164,7 @@ def test_oldest_entries_are_removed_if_there_are_too_many(
     assert cache_use() == (3, 3 * size)
 
 
-def test_concurrent_threads_leave_one_valid_entry(folder: Path) -> None:
+def test_concurrent_threads_leave_one_valid_entry(folder):
     threads = [threading.Thread(target=slot().store, args=(VALUES,)) for _ in range(8)]
     for thread in threads:
         thread.start()
@@ -180,7 +174,7 @@ def test_concurrent_threads_leave_one_valid_entry(folder: Path) -> None:
     assert entry(folder) == slot().path
 
 
-def test_pixels_of_an_image_are_cached(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pixels_of_an_image_are_cached(folder, monkeypatch):
     pixels = np.random.default_rng(0).integers(0, 256, (100, 120, 4), dtype=np.uint8)
     data = encode_png(pixels)
     for _ in range(2):
@@ -190,9 +184,7 @@ def test_pixels_of_an_image_are_cached(folder: Path, monkeypatch: pytest.MonkeyP
         forbid(monkeypatch, image, "decode_pictures")
 
 
-def test_option_and_variable_disable_the_cache(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
+def test_option_and_variable_disable_the_cache(folder, tmp_path, monkeypatch, capsys):
     rows = {
         "positions": [f"{n}.25 {n}.5 1" for n in range(4000)],
         "normals": ["0 0 1"] * 4000,
@@ -217,9 +209,7 @@ def test_option_and_variable_disable_the_cache(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="locations on Linux")
-def test_default_folder_is_that_of_platformdirs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_default_folder_is_that_of_platformdirs(tmp_path, monkeypatch):
     import platformdirs
 
     monkeypatch.delenv("VIEWER_CACHE")
@@ -229,9 +219,7 @@ def test_default_folder_is_that_of_platformdirs(
         assert cache_folder() == expected
 
 
-def test_folder_may_be_relative_or_below_the_home_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_folder_may_be_relative_or_below_the_home_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HOME", str(tmp_path))
     for value in ("kept", "~/kept"):
@@ -239,9 +227,7 @@ def test_folder_may_be_relative_or_below_the_home_folder(
         assert cache_folder() == tmp_path / "kept"
 
 
-def test_doctor_shows_the_folder_and_its_size(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_doctor_shows_the_folder_and_its_size(folder, monkeypatch):
     from viewer.commands import doctor
 
     slot().store(VALUES)

@@ -106,7 +106,7 @@ def noise(height: int, width: int, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1), (48, 64), (300, 301)])
-def test_png_contains_every_pixel_with_alpha(size: tuple[int, int]) -> None:
+def test_png_contains_every_pixel_with_alpha(size):
     pixels = noise(*size, seed=sum(size))
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         assert picture.mode == "RGBA" or (pixels[..., 3] == 255).all()
@@ -114,7 +114,7 @@ def test_png_contains_every_pixel_with_alpha(size: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("size", [(1, 1), (33, 20)])
-def test_opaque_png_has_no_alpha(size: tuple[int, int]) -> None:
+def test_opaque_png_has_no_alpha(size):
     pixels = noise(*size, seed=1)
     pixels[..., 3] = 255
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
@@ -122,13 +122,13 @@ def test_opaque_png_has_no_alpha(size: tuple[int, int]) -> None:
         np.testing.assert_array_equal(np.array(picture), pixels[..., :3])
 
 
-def test_png_of_a_view_into_a_larger_array_is_correct() -> None:
+def test_png_of_a_view_into_a_larger_array_is_correct():
     pixels = noise(20, 40, seed=2)[::-1, 3:33]
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         np.testing.assert_array_equal(np.array(picture), pixels)
 
 
-def test_png_without_isal_contains_every_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_png_without_isal_contains_every_pixel(monkeypatch):
     monkeypatch.setitem(sys.modules, "isal", None)
     monkeypatch.setitem(sys.modules, "isal.isal_zlib", None)
     pixels = noise(20, 30, seed=3)

@@ -90,7 +90,7 @@ class Owner:
     """An object that supports weak references."""
 
 
-def test_result_is_computed_once() -> None:
+def test_result_is_computed_once():
     memo: Memo[Owner, list[int]] = Memo()
     owner, made = Owner(), []
     for _ in range(3):
@@ -98,7 +98,7 @@ def test_result_is_computed_once() -> None:
     assert made == [1]
 
 
-def test_oldest_result_is_evicted() -> None:
+def test_oldest_result_is_evicted():
     memo: Memo[Owner, int] = Memo(kept=2)
     owner, made = Owner(), []
 
@@ -109,7 +109,7 @@ def test_oldest_result_is_evicted() -> None:
     assert made == [1, 2, 3, 1]
 
 
-def test_results_are_freed_with_their_owner() -> None:
+def test_results_are_freed_with_their_owner():
     memo: Memo[Owner, Owner] = Memo()
     owner = Owner()
     gone = weakref.ref(memo.get(owner, "a", Owner))
@@ -119,7 +119,7 @@ def test_results_are_freed_with_their_owner() -> None:
     assert gone() is None
 
 
-def test_threads_that_evict_results_of_other_threads_get_correct_results() -> None:
+def test_threads_that_evict_results_of_other_threads_get_correct_results():
     """The memo stores one result; a second thread requests another while the first is computed."""
     memo: Memo[Owner, str] = Memo(kept=1)
     owner, inside, go = Owner(), threading.Event(), threading.Event()
@@ -140,7 +140,7 @@ def test_threads_that_evict_results_of_other_threads_get_correct_results() -> No
     assert memo.get(owner, "slow", lambda: "again") == "slow"
 
 
-def test_threads_alternating_constantly_never_fail() -> None:
+def test_threads_alternating_constantly_never_fail():
     memo: Memo[Owner, int] = Memo(kept=1)
     owner = Owner()
     wrong: list[int] = []

@@ -354,15 +354,10 @@ def _rules(effect: int, is_binary: tuple[bool, bool] = (False, False)) -> Expres
         (0, (False, False), (1.5, -0.5), (1.0, 0.0)),
     ],
 )
-def test_expressions_override_others_as_vrm_specifies(
-    effect: int,
-    is_binary: tuple[bool, bool],
-    given: tuple[float, float],
-    expected: tuple[float, float],
-) -> None:
+def test_expressions_override_others_as_vrm_specifies(effect, is_binary, given, expected):
     weights = np.array([2.0, *given])
     assert_allclose(_rules(effect, is_binary).shown(weights), [2.0, *expected], atol=1e-15)
 
 
-def test_missing_trailing_weights_are_zero() -> None:
+def test_missing_trailing_weights_are_zero():
     assert _rules(1).shown(np.array([0.3, 0.5])).tolist() == [0.3, 0.5]

@@ -233,7 +233,7 @@ def test_volume_far_from_the_origin_is_accurate():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_split_vertices_are_the_distinct_pairs_in_ascending_order(seed: int) -> None:
+def test_split_vertices_are_the_distinct_pairs_in_ascending_order(seed):
     rng = np.random.default_rng(seed)
     n_vertices, n_uvs, n_triangles = rng.integers(3, 20, 3)
     triangles = rng.integers(0, n_vertices, (n_triangles, 3))

@@ -278,7 +278,7 @@ def test_failed_results_are_not_cached():
     assert memo.get(owner, 1, lambda: 5) == 5
 
 
-def test_skeletons_follow_the_shape_only_with_a_joint_regressor() -> None:
+def test_skeletons_follow_the_shape_only_with_a_joint_regressor():
     figure, weights = arm(), np.array([1.0, 0.5])
     moved = shaped_skeleton(figure, weights)
     # The shape moves one of the second joint's two vertices by 2 along x, and all of them along y.

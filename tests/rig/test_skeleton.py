@@ -334,19 +334,19 @@ def walks_back(parents: list[int], joint: int) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_cycle_members_are_their_own_ancestors(seed: int) -> None:
+def test_cycle_members_are_their_own_ancestors(seed):
     rng = np.random.default_rng(seed)
     parents = rng.integers(-1, 30, 30)
     expected = [walks_back(parents.tolist(), joint) for joint in range(30)]
     assert cycle_members(parents).tolist() == expected
 
 
-def test_invalid_index_counts_as_no_parent() -> None:
+def test_invalid_index_counts_as_no_parent():
     parents = np.array([-1.0, 0.5, np.nan, 99.0, -7.0, 5.0])
     assert cycle_members(parents).tolist() == [False] * 5 + [True]
 
 
-def test_long_cycle_is_found() -> None:
+def test_long_cycle_is_found():
     parents = np.roll(np.arange(1000), 1)
     assert cycle_members(parents).all()
     parents[0] = -1

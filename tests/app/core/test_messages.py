@@ -248,7 +248,7 @@ def test_interface_image_shows_warnings_even_if_rendering_is_slow(drive, rig, mo
     assert (late == plain).all()
 
 
-def test_job_reports_progress_and_result() -> None:
+def test_job_reports_progress_and_result():
     reached, go = threading.Event(), threading.Event()
 
     def act() -> list[str]:
@@ -265,7 +265,7 @@ def test_job_reports_progress_and_result() -> None:
     assert job.is_done and job.lines == ["done"] and job.error == ""
 
 
-def test_job_keeps_its_title_if_no_step_is_named() -> None:
+def test_job_keeps_its_title_if_no_step_is_named():
     def act() -> list[str]:
         report(0, 1)
         return []
@@ -275,7 +275,7 @@ def test_job_keeps_its_title_if_no_step_is_named() -> None:
     assert job.title == "Checking"
 
 
-def test_cancelled_job_ends_before_its_next_step_and_is_done_once_its_thread_has_ended() -> None:
+def test_cancelled_job_ends_before_its_next_step_and_is_done_once_its_thread_has_ended():
     reached, go, after = threading.Event(), threading.Event(), []
 
     def act() -> list[str]:
@@ -296,7 +296,7 @@ def test_cancelled_job_ends_before_its_next_step_and_is_done_once_its_thread_has
     assert not after and job.lines == [] and job.error == "" and job.title == "first"
 
 
-def test_errors_are_stored_as_messages() -> None:
+def test_errors_are_stored_as_messages():
     def refuse() -> list[str]:
         raise RigError("figure box has no mesh")
 
@@ -309,7 +309,7 @@ def test_errors_are_stored_as_messages() -> None:
     assert [job.error for job in jobs] == ["figure box has no mesh", "Checking: not enough memory"]
 
 
-def test_the_result_of_a_job_is_applied_in_the_frame_loop() -> None:
+def test_the_result_of_a_job_is_applied_in_the_frame_loop():
     applied: list[int] = []
 
     def refuse() -> list[str]:

@@ -23,7 +23,7 @@ def written(topic: str) -> list[str]:
     return [line.replace("`", "") for line in lines]
 
 
-def test_pages_open_from_the_menu_and_the_list(drive, rig) -> None:
+def test_pages_open_from_the_menu_and_the_list(drive, rig):
     hand = drive(*rig, size=(1000, 640), samples=1)
     hand.menu("menu Help", "menu Manual", "Captures##page captures")
     assert shown(hand) == "captures" and headings() == written("captures")
@@ -33,7 +33,7 @@ def test_pages_open_from_the_menu_and_the_list(drive, rig) -> None:
 
 
 @pytest.mark.parametrize("size", [(900, 640), (300, 200)])
-def test_every_page_is_drawn_inside_the_window(drive, rig, size) -> None:
+def test_every_page_is_drawn_inside_the_window(drive, rig, size):
     hand = drive(*rig, size=size, samples=1)
     for topic in PAGES:
         hand.state.of(Manual).topic = topic
@@ -44,7 +44,7 @@ def test_every_page_is_drawn_inside_the_window(drive, rig, size) -> None:
     assert set(hand.state.of(Manual).pages) == set(PAGES) and not hand.state.error
 
 
-def test_escape_closes_only_the_manual_window(drive, rig) -> None:
+def test_escape_closes_only_the_manual_window(drive, rig):
     hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.selected_joint = 1
     hand.state.of(Manual).topic = "motion"
@@ -53,7 +53,7 @@ def test_escape_closes_only_the_manual_window(drive, rig) -> None:
     assert shown(hand) == "" and hand.state.selected_joint == 1
 
 
-def test_escape_closes_the_manual_after_a_click_on_its_code(drive, rig) -> None:
+def test_escape_closes_the_manual_after_a_click_on_its_code(drive, rig):
     hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.of(Manual).topic = "pictures"
     hand.step(2)
@@ -63,7 +63,7 @@ def test_escape_closes_the_manual_after_a_click_on_its_code(drive, rig) -> None:
     assert shown(hand) == ""
 
 
-def test_missing_page_shows_a_message(drive, rig, monkeypatch, tmp_path) -> None:
+def test_missing_page_shows_a_message(drive, rig, monkeypatch, tmp_path):
     monkeypatch.setattr("viewer.resources._PACKAGE", tmp_path / "viewer")
     hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.of(Manual).topic = "motion"

@@ -346,7 +346,7 @@ def limited_arm():
 
 
 @pytest.mark.parametrize("dof", [1, 2])
-def test_arc_ends_are_at_the_limits_of_the_bone(dof) -> None:
+def test_arc_ends_are_at_the_limits_of_the_bone(dof):
     actor = limited_arm()
     joint = posed_joint(actor, 0)
     arc = next(arc for arc in limit_arcs(joint, actor.pose) if arc.dof == dof)
@@ -361,7 +361,7 @@ def test_arc_ends_are_at_the_limits_of_the_bone(dof) -> None:
         assert_allclose(end - joint.center, across, atol=1e-9)
 
 
-def test_twist_is_shown_by_an_axis_that_rotates_with_the_joint() -> None:
+def test_twist_is_shown_by_an_axis_that_rotates_with_the_joint():
     # The bone points along x, so a rotation about x does not move it.
     actor = Actor(arm_figure(limits=LIMITS))
     joint = posed_joint(actor, 0)
@@ -375,7 +375,7 @@ def test_twist_is_shown_by_an_axis_that_rotates_with_the_joint() -> None:
     assert (turned.high, turned.is_limited) == (pytest.approx(0.0, abs=1e-12), True)
 
 
-def test_arcs_have_axis_colours_and_span_the_limits() -> None:
+def test_arcs_have_axis_colours_and_span_the_limits():
     actor = limited_arm()
     found = limit_arcs(posed_joint(actor, 0), actor.pose)
     assert [arc.color for arc in found] == [0, 1, 2]
@@ -383,12 +383,12 @@ def test_arcs_have_axis_colours_and_span_the_limits() -> None:
     assert not any(arc.is_limited for arc in found)
 
 
-def test_dof_without_two_limits_has_no_arc() -> None:
+def test_dof_without_two_limits_has_no_arc():
     actor = Actor(arm_figure(limits={(0, "x"): (-np.inf, 1.0), (0, "y"): (0.3, 0.3)}))
     assert limit_arcs(posed_joint(actor, 0), actor.pose) == []
 
 
-def test_range_over_360_degrees_is_drawn_as_a_full_circle() -> None:
+def test_range_over_360_degrees_is_drawn_as_a_full_circle():
     actor = Actor(arm_figure(limits={(0, "z"): (-9.0, 9.0)}))
     arc = limit_arcs(posed_joint(actor, 0), actor.pose)[0]
     points = arc_points(arc, np.zeros(3), 1.0)
@@ -396,7 +396,7 @@ def test_range_over_360_degrees_is_drawn_as_a_full_circle() -> None:
     assert len(points) < 100
 
 
-def test_joint_without_children_shows_its_box_or_the_bone_of_its_parent() -> None:
+def test_joint_without_children_shows_its_box_or_the_bone_of_its_parent():
     actor = Actor(arm_figure(limits={(2, "z"): (-1.0, 1.0)}))
     arc = limit_arcs(posed_joint(actor, 2), actor.pose)[0]
     assert_allclose(arc.start @ arc.axis, 0, atol=1e-12)

@@ -418,7 +418,7 @@ def turned_actor():
     return actor
 
 
-def test_positions_and_axes_match_hand_calculation() -> None:
+def test_positions_and_axes_match_hand_calculation():
     actor = turned_actor()
     elbow = posed_joint(actor, 1)
     assert_allclose(elbow.center, [0, 1, 0], atol=1e-12)
@@ -428,7 +428,7 @@ def test_positions_and_axes_match_hand_calculation() -> None:
     assert_allclose(elbow.axes("local")[:, 0], np.array([1, 1, 0]) / np.sqrt(2), atol=1e-12)
 
 
-def test_placement_and_scale_of_the_figure_are_applied() -> None:
+def test_placement_and_scale_of_the_figure_are_applied():
     actor = turned_actor()
     actor.placement[:3, 3] = 1, 2, 3
     actor.pose.figure_scale = 2.0
@@ -436,7 +436,7 @@ def test_placement_and_scale_of_the_figure_are_applied() -> None:
     assert_allclose(posed_joint(actor, 1).axes("local")[:, 2], [0, 0, 1], atol=1e-12)
 
 
-def test_missing_joint_returns_none() -> None:
+def test_missing_joint_returns_none():
     actor = turned_actor()
     assert posed_joint(actor, -1) is None and posed_joint(actor, 3) is None
     actor.pose = None
@@ -453,7 +453,7 @@ PLACEMENTS = {
 
 @pytest.mark.parametrize("name", PLACEMENTS)
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0.6, 0, 0.8)])
-def test_rotation_axis_matches_observed_rotation(name, axis) -> None:
+def test_rotation_axis_matches_observed_rotation(name, axis):
     actor = Actor(arm_figure())
     actor.placement[:3, :3] = PLACEMENTS[name]
     joint = posed_joint(actor, 0)
@@ -468,7 +468,7 @@ def test_rotation_axis_matches_observed_rotation(name, axis) -> None:
         assert_allclose(joint.parent_axis(seen), axis, atol=1e-9)
 
 
-def test_world_matrices_cover_every_joint() -> None:
+def test_world_matrices_cover_every_joint():
     actor = turned_actor()
     joint = posed_joint(actor, 2)
     assert joint.world.shape == (3, 4, 4)

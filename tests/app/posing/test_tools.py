@@ -47,7 +47,7 @@ def hand_of(actor, pose):
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.25])
-def test_joint_moves_to_the_pointer_at_constant_depth(scale) -> None:
+def test_joint_moves_to_the_pointer_at_constant_depth(scale):
     actor, view = bent_arm(), frame()
     actor.pose.figure_scale = scale
     actor.placement[:3, 3] = 0.2, -0.1, 0.5
@@ -61,7 +61,7 @@ def test_joint_moves_to_the_pointer_at_constant_depth(scale) -> None:
     assert outcome.target is None and outcome.text == "hand"
 
 
-def test_joint_grabbed_off_its_centre_keeps_the_offset() -> None:
+def test_joint_grabbed_off_its_centre_keeps_the_offset():
     actor, view = bent_arm(), frame(parallel=True)
     posed = posed_joint(actor, 2)
     x, y = view.place(posed.center)
@@ -70,7 +70,7 @@ def test_joint_grabbed_off_its_centre_keeps_the_offset() -> None:
     assert_allclose(outcome.pose.dofs, actor.pose.dofs, atol=1e-6)
 
 
-def test_drag_there_and_back_leaves_no_drift() -> None:
+def test_drag_there_and_back_leaves_no_drift():
     actor, view = bent_arm(), frame()
     posed = posed_joint(actor, 2)
     x, y = view.place(posed.center)
@@ -82,7 +82,7 @@ def test_drag_there_and_back_leaves_no_drift() -> None:
     assert_allclose(handle.follow(view, (x, y), False).pose.dofs, actor.pose.dofs, atol=1e-9)
 
 
-def test_unreachable_target_reports_its_distance() -> None:
+def test_unreachable_target_reports_its_distance():
     actor, view = bent_arm(), frame()
     posed = posed_joint(actor, 2)
     far = np.array([0.0, 2.9, 0.0])
@@ -96,7 +96,7 @@ def test_unreachable_target_reports_its_distance() -> None:
     assert_allclose(outcome.target, far, atol=1e-9)
 
 
-def test_limits_are_kept_and_reported() -> None:
+def test_limits_are_kept_and_reported():
     actor, view = bent_arm(limits={(1, "z"): (0.5, 1.0)}), frame()
     posed = posed_joint(actor, 2)
     outcome = ReachHandle(posed, actor.pose, view.place(posed.center), 2).follow(
@@ -105,7 +105,7 @@ def test_limits_are_kept_and_reported() -> None:
     assert outcome.pose.dofs[1] == 1.0 and outcome.limited == (1,)
 
 
-def test_chain_of_one_rotates_only_the_elbow() -> None:
+def test_chain_of_one_rotates_only_the_elbow():
     actor, view = bent_arm(), frame()
     posed = posed_joint(actor, 2)
     x, y = view.place(posed.center)
@@ -115,7 +115,7 @@ def test_chain_of_one_rotates_only_the_elbow() -> None:
     assert [longest_chain(skeleton, joint) for joint in (-1, 0, 1, 2)] == [0, 0, 1, 2]
 
 
-def test_default_chain_does_not_move_the_root() -> None:
+def test_default_chain_does_not_move_the_root():
     skeleton = bent_arm().figure.skeleton
     assert used_chain(skeleton, 2, 0).tolist() == [1]
     assert used_chain(skeleton, 2, 2).tolist() == [1, 0]
@@ -123,7 +123,7 @@ def test_default_chain_does_not_move_the_root() -> None:
     assert used_chain(skeleton, 0, 0).tolist() == []
 
 
-def test_only_roots_and_translating_joints_have_arrows() -> None:
+def test_only_roots_and_translating_joints_have_arrows():
     skeleton = arm_figure(root="xyz").skeleton
     assert shifts(skeleton, 0) and not shifts(skeleton, 1)
     assert translation_dofs(skeleton, 0).tolist() == [0, 1, 2]
@@ -133,7 +133,7 @@ def test_only_roots_and_translating_joints_have_arrows() -> None:
     assert arrows(posed_joint(actor, 1), "world") == []
 
 
-def test_arrow_is_picked_along_its_shaft_unless_it_points_at_the_eye() -> None:
+def test_arrow_is_picked_along_its_shaft_unless_it_points_at_the_eye():
     actor, view = Actor(arm_figure()), frame(parallel=True)
     found, center = arrows(posed_joint(actor, 0), "world"), np.zeros(3)
     assert grab_arrow(found, center, view, (300 + 0.7 * LENGTH, 302)).color == 0
@@ -143,7 +143,7 @@ def test_arrow_is_picked_along_its_shaft_unless_it_points_at_the_eye() -> None:
     assert grab_arrow(found[2:], center, view, (300, 300)) is None
 
 
-def test_arrow_moves_the_figure_only_along_its_axis() -> None:
+def test_arrow_moves_the_figure_only_along_its_axis():
     actor, view = Actor(arm_figure()), frame(azimuth=30, inclination=20)
     actor.placement[:3, :3] *= 2.0
     posed = posed_joint(actor, 0)
@@ -156,7 +156,7 @@ def test_arrow_moves_the_figure_only_along_its_axis() -> None:
     assert outcome.text == "figure   +0.5 +0 +0"
 
 
-def test_root_with_translations_moves_by_its_dofs_within_their_limits() -> None:
+def test_root_with_translations_moves_by_its_dofs_within_their_limits():
     actor = Actor(arm_figure(root="xyz", limits={(0, "Y"): (-0.1, 0.1)}))
     view = frame()
     posed = posed_joint(actor, 0)
@@ -184,14 +184,14 @@ def spot(angle, radius=RADIUS):
     return (300 + radius * np.cos(angle), 300 - radius * np.sin(angle))
 
 
-def test_free_joint_has_three_rings_and_one_about_the_line_of_sight() -> None:
+def test_free_joint_has_three_rings_and_one_about_the_line_of_sight():
     actor, view = Actor(arm_figure()), parallel_frame()
     found = rings(posed_joint(actor, 0), actor.pose, "local", view)
     assert [(ring.color, ring.dof) for ring in found] == [(0, -1), (1, -1), (2, -1), (3, -1)]
     assert_allclose([ring.axis for ring in found], [*np.eye(3), [0, 0, 1]], atol=1e-9)
 
 
-def test_rings_and_their_pick_distance_scale_with_the_interface() -> None:
+def test_rings_and_their_pick_distance_scale_with_the_interface():
     actor = Actor(arm_figure())
     view = replace(parallel_frame(), scale=2.0)
     posed = posed_joint(actor, 0)
@@ -204,14 +204,14 @@ def test_rings_and_their_pick_distance_scale_with_the_interface() -> None:
 @pytest.mark.parametrize(
     ("orientation", "x_axis"), [("world", [1, 0, 0]), ("parent", [0, 1, 0]), ("local", [-1, 0, 0])]
 )
-def test_orientation_setting_determines_the_axes(orientation, x_axis) -> None:
+def test_orientation_setting_determines_the_axes(orientation, x_axis):
     actor = Actor(arm_figure(orders=("xyz", "xyz", "xyz")))
     actor.pose.dofs[[2, 5]] = np.pi / 2  # shoulder and elbow each by 90 degrees about z
     found = rings(posed_joint(actor, 1), actor.pose, orientation, parallel_frame())
     assert_allclose(found[0].axis, x_axis, atol=1e-12)
 
 
-def test_joint_with_two_dofs_has_a_ring_about_each_dof_axis() -> None:
+def test_joint_with_two_dofs_has_a_ring_about_each_dof_axis():
     # x is applied first, so the x axis is rotated by y, and the y axis is that of the parent.
     actor = Actor(arm_figure(orders=("xy", "z", "")))
     actor.pose.dofs[:2] = 0.7, np.pi / 2
@@ -221,13 +221,13 @@ def test_joint_with_two_dofs_has_a_ring_about_each_dof_axis() -> None:
     assert rings(posed_joint(actor, 2), actor.pose, "world", parallel_frame()) == []
 
 
-def test_locked_dof_has_no_ring() -> None:
+def test_locked_dof_has_no_ring():
     actor = Actor(arm_figure(limits={(0, "y"): (0.2, 0.2)}))
     found = rings(posed_joint(actor, 0), actor.pose, "local", parallel_frame())
     assert [ring.dof for ring in found] == [0, 2]
 
 
-def test_circle_is_round_and_perpendicular_to_its_axis() -> None:
+def test_circle_is_round_and_perpendicular_to_its_axis():
     center, axis = np.array([1.0, 2, 3]), np.array([0.6, 0, 0.8])
     points = circle(center, axis, 2.5)
     assert_allclose(np.linalg.norm(points - center, axis=1), 2.5)
@@ -235,7 +235,7 @@ def test_circle_is_round_and_perpendicular_to_its_axis() -> None:
     assert_allclose(points[0], points[-1], atol=1e-12)
 
 
-def test_pointer_picks_the_nearest_ring_within_range() -> None:
+def test_pointer_picks_the_nearest_ring_within_range():
     actor, view = Actor(arm_figure()), parallel_frame()
     posed = posed_joint(actor, 0)
     found = rings(posed, actor.pose, "local", view)
@@ -250,7 +250,7 @@ def test_pointer_picks_the_nearest_ring_within_range() -> None:
 
 @pytest.mark.parametrize("parallel", [True, False])
 @pytest.mark.parametrize("angle", [0.4, -1.2, 2.9])
-def test_ring_facing_the_camera_rotates_by_the_pointer_angle(angle, parallel) -> None:
+def test_ring_facing_the_camera_rotates_by_the_pointer_angle(angle, parallel):
     actor, view = Actor(arm_figure()), parallel_frame(parallel=parallel)
     handle = grabbed(actor, 0, view, spot(0.7))  # no other ring crosses there
     assert handle.ring.color == 2
@@ -261,7 +261,7 @@ def test_ring_facing_the_camera_rotates_by_the_pointer_angle(angle, parallel) ->
     assert not actor.pose.dofs.any()  # the initial pose is not modified
 
 
-def test_rotation_accumulates_beyond_360_degrees() -> None:
+def test_rotation_accumulates_beyond_360_degrees():
     actor, view = Actor(arm_figure(orders=("z", "z", ""))), parallel_frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
     for turn in np.linspace(0, 4.5 * np.pi, 40):
@@ -269,7 +269,7 @@ def test_rotation_accumulates_beyond_360_degrees() -> None:
     assert outcome.pose.dofs[0] == pytest.approx(4.5 * np.pi)
 
 
-def test_slanted_ring_follows_the_pointer_in_its_plane() -> None:
+def test_slanted_ring_follows_the_pointer_in_its_plane():
     # From 50 degrees above, the ring about y is an ellipse; one of its points is dragged to
     # another.
     actor, view = Actor(arm_figure()), parallel_frame(inclination=50.0)
@@ -281,7 +281,7 @@ def test_slanted_ring_follows_the_pointer_in_its_plane() -> None:
     assert_allclose(outcome.pose.dofs[:3], [0, 0.7, 0], atol=1e-3)
 
 
-def test_ring_seen_edge_on_rolls_like_a_wheel() -> None:
+def test_ring_seen_edge_on_rolls_like_a_wheel():
     # The front of the ring about y moves right by one radius: one radian.
     actor, view = Actor(arm_figure()), parallel_frame()
     handle = grabbed(actor, 0, view, (310.0, 300.0))
@@ -290,7 +290,7 @@ def test_ring_seen_edge_on_rolls_like_a_wheel() -> None:
     assert outcome.pose.dofs[1] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_snap_steps_by_fifteen_degrees() -> None:
+def test_snap_steps_by_fifteen_degrees():
     actor, view = Actor(arm_figure()), parallel_frame()
     handle = grabbed(actor, 0, view, spot(0.7))
     outcome = handle.follow(view, spot(0.7 + np.radians(40.0)), True)
@@ -299,7 +299,7 @@ def test_snap_steps_by_fifteen_degrees() -> None:
     assert outcome.text == "shoulder z +45.0\N{DEGREE SIGN}"
 
 
-def test_ball_joint_rotates_exactly_about_the_axis() -> None:
+def test_ball_joint_rotates_exactly_about_the_axis():
     actor, view = Actor(arm_figure(orders=("zxy", "yzx", ""))), parallel_frame()
     actor.pose.dofs[:] = 0.3, -0.4, 0.5, 0.6, 0.2, -0.9
     posed = posed_joint(actor, 1)
@@ -317,7 +317,7 @@ def test_ball_joint_rotates_exactly_about_the_axis() -> None:
                     joint_rotations(posed.skeleton, actor.pose)[0])  # fmt: skip
 
 
-def test_limit_stops_its_dof_and_is_reported() -> None:
+def test_limit_stops_its_dof_and_is_reported():
     actor = Actor(arm_figure(orders=("z", "z", ""), limits={(0, "z"): (-0.2, 0.5)}))
     view = parallel_frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
@@ -330,7 +330,7 @@ def test_limit_stops_its_dof_and_is_reported() -> None:
     assert limit_text(skeleton, ()) == ""
 
 
-def test_mirrored_figure_rotates_with_the_pointer() -> None:
+def test_mirrored_figure_rotates_with_the_pointer():
     actor, view = Actor(arm_figure(orders=("z", "z", ""))), parallel_frame()
     actor.placement[0, 0] = -1.0
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))

@@ -76,7 +76,7 @@ def finished(job, some, limits, on_result=lambda result: None):
     return {result.item.index: result for result in results}
 
 
-def test_local_cluster_reports_crashes_hangs_and_defects() -> None:
+def test_local_cluster_reports_crashes_hangs_and_defects():
     some = items(40, crash=5, hang=11, **{"raise": 20})
     found = finished(Job(), some, Limits(2, retries=0, timeout=1.0, cluster="local"))
     assert {n: one.status for n, one in found.items() if one.status != "done"} == {
@@ -89,7 +89,7 @@ def test_local_cluster_reports_crashes_hangs_and_defects() -> None:
     assert {one.text for one in found.values() if one.status == "done"} <= set("0123")
 
 
-def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path) -> None:
+def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path):
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(60)]
     first = []
 
@@ -107,7 +107,7 @@ def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path) -> Non
 
 
 @pytest.mark.parametrize("where", ["local", "mortal"])
-def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path) -> None:
+def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path):
     cluster = where if where == "local" else request.getfixturevalue(where)
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(600)]
     Path(some[590].output).touch()
@@ -133,7 +133,7 @@ def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path) -> 
     assert 0 < sum(len(pids) > 1 for pids in runs.values()) <= 2 * LONGEST / 0.005
 
 
-def test_items_at_fault_are_found_within_tasks(tmp_path) -> None:
+def test_items_at_fault_are_found_within_tasks(tmp_path):
     some = items(400, crash=200, hang=300, **{"raise": 380})
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in some]
     found = finished(Job(seconds=0.005), some, Limits(2, retries=1, timeout=1.0, cluster="local"))
@@ -144,7 +144,7 @@ def test_items_at_fault_are_found_within_tasks(tmp_path) -> None:
     assert len(Path(some[200].output).read_text().split()) == 3
 
 
-def test_two_thousand_files_of_which_some_are_broken(address, tmp_path) -> None:
+def test_two_thousand_files_of_which_some_are_broken(address, tmp_path):
     broken = write_numbers(tmp_path / "in", 2000)
     report = viewer.batch(
         str(tmp_path / "in" / "*.txt"), add_numbers, tmp_path / "out", to="sum", cluster=address
@@ -159,7 +159,7 @@ def test_two_thousand_files_of_which_some_are_broken(address, tmp_path) -> None:
         assert not path.exists() or path.read_text() == str(1 + number)
 
 
-def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
+def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path):
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(12)]
     finished(Job(uses_gpu=True), some, Limits(2, cluster=address))
     assert len({path.read_text() for path in tmp_path.iterdir()}) == 1
@@ -167,13 +167,13 @@ def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
     assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
 
 
-def test_shards_together_cover_all_items(address) -> None:
+def test_shards_together_cover_all_items(address):
     whole = items(30)
     parts = [finished(Job(), whole[shard::3], Limits(cluster=address)) for shard in range(3)]
     assert sorted(n for part in parts for n in part) == list(range(30))
 
 
-def test_stopping_finishes_running_items_and_starts_no_more(address) -> None:
+def test_stopping_finishes_running_items_and_starts_no_more(address):
     results = []
     stopping = Limits(2, cluster=address, is_stopping=lambda: len(results) >= 3)
     for result in dask_cluster.run(iter(items(1000)), Job(seconds=0.02), stopping):
@@ -182,9 +182,7 @@ def test_stopping_finishes_running_items_and_starts_no_more(address) -> None:
     assert {one.status for one in results} == {"done"}
 
 
-def test_workers_without_the_package_or_with_another_version_are_refused(
-    address, monkeypatch
-) -> None:
+def test_workers_without_the_package_or_with_another_version_are_refused(address, monkeypatch):
     def refusal(job):
         with pytest.raises(ViewerError) as caught:
             list(dask_cluster.run(items(5), job, Limits(cluster=address)))
@@ -197,7 +195,7 @@ def test_workers_without_the_package_or_with_another_version_are_refused(
     assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
 
 
-def test_paths_are_relative_to_the_folder_of_the_batch(address, tmp_path, monkeypatch) -> None:
+def test_paths_are_relative_to_the_folder_of_the_batch(address, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     some = [replace(item, output=f"{item.index}.txt") for item in items(5)]
     finished(Job(), some, Limits(cluster=address))
@@ -209,7 +207,7 @@ def test_paths_are_relative_to_the_folder_of_the_batch(address, tmp_path, monkey
     finished(Job(), absolute, Limits(cluster=address))
 
 
-def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeypatch) -> None:
+def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeypatch):
     absent = str(tmp_path / "absent.npz")
     some = [replace(item, files=(absent,), output=str(tmp_path / "none.bvh")) for item in items(3)]
     notes = []
@@ -230,7 +228,7 @@ def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeyp
         list(dask_cluster.run(some, read_nothing, limits))
 
 
-def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
+def test_scheduler_without_workers_is_reported(monkeypatch):
     from distributed import Scheduler, SpecCluster
 
     options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
@@ -246,7 +244,7 @@ def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
             list(dask_cluster.run(items(3), Job(), limits))
 
 
-def test_address_without_a_scheduler_is_reported(monkeypatch) -> None:
+def test_address_without_a_scheduler_is_reported(monkeypatch):
     monkeypatch.setattr(dask_cluster, "_CONNECT", 0.3)
     with pytest.raises(ViewerError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1 "):
         next(dask_cluster.run(items(1), Job(), Limits(cluster="tcp://127.0.0.1:1")))

@@ -79,7 +79,7 @@ def wait_for_end(folder: Path) -> None:
     pytest.fail(f"{folder.name} still runs")
 
 
-def test_jobs_that_end_are_submitted_again(jobs, tmp_path) -> None:
+def test_jobs_that_end_are_submitted_again(jobs, tmp_path):
     some = [replace(item, output=str(tmp_path / f"{item.index}")) for item in items(60)]
     notes, results = [], []
     limits = Limits(1, cluster="slurm:interface=lo", note=notes.append)
@@ -101,7 +101,7 @@ def test_jobs_that_end_are_submitted_again(jobs, tmp_path) -> None:
     assert "export DASK_DISTRIBUTED__WORKER__MEMORY__PAUSE=False" in script
 
 
-def test_refused_jobs_are_reported(jobs) -> None:
+def test_refused_jobs_are_reported(jobs):
     (jobs / "most").write_text("0")
     with pytest.raises(ViewerError) as caught:
         list(dask_cluster.run(items(3), Job(), Limits(2, cluster="slurm:interface=lo")))
@@ -117,13 +117,13 @@ def test_refused_jobs_are_reported(jobs) -> None:
     assert f"SLURM accepted only 1 of 2 jobs: {reason}" in notes
 
 
-def test_jobs_that_end_before_their_workers_connect_end_the_batch(jobs, monkeypatch) -> None:
+def test_jobs_that_end_before_their_workers_connect_end_the_batch(jobs, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(ViewerError, match=r"3 jobs ended before .* in the output of 3, by default"):
         list(dask_cluster.run(items(3), Job(), Limits(1, cluster="slurm:interface=lo")))
 
 
-def test_job_script_contains_the_slurm_options(jobs) -> None:
+def test_job_script_contains_the_slurm_options(jobs):
     name = parse_cluster("slurm:partition=gpu,time=2:00:00,cpus=4,gres=gpu:1,exclusive,account=lab")
     before = signal.getsignal(signal.SIGINT)
     with slurm_cluster(name, 2 << 30, {"distributed.a-b.c": False}) as cluster:
@@ -148,12 +148,12 @@ def test_job_script_contains_the_slurm_options(jobs) -> None:
         ("mem=lots", 'mem: expected a size such as 64G, found "lots"'),
     ],
 )
-def test_wrong_options_are_reported(jobs, options, message) -> None:
+def test_wrong_options_are_reported(jobs, options, message):
     with pytest.raises(ViewerError, match=rf"--cluster slurm: .*{message}"):
         slurm_cluster(parse_cluster(f"slurm:{options}"), None, {})
 
 
-def test_missing_sbatch_is_reported(monkeypatch) -> None:
+def test_missing_sbatch_is_reported(monkeypatch):
     monkeypatch.setenv("PATH", "")
     with pytest.raises(ViewerError, match="sbatch was not found"):
         next(dask_cluster.run([], lambda item: item, Limits(cluster="slurm")))

@@ -59,7 +59,7 @@ def linted(index, name, *codes, **others):
     return replace(Result(Item(index, (), "", name), "done", code, values=values), **others)
 
 
-def test_page_of_lint_lists_codes_and_the_worst_items_first(tmp_path) -> None:
+def test_page_of_lint_lists_codes_and_the_worst_items_first(tmp_path):
     results = [
         linted(0, "clean.glb"),
         linted(1, "warned.glb", "S004"),
@@ -78,7 +78,7 @@ def test_page_of_lint_lists_codes_and_the_worst_items_first(tmp_path) -> None:
     assert page.row("broken.glb")[3] == "broken.glb:1: expected <b>"
 
 
-def test_pages_are_self_contained_and_execute_nothing(tmp_path) -> None:
+def test_pages_are_self_contained_and_execute_nothing(tmp_path):
     results = [linted(0, EVIL, "W001"), replace(linted(1, "a"), status="failed", message=EVIL)]
     path = tmp_path / "o.html"
     save_overview(path, "lint", results)
@@ -98,7 +98,7 @@ def compared(index, relative, status="done"):
     return Result(Item(index, (), "", f"s{index}"), status, values={"comparisons": [row]})
 
 
-def test_page_of_diff_sorts_by_distance_and_shows_the_vertex(tmp_path) -> None:
+def test_page_of_diff_sorts_by_distance_and_shows_the_vertex(tmp_path):
     results = [compared(0, 0.0), compared(1, 0.125), compared(2, 0.25)]
     save_overview(tmp_path / "o.html", "diff", results)
     page = Page(tmp_path / "o.html")
@@ -119,7 +119,7 @@ def has(pixels, color):
     return int((np.abs(pixels[..., :3].astype(int) - color).max(axis=-1) < 3).sum())
 
 
-def test_sheet_shows_every_picture_and_marks_failed_items(tmp_path, monkeypatch) -> None:
+def test_sheet_shows_every_picture_and_marks_failed_items(tmp_path, monkeypatch):
     red, green = (200, 0, 0), (0, 160, 0)
     failed = Result(Item(2, (), "", "2.glb"), "failed", 2, message="expected a mesh")
     results = [drawn(tmp_path, 3, red), failed, drawn(tmp_path, 0, red), drawn(tmp_path, 1, green)]
@@ -139,26 +139,26 @@ def test_sheet_shows_every_picture_and_marks_failed_items(tmp_path, monkeypatch)
     assert lines[1:] == ["the sheets show the first 3 of 4 items"]
 
 
-def test_page_of_render_contains_small_pictures(tmp_path) -> None:
+def test_page_of_render_contains_small_pictures(tmp_path):
     save_overview(tmp_path / "o.html", "render", [drawn(tmp_path, 0, (200, 0, 0))])
     sources = [one["src"] for tag, one in Page(tmp_path / "o.html").tags if tag == "img"]
     assert len(sources) == 1 and sources[0].startswith("data:image/jpeg;base64,")
 
 
-def test_sheet_of_failures_only_is_drawn(tmp_path) -> None:
+def test_sheet_of_failures_only_is_drawn(tmp_path):
     failed = Result(Item(0, (), "", "a"), "failed", 2, message="no mesh")
     (line,) = save_overview(tmp_path / "o.png", "render", [failed])
     assert line.endswith("o.png: 1 item, 1 of them failed") and (tmp_path / "o.png").exists()
 
 
-def test_unsupported_suffixes_and_batches_without_pictures_are_refused(tmp_path) -> None:
+def test_unsupported_suffixes_and_batches_without_pictures_are_refused(tmp_path):
     with pytest.raises(UnsupportedFormatError, match=r'expected \.html, \.png.*, found "\.pdf"'):
         check_overview("o.pdf")
     with pytest.raises(ViewerError, match=r"no picture was written; name a page such as o\.html"):
         save_overview(tmp_path / "o.png", "lint", [linted(0, "a")])
 
 
-def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> None:
+def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch):
     """As when Ctrl-C arrives after the first sheet."""
     results = [
         Result(Item(index, (), "", f"{index}.glb"), "failed", 2, message="broken")
@@ -179,7 +179,7 @@ def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> Non
     assert [one.name for one in tmp_path.iterdir()] == ["o.png"] and path.read_bytes() == b"old"
 
 
-def test_message_of_a_failed_item_is_shown_once(tmp_path) -> None:
+def test_message_of_a_failed_item_is_shown_once(tmp_path):
     notes = [{"message": "expected a mesh"}, {"message": "the unit is unknown"}]
     failed = Result(Item(0, (), "", "a.obj"), "failed", 2, message="a.obj:1: expected a mesh")
     save_overview(tmp_path / "o.html", "convert", [replace(failed, diagnostics=notes)])
@@ -187,7 +187,7 @@ def test_message_of_a_failed_item_is_shown_once(tmp_path) -> None:
     assert texts == "a.obj:1: expected a meshthe unit is unknown"
 
 
-def test_page_of_info_lists_figures(tmp_path) -> None:
+def test_page_of_info_lists_figures(tmp_path):
     base = {"size": 2.0, "unit": "m", "model": {}}
     clip = {"range": [0.0, 1.0], "frames": 1, "frame_rate": 2.0}
     actors = [

@@ -60,9 +60,7 @@ def refusal(path: Path, expected=(), alike=ALIKE) -> str:
         (["made/fox.glb", "made/readme.txt"], ["made"]),
     ],
 )
-def test_files_with_the_suffixes_of_the_reference_are_found(
-    tmp_path, names, result, is_zip
-) -> None:
+def test_files_with_the_suffixes_of_the_reference_are_found(tmp_path, names, result, is_zip):
     if is_zip:
         path = zipped(tmp_path / "bob.zip", dict.fromkeys(names, "x"))
     else:
@@ -88,19 +86,19 @@ def test_files_with_the_suffixes_of_the_reference_are_found(
         ),
     ],
 )
-def test_missing_and_ambiguous_files_are_reported(tmp_path, names, message) -> None:
+def test_missing_and_ambiguous_files_are_reported(tmp_path, names, message):
     path = zipped(tmp_path / "bob.zip", dict.fromkeys(names, "x"))
     assert refusal(path) == message
 
 
-def test_expected_patterns_take_precedence(tmp_path) -> None:
+def test_expected_patterns_take_precedence(tmp_path):
     path = written(tmp_path / "bob", "a.skel", "b.skel", "in/b.skin", "in/Student.skin")
     assert chosen(path, ["b.skel", "student.skin"]) == ["b.skel", "in/Student.skin"]
     assert chosen(path, ["in/b*"]) == ["in/b.skin"]
     assert refusal(path, ["c.skel"]).startswith(": expected 1 file matching c.skel, found a.skel")
 
 
-def test_unpacked_files_are_removed_and_only_the_needed_ones_unpacked(tmp_path) -> None:
+def test_unpacked_files_are_removed_and_only_the_needed_ones_unpacked(tmp_path):
     members = {"a/f.glb": "1", "a/f.bin": "2", "a/f.exe": "3", "b/x.png": "4"}
     path = zipped(tmp_path / "bob.zip", members)
     with opened(path, ["f.glb"], temporary=tmp_path) as found:
@@ -111,7 +109,7 @@ def test_unpacked_files_are_removed_and_only_the_needed_ones_unpacked(tmp_path) 
     assert [one.name for one in tmp_path.iterdir()] == ["bob.zip"]
 
 
-def test_archives_in_archives_and_folders_are_opened(tmp_path) -> None:
+def test_archives_in_archives_and_folders_are_opened(tmp_path):
     def inner(data: bytes, name: str = "in.zip") -> bytes:
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w") as archive:
@@ -131,14 +129,14 @@ def test_archives_in_archives_and_folders_are_opened(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", ["/etc/a.skel", "../a.skel", "x/../../a.skel", "C:\\a.skel",
                                   "\\a.skel", "x\\..\\..\\a.skel", "C:a.skel"])  # fmt: skip
-def test_paths_outside_the_archive_are_refused(tmp_path, name) -> None:
+def test_paths_outside_the_archive_are_refused(tmp_path, name):
     path = zipped(tmp_path / "bob.zip", {name: "x", "b.skin": "x"})
     assert "expected a path inside the archive, found one that leads outside" in refusal(path)
     assert [one.name for one in tmp_path.iterdir()] == ["bob.zip"]
 
 
 @pytest.mark.slow
-def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch) -> None:
+def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch):
     path = zipped(tmp_path / "bob.zip", {"a.skel": bytes(80 << 20), "a.skin": "x"})
     size = path.stat().st_size
     found = (80 << 20) + 1
@@ -151,7 +149,7 @@ def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch) ->
     assert refusal(path) == ": expected at most 1 file, found 2"
 
 
-def test_directory_with_understated_sizes_unpacks_only_the_stated_sizes(tmp_path) -> None:
+def test_directory_with_understated_sizes_unpacks_only_the_stated_sizes(tmp_path):
     path = zipped(tmp_path / "bob.zip", {"a.skel": bytes(1 << 20), "a.skin": "x"})
     data = path.read_bytes()
     directory = data.index(b"PK\x01\x02")
@@ -159,7 +157,7 @@ def test_directory_with_understated_sizes_unpacks_only_the_stated_sizes(tmp_path
     assert "damaged" in refusal(path)
 
 
-def test_links_encrypted_repeated_and_damaged_files_are_refused(tmp_path) -> None:
+def test_links_encrypted_repeated_and_damaged_files_are_refused(tmp_path):
     path = tmp_path / "bob.zip"
     link = zipfile.ZipInfo("a.skel")
     link.external_attr = (stat.S_IFLNK | 0o777) << 16
@@ -185,7 +183,7 @@ def test_links_encrypted_repeated_and_damaged_files_are_refused(tmp_path) -> Non
     assert refusal(path) == ": a.skel: expected a single file with this path, found 2"
 
 
-def test_links_out_of_a_folder_are_treated_as_missing(tmp_path) -> None:
+def test_links_out_of_a_folder_are_treated_as_missing(tmp_path):
     (tmp_path / "solution.skin").write_text("x")
     folder = written(tmp_path / "bob", "a.skel", "b.skin")
     (folder / "b.skin").unlink()
@@ -193,7 +191,7 @@ def test_links_out_of_a_folder_are_treated_as_missing(tmp_path) -> None:
     assert refusal(folder) == ": expected 1 file matching *.skin, found a.skel"
 
 
-def test_submissions_are_the_folders_and_archives_of_a_folder(tmp_path) -> None:
+def test_submissions_are_the_folders_and_archives_of_a_folder(tmp_path):
     written(tmp_path, "bob/x/a.skel", "ann/a.skel", "eve.zip", "max.rar", "grades.json", ".x/a")
     found = find_submissions([tmp_path])
     assert [one.name for one in found.submissions] == ["ann", "bob", "eve.zip", "max.rar"]
@@ -204,7 +202,7 @@ def test_submissions_are_the_folders_and_archives_of_a_folder(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ("geoffrey.obj", "overlap.obj", "it's.obj"))
-def test_reason_for_damage_does_not_depend_on_names(tmp_path, name) -> None:
+def test_reason_for_damage_does_not_depend_on_names(tmp_path, name):
     path = tmp_path / "a.zip"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(name, b"v 0 0 0\n" * 20)
@@ -215,7 +213,7 @@ def test_reason_for_damage_does_not_depend_on_names(tmp_path, name) -> None:
     assert "the headers of its files differ" in refusal(path, alike=("*.obj",))
 
 
-def test_end_of_an_archive_within_a_file_is_reported(tmp_path, monkeypatch) -> None:
+def test_end_of_an_archive_within_a_file_is_reported(tmp_path, monkeypatch):
     def ends(*_: object) -> None:
         raise EOFError
 

@@ -372,7 +372,7 @@ def test_every_job_writes_a_page_and_sheets_without_images_are_refused_first(rig
     assert "one: 2 joints" in Path("o.html").read_text()
 
 
-def test_workers_that_render_use_separate_devices_unless_one_is_given(monkeypatch) -> None:
+def test_workers_that_render_use_separate_devices_unless_one_is_given(monkeypatch):
     used = []
     monkeypatch.setattr(render, "run", lambda arguments: used.append(arguments.gpu) or 0)
     monkeypatch.setattr(jobs, "_device", lambda: 3)
@@ -383,7 +383,7 @@ def test_workers_that_render_use_separate_devices_unless_one_is_given(monkeypatc
     assert used == [3, 1]
 
 
-def test_process_of_the_batch_uses_the_default_device() -> None:
+def test_process_of_the_batch_uses_the_default_device():
     assert jobs._device() is None
 
 
@@ -397,12 +397,12 @@ def commands() -> list[str]:
     return [line for line in lines if line.startswith("viewer batch ")]
 
 
-def test_page_has_a_command_of_each_kind() -> None:
+def test_page_has_a_command_of_each_kind():
     assert {line.split()[2] for line in commands()} == JOBS.keys() - {"rig"}
 
 
 @pytest.mark.parametrize("line", commands())
-def test_command_of_the_page_is_valid(line) -> None:
+def test_command_of_the_page_is_valid(line):
     line = line.replace("$SLURM_ARRAY_TASK_ID", "0").replace("$SLURM_ARRAY_TASK_COUNT", "8")
     words = shlex.split(line, comments=True)[2:]
     parser = job_parser(words[0])

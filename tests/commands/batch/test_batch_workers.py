@@ -56,7 +56,7 @@ def shown(monkeypatch, is_terminal, statuses):
     return stream.getvalue()
 
 
-def test_bar_shows_rate_failures_and_time_left(monkeypatch) -> None:
+def test_bar_shows_rate_failures_and_time_left(monkeypatch):
     text = shown(monkeypatch, True, ["done", "failed", *["done"] * 18])
     last = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text).strip().splitlines()[-1]
     assert " 20/100 0.5/s, 1 failed " in last
@@ -64,18 +64,18 @@ def test_bar_shows_rate_failures_and_time_left(monkeypatch) -> None:
     assert last.rstrip().endswith("0:02:40")
 
 
-def test_bar_is_shown_before_the_first_item_finishes(monkeypatch) -> None:
+def test_bar_is_shown_before_the_first_item_finishes(monkeypatch):
     assert "  0/100" in shown(monkeypatch, True, [])
     assert shown(monkeypatch, False, []) == ""
 
 
-def test_lines_without_a_terminal_have_rate_and_time_left(monkeypatch) -> None:
+def test_lines_without_a_terminal_have_rate_and_time_left(monkeypatch):
     text = shown(monkeypatch, False, ["unchanged"] * 10 + ["done"] * 40)
     # In the first minute, ten items of 31 are skipped: 21 in 62 s. Later, all are run.
     assert text == "31 of 100, 0.339/s, 3 min 24 s left\n"
 
 
-def test_rate_is_that_of_the_last_minute(monkeypatch) -> None:
+def test_rate_is_that_of_the_last_minute(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(display, "time", clock)
     rate = display._Rate()
@@ -117,7 +117,7 @@ def plan(folder, count, **options):
         ({"cluster": "slurm:cpus=16", "workers": 64}, ("dask_cluster", 20)),
     ],
 )
-def test_number_of_workers(tmp_path, monkeypatch, options, expected) -> None:
+def test_number_of_workers(tmp_path, monkeypatch, options, expected):
     monkeypatch.delenv("SLURM_CPUS_PER_TASK", raising=False)
     monkeypatch.delenv("SLURM_CPUS_ON_NODE", raising=False)
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: range(5), raising=False)
@@ -125,7 +125,7 @@ def test_number_of_workers(tmp_path, monkeypatch, options, expected) -> None:
     assert (settings.engine, settings.limits.workers) == expected
 
 
-def test_tasks_of_slurm_use_their_own_cores_only(tmp_path, monkeypatch) -> None:
+def test_tasks_of_slurm_use_their_own_cores_only(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: range(64), raising=False)
     monkeypatch.setenv("SLURM_CPUS_ON_NODE", "8")
     assert plan(tmp_path, 20).settings.limits.workers == 8
@@ -134,14 +134,14 @@ def test_tasks_of_slurm_use_their_own_cores_only(tmp_path, monkeypatch) -> None:
     assert plan(tmp_path, 20, workers=10).settings.limits.workers == 10
 
 
-def test_workers_that_have_no_effect_are_noted(tmp_path) -> None:
+def test_workers_that_have_no_effect_are_noted(tmp_path):
     notes = plan(tmp_path, 2, cluster="tcp://node:8786", workers=3).notes
     assert notes == ("--workers has no effect: all workers of tcp://node:8786 are used",)
     with pytest.raises(ViewerError, match="--cluster: expected --workers 1 or more, found 0"):
         plan(tmp_path, 2, cluster="local", workers=0)
 
 
-def test_reports_in_python_have_the_notes(tmp_path) -> None:
+def test_reports_in_python_have_the_notes(tmp_path):
     (tmp_path / "a.bvh").touch()
     (tmp_path / "b.unknown").touch()
     found = viewer.batch(tmp_path, "info", workers=0)
@@ -250,7 +250,7 @@ def rows_of(path: Path) -> dict[str, dict[str, str]]:
         return {row["name"]: row for row in csv.DictReader(stream)}
 
 
-def test_every_submission_has_a_row_and_failures_do_not_stop_the_others(course, capsys) -> None:
+def test_every_submission_has_a_row_and_failures_do_not_stop_the_others(course, capsys):
     code = run(["batch", "diff", "solution/arm.skel+solution/arm.skin", "subs", "--poses", "0",
                 "--tolerance", "1e-6", "--table", "t.csv", "--overview", "o.html"])  # fmt: skip
     assert code == 1
@@ -281,7 +281,7 @@ def test_every_submission_has_a_row_and_failures_do_not_stop_the_others(course, 
     assert not Path("arm.skel").exists()
 
 
-def test_python_grading_with_expected_names_is_equal_in_workers(course) -> None:
+def test_python_grading_with_expected_names_is_equal_in_workers(course):
     zipped(course / "gus.zip", rig() | {"old.skel": "x", "old.skin": "x"})
     names = [str(course / "dee.zip"), str(course / "gus.zip")]
     options = ["solution", "--expect", "arm.skel", "--expect", "arm.skin", "--poses", "0"]
@@ -300,7 +300,7 @@ def test_python_grading_with_expected_names_is_equal_in_workers(course) -> None:
         (["--table", "grades.csv"], "grades.csv: already exists (--force replaces it)"),
     ],
 )
-def test_files_that_cannot_be_written_are_refused_first(course, options, message, capsys) -> None:
+def test_files_that_cannot_be_written_are_refused_first(course, options, message, capsys):
     Path("grades.csv").write_text("keep")
     assert run(["batch", "diff", "solution", "subs", *options]) in (2, 5)
     caught = capsys.readouterr()
@@ -308,7 +308,7 @@ def test_files_that_cannot_be_written_are_refused_first(course, options, message
     assert Path("grades.csv").read_text() == "keep"
 
 
-def test_plus_sign_separates_files_unless_it_is_part_of_a_name(course) -> None:
+def test_plus_sign_separates_files_unless_it_is_part_of_a_name(course):
     folder = course / "bob + co" / "project"
     files = [folder / "arm.skel", folder / "arm.skin"]
     assert input_files("+".join(map(str, files))) == files

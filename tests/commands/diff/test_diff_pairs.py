@@ -65,26 +65,26 @@ def paired(first: list[Actor], second: list[Actor]) -> list[tuple[int, int]]:
     return [(figures[0].index(a.figure), figures[1].index(b.figure)) for a, b in pairs]
 
 
-def test_names_take_precedence_over_order() -> None:
+def test_names_take_precedence_over_order():
     assert paired([rig("a"), rig("b")], [rig("b"), rig("c"), rig("a")]) == [(0, 2), (1, 0)]
 
 
-def test_equal_names_prefer_the_same_format() -> None:
+def test_equal_names_prefer_the_same_format():
     assert paired([rig("a")], [skeleton("a"), surface("a"), rig("a")]) == [(0, 2)]
     assert paired([surface("a")], [rig("a"), skeleton("a")]) == [(0, 0)]
 
 
-def test_figures_without_common_names_are_paired_by_format_then_by_order() -> None:
+def test_figures_without_common_names_are_paired_by_format_then_by_order():
     assert paired([rig("a"), skeleton("b")], [skeleton("x"), rig("y")]) == [(0, 1), (1, 0)]
     assert paired([rig("a"), rig("b")], [rig("x"), rig("y")]) == [(0, 0), (1, 1)]
     assert paired([rig("a")], [surface("x")]) == [(0, 0)]
 
 
-def test_exact_name_match_takes_precedence_over_an_earlier_figure() -> None:
+def test_exact_name_match_takes_precedence_over_an_earlier_figure():
     assert paired([rig("x"), rig("a")], [rig("a"), rig("b")]) == [(0, 1), (1, 0)]
 
 
-def test_people_are_paired_by_their_number() -> None:
+def test_people_are_paired_by_their_number():
     first = [points("a", person=1), points("a", person=2)]
     second = [points("a", person=2), points("a", person=3)]
     found = pair_actors(first, second)
@@ -93,7 +93,7 @@ def test_people_are_paired_by_their_number() -> None:
     assert found.second == (f"{second[1].name} (captured points)",)
 
 
-def test_unpaired_figures_are_reported_with_their_side() -> None:
+def test_unpaired_figures_are_reported_with_their_side():
     found = pair_actors([rig("a")], [skeleton("other"), surface("skin"), rig("a"), rig("b")])
     assert found.first == ()
     assert found.second == (
@@ -105,7 +105,7 @@ def test_unpaired_figures_are_reported_with_their_side() -> None:
     assert found.first == ("a",) and found.second == ()
 
 
-def test_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
+def test_clip_on_an_unpaired_skeleton_is_used_for_the_pair():
     walk, mine = motion("walk"), motion("walk")
     first, second = [rig("a", walk)], [skeleton("stray", mine), rig("a")]
     for turned in (False, True):
@@ -119,7 +119,7 @@ def test_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
     assert second[0].clip is mine and second[1].clip is None  # both clips are unchanged
 
 
-def test_clips_are_paired_by_name_then_by_order() -> None:
+def test_clips_are_paired_by_name_then_by_order():
     run, walk = motion("run"), motion("walk")
     first = [rig("a", motion("walk")), rig("b", motion("run"))]
     pairs = pair_actors(first, [rig("a", run), rig("b", walk)]).pairs
@@ -128,7 +128,7 @@ def test_clips_are_paired_by_name_then_by_order() -> None:
     assert pairs[0][1].clip is run
 
 
-def test_clip_with_a_different_name_is_used_only_if_necessary() -> None:
+def test_clip_with_a_different_name_is_used_only_if_necessary():
     run = motion("run")
     found = pair_actors([rig("a", motion("walk"))], [skeleton("s", run), rig("a")])
     assert found.pairs[0][1].clip is run

@@ -9,7 +9,7 @@ from viewer.errors import RenderError
 pytestmark = pytest.mark.slow
 
 
-def test_all_measurements_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_measurements_are_made(monkeypatch):
     commands: list[list[str]] = []
     monkeypatch.setattr(doctor, "_process", lambda words, _: lambda: commands.append([*words]))
     for name, value in (("_SIZE", (32, 24)), ("_FRAMES", 1), ("_STARTS", 2), ("_INSTANCES", 2)):
@@ -24,24 +24,22 @@ def test_all_measurements_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(commands) == 3 * 6  # a warm-up round and two measured rounds
 
 
-def test_relative_times_state_their_reference() -> None:
+def test_relative_times_state_their_reference():
     assert str(Measured("a", 2.0)).split() == ["a", "2.00", "ms"]
     assert str(Measured("a", 2.0, 1.5, "b")).split() == ["a", "2.00", "ms", "1.50", "times", "b"]
 
 
-def test_failure_of_a_program_is_reported_in_one_line() -> None:
+def test_failure_of_a_program_is_reported_in_one_line():
     run = doctor._process(["-c", "import sys; print('x'); sys.exit('no\\nOpenGL')"], {})
     with pytest.raises(RenderError, match=r"^OpenGL$"):
         run()
 
 
-def test_programs_receive_the_environment() -> None:
+def test_programs_receive_the_environment():
     doctor._process(["-c", "import os; assert os.environ['A'] == 'b'"], {"A": "b"})()
 
 
-def test_doctor_measures_only_on_request(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
+def test_doctor_measures_only_on_request(monkeypatch, capsys):
     from viewer.cli import run
 
     monkeypatch.setattr(doctor, "examine", lambda: iter(()))

@@ -4,7 +4,6 @@ import io
 import json
 import struct
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -179,7 +178,7 @@ def test_invalid_tangents_are_omitted(tmp_path):
 
 
 @pytest.mark.parametrize("called", ["", "eye"])
-def test_names_are_kept_or_listed(tmp_path: Path, called: str) -> None:
+def test_names_are_kept_or_listed(tmp_path, called):
     file = skinned()
     file.root["skins"][0]["name"] = "Armature"
     file.root["nodes"][2] |= {"name": called, "camera": 0}

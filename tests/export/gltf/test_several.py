@@ -46,7 +46,7 @@ def posed(actor: Actor, animation: int, time: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("optimizes", "up"), [(False, "y"), (True, "y"), (False, "z")])
-def test_figures_are_placed_as_in_the_scene(tmp_path: Path, optimizes: bool, up: str) -> None:
+def test_figures_are_placed_as_in_the_scene(tmp_path, optimizes, up):
     actors, path = [Actor(two_parts()), other()], tmp_path / "both.glb"
     every = [[each.clip() for each in actor.figure.animations] for actor in actors]
     turned = np.linalg.inv(UP) if up == "z" else np.eye(4)
@@ -66,7 +66,7 @@ def test_figures_are_placed_as_in_the_scene(tmp_path: Path, optimizes: bool, up:
         assert apart.min(axis=0).max() < limit and apart.min(axis=1).max() < limit
 
 
-def test_written_figures_are_read_as_several_actors(tmp_path: Path) -> None:
+def test_written_figures_are_read_as_several_actors(tmp_path):
     actors, path = [Actor(two_parts()), other()], tmp_path / "both.glb"
     export_figures(actors, path)
     scene = viewer.load(path)
@@ -78,9 +78,7 @@ def test_written_figures_are_read_as_several_actors(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("units", [("m", "cm"), ("cm", "m"), ("cm", "cm")])
-def test_sizes_are_in_metres_whatever_the_unit_of_the_scene(
-    tmp_path: Path, units: tuple[str, str]
-) -> None:
+def test_sizes_are_in_metres_whatever_the_unit_of_the_scene(tmp_path, units):
     metres = [{"m": 1.0, "cm": 0.01}[unit] for unit in units]
     scaled = np.diag([metres[1] / metres[0]] * 3 + [1.0])
     first, second = (replace(two_parts(), unit=unit) for unit in units)
@@ -93,7 +91,7 @@ def test_sizes_are_in_metres_whatever_the_unit_of_the_scene(
     assert apart.min(axis=0).max() < SINGLE and apart.min(axis=1).max() < SINGLE
 
 
-def test_animations_of_different_length_remain_separate(tmp_path: Path) -> None:
+def test_animations_of_different_length_remain_separate(tmp_path):
     longer = [replace(clip, end=clip.end + 1.0) for clip in clips()]
     actors, path = [Actor(two_parts()), Actor(two_parts())], tmp_path / "both.glb"
     export_figures(actors, path, [clips(), longer])
@@ -101,7 +99,7 @@ def test_animations_of_different_length_remain_separate(tmp_path: Path) -> None:
     assert names == ["wave", "jump", "wave", "jump"]
 
 
-def test_cameras_are_read_back(tmp_path: Path) -> None:
+def test_cameras_are_read_back(tmp_path):
     intrinsic = np.array([[900.0, 0, 400], [0, 900, 300], [0, 0, 1]])
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     view = CameraView("front", intrinsic, turn, np.array([0.1, 0.2, 5.0]), (800, 600))
@@ -120,7 +118,7 @@ def test_cameras_are_read_back(tmp_path: Path) -> None:
     assert_allclose(front.translation, view.translation, atol=1e-12)
 
 
-def test_animations_without_effect_are_reported(tmp_path: Path) -> None:
+def test_animations_without_effect_are_reported(tmp_path):
     face = TransformChannel(
         -1, "weights", np.array([0.0, 1.0]), np.array([[0.0], [1.0]]), shapes=np.array([1])
     )
@@ -140,7 +138,7 @@ def with_extras(name: str, extras: object) -> Actor:
     return Actor(replace(figure, name=name, record=replace(figure.record, extras=extras)))
 
 
-def test_different_application_data_is_listed_by_figure(tmp_path: Path) -> None:
+def test_different_application_data_is_listed_by_figure(tmp_path):
     actors = [with_extras("a", {"k": 1}), with_extras("b", [2]), with_extras("c", {"k": 1})]
     plain = with_extras("d", None)
     export_figures([*actors, plain], tmp_path / "some.glb")
@@ -163,7 +161,7 @@ def test_different_application_data_is_listed_by_figure(tmp_path: Path) -> None:
     ]
 
 
-def test_equal_application_data_is_unchanged(tmp_path: Path) -> None:
+def test_equal_application_data_is_unchanged(tmp_path):
     export_figures([with_extras("a", {"k": 1}), with_extras("b", {"k": 1})], tmp_path / "a.glb")
     assert Evaluator(tmp_path / "a.glb").root["extras"] == {"k": 1}
 
@@ -316,7 +314,7 @@ def test_unknown_handling_of_gaps_is_refused(tmp_path):
     assert not [*tmp_path.iterdir()]
 
 
-def test_animations_that_are_not_played_are_reported(tmp_path: Path) -> None:
+def test_animations_that_are_not_played_are_reported(tmp_path):
     figure = two_parts()
     played = Actor(figure, clip=figure.animations[1].clip(), animation=1)
     scene = Scene([crowd().actors[0], played])

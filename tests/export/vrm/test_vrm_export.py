@@ -71,12 +71,12 @@ def old(tmp_path_factory: pytest.TempPathFactory) -> tuple[Written, list[str], P
     return *convert(swinging(0), folder), folder
 
 
-def test_export_reports_no_loss(modern: Any, old: Any) -> None:
+def test_export_reports_no_loss(modern, old):
     for _, keys, _ in (modern, old):
         assert keys == ["X001.gltf", "X001.vrm", "X005.morph-targets", "X003.vrm-motions"]
 
 
-def test_bones_views_and_meta_are_those_of_the_file(modern: Any) -> None:
+def test_bones_views_and_meta_are_those_of_the_file(modern):
     written = modern[0]
     vrm = written.root["extensions"]["VRMC_vrm"]
     bones = vrm["humanoid"]["humanBones"]
@@ -92,7 +92,7 @@ def test_bones_views_and_meta_are_those_of_the_file(modern: Any) -> None:
     assert vrm["lookAt"] == original["lookAt"]
 
 
-def test_expressions_bind_the_same_targets_and_materials(modern: Any) -> None:
+def test_expressions_bind_the_same_targets_and_materials(modern):
     written = modern[0]
     told = written.root["extensions"]["VRMC_vrm"]["expressions"]
     happy, blink, angry = (told["preset"][name] for name in ("happy", "blink", "angry"))
@@ -108,7 +108,7 @@ def test_expressions_bind_the_same_targets_and_materials(modern: Any) -> None:
     assert [*told["custom"]] == ["proud"]
 
 
-def test_springs_colliders_and_constraints_refer_to_the_same_nodes(modern: Any) -> None:
+def test_springs_colliders_and_constraints_refer_to_the_same_nodes(modern):
     written = modern[0]
     springs = written.root["extensions"]["VRMC_springBone"]
     original = swinging().root["extensions"]["VRMC_springBone"]
@@ -125,7 +125,7 @@ def test_springs_colliders_and_constraints_refer_to_the_same_nodes(modern: Any) 
     assert (told["rollAxis"], told["weight"]) == ("X", 0.5)
 
 
-def test_toon_shading_keeps_its_values_and_textures(modern: Any) -> None:
+def test_toon_shading_keeps_its_values_and_textures(modern):
     written = modern[0]
     (skin,) = [m for m in written.root["materials"] if m["name"] == "skin"]
     toon = skin["extensions"]["VRMC_materials_mtoon"]
@@ -135,7 +135,7 @@ def test_toon_shading_keeps_its_values_and_textures(modern: Any) -> None:
     assert "KHR_materials_unlit" not in written.root["extensionsUsed"]
 
 
-def test_character_is_read_back_equally(modern: Any) -> None:
+def test_character_is_read_back_equally(modern):
     folder = modern[2]
     before, after = (load(folder / name).actors[0].figure for name in ("ada.vrm", "out.vrm"))
     facts = {key: value for key, value in before.facts if key != "version"}
@@ -159,18 +159,18 @@ def test_character_is_read_back_equally(modern: Any) -> None:
     assert_allclose(shapes[1], shapes[0], rtol=0, atol=1e-6)
 
 
-def test_requested_meta_replaces_that_of_the_file(tmp_path: Path) -> None:
+def test_requested_meta_replaces_that_of_the_file(tmp_path):
     written, _ = convert(swinging(), tmp_path, name="Bea", authors=("C",))
     meta = written.root["extensions"]["VRMC_vrm"]["meta"]
     assert (meta["name"], meta["authors"], meta["version"]) == ("Bea", ["C"], "2")
 
 
-def test_empty_authors_keep_those_of_the_file(tmp_path: Path) -> None:
+def test_empty_authors_keep_those_of_the_file(tmp_path):
     written, _ = convert(swinging(), tmp_path, authors=("",))
     assert written.root["extensions"]["VRMC_vrm"]["meta"]["authors"] == META["authors"]
 
 
-def test_lost_references_are_counted(tmp_path: Path) -> None:
+def test_lost_references_are_counted(tmp_path):
     file = swinging()
     vrm = file.root["extensions"]["VRMC_vrm"]
     vrm["meta"] = {**META, "thumbnailImage": 9}
@@ -184,7 +184,7 @@ def test_lost_references_are_counted(tmp_path: Path) -> None:
     )
 
 
-def test_character_without_a_mesh_is_written(tmp_path: Path) -> None:
+def test_character_without_a_mesh_is_written(tmp_path):
     file = swinging()
     for node in file.root["nodes"]:
         node.pop("mesh", None), node.pop("skin", None)
@@ -210,8 +210,8 @@ def test_character_without_a_mesh_is_written(tmp_path: Path) -> None:
     ],
 )
 def test_data_with_an_unexpected_structure_does_not_prevent_writing(
-    tmp_path: Path, version: int, place: tuple[str, ...], value: Any
-) -> None:
+    tmp_path, version, place, value
+):
     file = swinging(version)
     told: Any = file.root["extensions"]
     for name in place[:-1]:
@@ -229,7 +229,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> Figure:
     return load(path).actors[0].figure
 
 
-def test_optional_bones_below_omitted_ones_are_omitted_in_any_order(body: Figure) -> None:
+def test_optional_bones_below_omitted_ones_are_omitted_in_any_order(body):
     skeleton = body.require_skeleton()
     joints = human_bones(body)
     # A chest that is not below the spine, listed after the bone that needs it.
@@ -239,7 +239,7 @@ def test_optional_bones_below_omitted_ones_are_omitted_in_any_order(body: Figure
     assert human_bones(figure) == others
 
 
-def test_flattened_figures_are_written(tmp_path: Path) -> None:
+def test_flattened_figures_are_written(tmp_path):
     file = swinging(turn=False)
     del file.root["extensions"]
     file.root["nodes"][BONES.index("hips")]["scale"] = [0.0, 1.0, 1.0]
@@ -251,7 +251,7 @@ def test_flattened_figures_are_written(tmp_path: Path) -> None:
     assert_allclose(np.linalg.norm(rotations, axis=1), 1.0, rtol=0, atol=1e-6)
 
 
-def test_other_humanoids_are_written_as_version_1_in_a_t_pose(body: Figure, tmp_path: Path) -> None:
+def test_other_humanoids_are_written_as_version_1_in_a_t_pose(body, tmp_path):
     out = tmp_path / "out.vrm"
     notes = export(viewer.Actor(body), out, meta=ME)
     assert "X005.t-pose" in [note.key for note in notes]
@@ -272,9 +272,7 @@ def test_other_humanoids_are_written_as_version_1_in_a_t_pose(body: Figure, tmp_
     assert_allclose(figure.require_mesh().positions[:, 1].min(), 0.0, rtol=0, atol=1e-6)
 
 
-def test_authors_licence_and_bones_are_required(
-    body: Figure, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_authors_licence_and_bones_are_required(body, tmp_path, capsys):
     out = tmp_path / "out.vrm"
     with pytest.raises(RigError, match="--vrm-author NAME and --vrm-licence"):
         export(viewer.Actor(body), out)
@@ -365,9 +363,7 @@ def _errors(path: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_fault_is_found_and_corrected_or_refused(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fault_is_found_and_corrected_or_refused(tmp_path, name, capsys):
     version, change, pointer, corrected = FAULTS[name]
     file = swinging(version)
     change(file.root["extensions"]["VRMC_vrm" if version else "VRM"])
@@ -384,13 +380,13 @@ def test_fault_is_found_and_corrected_or_refused(
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_valid_characters_have_no_errors(tmp_path: Path, version: int) -> None:
+def test_valid_characters_have_no_errors(tmp_path, version):
     path = tmp_path / "a.vrm"
     path.write_bytes(swinging(version).glb())
     assert _errors(path) == []
 
 
-def test_two_versions_in_one_file_are_an_error(tmp_path: Path) -> None:
+def test_two_versions_in_one_file_are_an_error(tmp_path):
     file, path, out = swinging(1), tmp_path / "a.vrm", tmp_path / "out.vrm"
     file.root["extensions"]["VRM"] = swinging(0).root["extensions"]["VRM"]
     path.write_bytes(file.glb())
@@ -401,7 +397,7 @@ def test_two_versions_in_one_file_are_an_error(tmp_path: Path) -> None:
     assert "VRM" not in root["extensions"] and _errors(out) == []
 
 
-def test_bone_that_json_repeats_is_an_error(tmp_path: Path) -> None:
+def test_bone_that_json_repeats_is_an_error(tmp_path):
     path = tmp_path / "a.vrm"
     text = swinging(1).json().decode()
     place = text.index('"head": {"node"')
@@ -409,7 +405,7 @@ def test_bone_that_json_repeats_is_an_error(tmp_path: Path) -> None:
     assert _errors(path) == [f"{HUMAN_BONES}/head"]
 
 
-def test_missing_meta_data_can_be_given(tmp_path: Path) -> None:
+def test_missing_meta_data_can_be_given(tmp_path):
     file, path, out = swinging(1), tmp_path / "a.vrm", tmp_path / "out.vrm"
     del file.root["extensions"]["VRMC_vrm"]["meta"]
     path.write_bytes(file.glb())

@@ -33,7 +33,7 @@ def old_vrm(file: File) -> dict[str, Any]:
     return file.root["extensions"]["VRM"]
 
 
-def test_character_faces_the_opposite_direction(tmp_path: Path) -> None:
+def test_character_faces_the_opposite_direction(tmp_path):
     _, notes = upgrade(swinging(0), tmp_path)
     assert not [key for key in notes if key.startswith("X002")]
     before, after = (load(tmp_path / name).actors[0].figure for name in ("ada.vrm", "out.vrm"))
@@ -53,7 +53,7 @@ def test_character_faces_the_opposite_direction(tmp_path: Path) -> None:
     assert_allclose(weights[1], weights[0] * TURN, rtol=0, atol=SINGLE)
 
 
-def test_bones_views_gaze_and_expressions_are_converted(tmp_path: Path) -> None:
+def test_bones_views_gaze_and_expressions_are_converted(tmp_path):
     file = swinging(0)
     vrm = old_vrm(file)
     vrm["humanoid"]["humanBones"].append({"bone": "leftThumbProximal", "node": 99})
@@ -84,7 +84,7 @@ def test_bones_views_gaze_and_expressions_are_converted(tmp_path: Path) -> None:
     assert (color["type"], color["targetValue"]) == ("color", [1.0, 0.0, 0.0, 1.0])
 
 
-def test_meta_permits_no_more_than_the_file(tmp_path: Path) -> None:
+def test_meta_permits_no_more_than_the_file(tmp_path):
     file = swinging(0)
     old_vrm(file)["meta"] |= {
         "licenseName": "CC_BY_NC_ND",
@@ -114,7 +114,7 @@ def test_meta_permits_no_more_than_the_file(tmp_path: Path) -> None:
     }
 
 
-def test_author_is_required(tmp_path: Path) -> None:
+def test_author_is_required(tmp_path):
     file = swinging(0)
     del old_vrm(file)["meta"]["author"]
     with pytest.raises(RigError, match="--vrm-author"):
@@ -124,7 +124,7 @@ def test_author_is_required(tmp_path: Path) -> None:
     assert written.root["extensions"]["VRMC_vrm"]["meta"]["authors"] == ["B"]
 
 
-def test_chains_are_extended_by_seven_centimetres(tmp_path: Path) -> None:
+def test_chains_are_extended_by_seven_centimetres(tmp_path):
     written, _ = upgrade(swinging(0), tmp_path)
     springs = written.root["extensions"]["VRMC_springBone"]
     (chain,) = springs["springs"]
@@ -150,7 +150,7 @@ def test_chains_are_extended_by_seven_centimetres(tmp_path: Path) -> None:
     assert_allclose(after.gravities, before.gravities * TURN, rtol=0, atol=SINGLE)
 
 
-def test_branches_become_chains(tmp_path: Path) -> None:
+def test_branches_become_chains(tmp_path):
     file = swinging(0)
     index = next(n for n, node in enumerate(file.root["nodes"]) if node["name"] == "hair2")
     twig = file.add("nodes", {"name": "twig", "translation": [0.1, 0, 0]})
@@ -165,7 +165,7 @@ def test_branches_become_chains(tmp_path: Path) -> None:
     assert chains == [[*HAIR, "hairEnd_end"], ["twig", "twig_end"]]
 
 
-def test_node_that_is_no_joint_ends_a_chain(tmp_path: Path) -> None:
+def test_node_that_is_no_joint_ends_a_chain(tmp_path):
     file = swinging(0)
     index = next(n for n, node in enumerate(file.root["nodes"]) if node["name"] == "hairEnd")
     tip = file.add("nodes", {"name": "tip", "translation": [0, -0.05, 0.01]})
@@ -178,7 +178,7 @@ def test_node_that_is_no_joint_ends_a_chain(tmp_path: Path) -> None:
     assert_allclose(nodes[-1]["translation"], [0, -0.05, 0.01], rtol=0, atol=1e-9)
 
 
-def test_toon_shading_is_converted(tmp_path: Path) -> None:
+def test_toon_shading_is_converted(tmp_path):
     file = swinging(0)
     skin = old_vrm(file)["materialProperties"][0]
     skin["floatProperties"] = {
@@ -219,7 +219,7 @@ def test_toon_shading_is_converted(tmp_path: Path) -> None:
     assert notes["X003.vrm-upgrade"].values["names"] == ["skin _ShadingGradeRate"]
 
 
-def test_texture_movements_of_expressions_are_converted(tmp_path: Path) -> None:
+def test_texture_movements_of_expressions_are_converted(tmp_path):
     file = swinging(0)
     vrm = old_vrm(file)
     vrm["blendShapeMaster"]["blendShapeGroups"][1]["materialValues"] = [
@@ -241,7 +241,7 @@ def test_texture_movements_of_expressions_are_converted(tmp_path: Path) -> None:
     assert lost == ["materialValues skin _ShadeTexture_ST"]
 
 
-def test_version_1_is_not_changed(tmp_path: Path) -> None:
+def test_version_1_is_not_changed(tmp_path):
     written, _ = upgrade(swinging(1), tmp_path)
     original = swinging(1).root["extensions"]["VRMC_vrm"]
     assert written.root["extensions"]["VRMC_vrm"]["lookAt"] == original["lookAt"]
@@ -260,9 +260,7 @@ def test_version_1_is_not_changed(tmp_path: Path) -> None:
         (("meta",), ["x"]),
     ],
 )
-def test_data_of_another_structure_does_not_prevent_writing(
-    tmp_path: Path, place: tuple[str, ...], value: Any
-) -> None:
+def test_data_of_another_structure_does_not_prevent_writing(tmp_path, place, value):
     file = swinging(0)
     told: Any = old_vrm(file)
     for name in place[:-1]:
@@ -276,14 +274,14 @@ def test_data_of_another_structure_does_not_prevent_writing(
     assert written.root["extensions"]["VRMC_vrm"]["specVersion"] == "1.0"
 
 
-def test_convert_writes_version_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_convert_writes_version_1(tmp_path, capsys):
     path, out = tmp_path / "ada.vrm", tmp_path / "out.vrm"
     path.write_bytes(swinging(0).glb())
     assert run(["convert", str(path), "-o", str(out)]) == 0
     assert "VRM 1.0: 17 human bones, 2 expressions, 1 spring chain" in capsys.readouterr().out
 
 
-def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path: Path) -> None:
+def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path):
     file = swinging(0)
     springs = old_vrm(file)["secondaryAnimation"]
     springs["boneGroups"] = [*springs["boneGroups"] * 2]
@@ -305,7 +303,7 @@ def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path: Path) 
     } <= {*notes["X003.vrm-upgrade"].values["names"]}
 
 
-def test_numbers_that_json_cannot_store_are_omitted(tmp_path: Path) -> None:
+def test_numbers_that_json_cannot_store_are_omitted(tmp_path):
     file = swinging(1)
     (chain,) = file.root["extensions"]["VRMC_springBone"]["springs"]
     chain |= {"note": float("nan"), "table": [1.0, float("inf")]}
@@ -317,7 +315,7 @@ def test_numbers_that_json_cannot_store_are_omitted(tmp_path: Path) -> None:
     assert "note" not in kept and kept["table"] == [1.0, 0.0]
 
 
-def test_numbers_that_are_invalid_or_too_large_are_reported(tmp_path: Path) -> None:
+def test_numbers_that_are_invalid_or_too_large_are_reported(tmp_path):
     file = swinging(0)
     vrm = old_vrm(file)
     vrm["humanoid"]["armStretch"] = 10**400

@@ -36,7 +36,7 @@ def directions(actor: Actor, time: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_character_moves_as_before_the_round_trip(tmp_path: Path, version: int) -> None:
+def test_character_moves_as_before_the_round_trip(tmp_path, version):
     path, still, out = (tmp_path / name for name in ("ada.vrm", "still.vrm", "out.vrma"))
     path.write_bytes(swinging(version).glb())
     still.write_bytes(swinging(turn=False).glb())
@@ -51,7 +51,7 @@ def test_character_moves_as_before_the_round_trip(tmp_path: Path, version: int) 
             assert_allclose(after[bone], facing @ before[bone], rtol=0, atol=1e-6)
 
 
-def test_motions_of_worlds_with_z_up_are_rotated(tmp_path: Path) -> None:
+def test_motions_of_worlds_with_z_up_are_rotated(tmp_path):
     amass, hero, out = (tmp_path / name for name in ("walk.npz", "hero.vrm", "out.vrma"))
     poses = np.zeros((4, 156))
     poses[:, 0], poses[:, 3], poses[:, 50] = np.pi / 2, np.linspace(0.0, 0.6, 4), -1.0
@@ -69,7 +69,7 @@ def test_motions_of_worlds_with_z_up_are_rotated(tmp_path: Path) -> None:
     assert_allclose(steps[1], TO_Y @ steps[0], rtol=0, atol=1e-6)
 
 
-def test_expressions_of_version_0_are_written_as_their_presets(tmp_path: Path) -> None:
+def test_expressions_of_version_0_are_written_as_their_presets(tmp_path):
     file, path, out = swinging(0), tmp_path / "ada.vrm", tmp_path / "out.vrma"
     groups = file.root["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"]
     groups[0] |= {"name": "Smile", "presetName": "joy"}
@@ -80,7 +80,7 @@ def test_expressions_of_version_0_are_written_as_their_presets(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("scale", [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
-def test_hidden_joints_have_the_rotations_of_shown_ones(tmp_path: Path, scale: list[float]) -> None:
+def test_hidden_joints_have_the_rotations_of_shown_ones(tmp_path, scale):
     outs = []
     for name in ("shown", "hidden"):
         file, path = swinging(), tmp_path / f"{name}.vrm"
@@ -93,9 +93,7 @@ def test_hidden_joints_have_the_rotations_of_shown_ones(tmp_path: Path, scale: l
     assert shown == hidden
 
 
-def test_expressions_are_written_and_other_figures_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_expressions_are_written_and_other_figures_refused(tmp_path, capsys):
     path, out = tmp_path / "ada.vrm", tmp_path / "out.vrma"
     path.write_bytes(swinging().glb())
     assert run(["convert", str(path), "--shape", "happy=0.5", "-o", str(out)]) == 0
@@ -108,7 +106,7 @@ def test_expressions_are_written_and_other_figures_refused(
     assert "required human bones not found" in capsys.readouterr().err
 
 
-def test_scale_that_the_format_cannot_hold_is_reported(tmp_path: Path) -> None:
+def test_scale_that_the_format_cannot_hold_is_reported(tmp_path):
     """The hips are written where they are; all other bones keep their distances from the hips."""
     hero, out = tmp_path / "hero.vrm", tmp_path / "out.vrma"
     hero.write_bytes(swinging().glb())

@@ -12,7 +12,6 @@ from formats.archive.joblib_bytes import joblib_file
 from formats.npz_bytes import cost
 from numpy.testing import assert_array_equal
 
-from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import are_indices
 from viewer.formats._archive.opening import is_archive, open_archive
@@ -62,9 +61,7 @@ def refused(action: Any, *arguments: Any) -> Fault:
         (b"(d.", "pickle", ()),
     ],
 )
-def test_content_takes_precedence_over_the_file_name(
-    data: bytes, kind: str, keys: tuple[str, ...]
-) -> None:
+def test_content_takes_precedence_over_the_file_name(data, kind, keys):
     assert is_archive(data[:64])
     for name in ("x.pkl", "x.npz", "x.txt"):
         archive = opened(data, name)
@@ -73,7 +70,7 @@ def test_content_takes_precedence_over_the_file_name(
 
 @pytest.mark.parametrize("protocol", range(6))
 @pytest.mark.parametrize("value", [{}, {"a": 1}, [1], ROWS, {1: 2}, []])
-def test_pickles_are_recognised_by_their_first_bytes(value: Any, protocol: int) -> None:
+def test_pickles_are_recognised_by_their_first_bytes(value, protocol):
     assert is_archive(pickle.dumps(value, protocol)[:64])
 
 
@@ -102,7 +99,7 @@ def test_pickles_are_recognised_by_their_first_bytes(value: Any, protocol: int) 
         b"(1, 2)",
     ],
 )
-def test_other_files_are_not_archives(head: bytes) -> None:
+def test_other_files_are_not_archives(head):
     assert not is_archive(head)
 
 
@@ -120,22 +117,22 @@ def test_other_files_are_not_archives(head: bytes) -> None:
         (bytes(1000), ("F002.archive", None, {"found": "zeros"})),
     ],
 )  # fmt: skip
-def test_unsuitable_files_are_described(data: bytes, found: Fault) -> None:
+def test_unsuitable_files_are_described(data, found):
     assert refused(opened, data, "SMPL_MALE.pkl") == found
 
 
 @pytest.mark.parametrize("protocol", [0, 1, 2])
-def test_damage_by_text_mode_transfer_is_reported(protocol: int) -> None:
+def test_damage_by_text_mode_transfer_is_reported(protocol):
     data = pickle.dumps({"v": np.arange(13.0)}, protocol).replace(b"\n", b"\r\n")
     assert refused(opened, data, "x.pkl") == (("F002.pickle-line-ends", None, {}))
 
 
-def test_text_that_is_not_a_pickle_is_refused() -> None:
+def test_text_that_is_not_a_pickle_is_refused():
     line = refused(opened, b"positions 4 {\n", "x.pkl")
     assert line == ("F002.archive", None, {"found": "an unknown format"})
 
 
-def test_single_array_is_read(tmp_path: Path) -> None:
+def test_single_array_is_read(tmp_path):
     path = tmp_path / "x.npy"
     np.save(path, ROWS)
     for source in (Source.open(path), Source("x.npy", path.read_bytes())):
@@ -144,7 +141,7 @@ def test_single_array_is_read(tmp_path: Path) -> None:
         assert not found.flags.writeable
 
 
-def test_single_array_may_end_like_text(tmp_path: Path) -> None:
+def test_single_array_may_end_like_text(tmp_path):
     """Byte 26 ends a text file, but may be part of an array."""
     path = tmp_path / "x.npy"
     np.save(path, np.array([1, 26], np.uint8))
@@ -153,7 +150,7 @@ def test_single_array_may_end_like_text(tmp_path: Path) -> None:
     assert open_archive(source).array("arr_0").values().tolist() == [1, 26]
 
 
-def test_opening_does_not_read_large_files(tmp_path: Path) -> None:
+def test_opening_does_not_read_large_files(tmp_path):
     path = tmp_path / "x.npz"
     np.savez(path, v=ROWS)
     source = Source.open(path)
@@ -161,7 +158,7 @@ def test_opening_does_not_read_large_files(tmp_path: Path) -> None:
     assert source._data is None
 
 
-def test_missing_file_is_refused(tmp_path: Path) -> None:
+def test_missing_file_is_refused(tmp_path):
     path = tmp_path / "x.npz"
     np.savez(path, v=ROWS)
     source = Source.open(path)
@@ -199,7 +196,7 @@ def test_missing_file_is_refused(tmp_path: Path) -> None:
          "found": "4 x 3 float64"})),
     ],
 )  # fmt: skip
-def test_shape_and_dtype_are_checked(shape: Any, kinds: str, message: Fault | None) -> None:
+def test_shape_and_dtype_are_checked(shape, kinds, message):
     for archive in (opened(npz(v=ROWS)), opened(pickle.dumps({"v": ROWS}))):
         if message is None:
             assert_array_equal(archive.array("v", shape, kinds).values(), ROWS)
@@ -223,7 +220,7 @@ def test_shape_and_dtype_are_checked(shape: Any, kinds: str, message: Fault | No
         (np.array([{}], object), "an unsupported value (object array)"),
     ],
 )
-def test_values_other_than_arrays_are_refused(value: Any, found: Phrase) -> None:
+def test_values_other_than_arrays_are_refused(value, found):
     archive = opened(pickle.dumps({"v": value}))
     for ask, expected in (
         (archive.array, "an array of numbers"),
@@ -244,14 +241,14 @@ def test_values_other_than_arrays_are_refused(value: Any, found: Phrase) -> None
         ([], "float64"),
     ],
 )
-def test_lists_of_numbers_are_read_as_arrays(value: Any, dtype: str) -> None:
+def test_lists_of_numbers_are_read_as_arrays(value, dtype):
     found = opened(pickle.dumps({"v": value})).array("v")
     assert found.dtype == dtype
     assert_array_equal(found.values(), value)
     assert not found.values().flags.writeable
 
 
-def test_missing_keys_are_refused() -> None:
+def test_missing_keys_are_refused():
     archive = opened(npz(v=ROWS))
     assert archive.has("v") and not archive.has("w")
     for ask in (archive.get, archive.array, archive.sparse, archive.text):
@@ -259,7 +256,7 @@ def test_missing_keys_are_refused() -> None:
     assert refused(archive.get, "a\nb") == ("F002.no-key", None, {"item": "a\\nb"})
 
 
-def test_matrix_may_be_dense() -> None:
+def test_matrix_may_be_dense():
     dense = np.array([[0, 2.5, 0], [1, 0, np.nan]])
     found = opened(npz(v=dense)).sparse("v", ("J", 3))
     assert (found.shape, found.layout) == ((2, 3), "csr")
@@ -278,7 +275,7 @@ def test_matrix_may_be_dense() -> None:
     )
 
 
-def test_sparse_matrix_is_read_from_rows_and_columns() -> None:
+def test_sparse_matrix_is_read_from_rows_and_columns():
     parts = np.array([5, 6]), np.array([1, 0]), np.array([0, 1, 2])
     for layout, pairs in (("csr", [[0, 1], [1, 0]]), ("csc", [[1, 0], [0, 1]])):
         rows, columns, values = Sparse((2, 2), *parts, layout).entries()
@@ -290,7 +287,7 @@ def test_sparse_matrix_is_read_from_rows_and_columns() -> None:
     "value",
     ["female", b"female", np.array("female"), np.array([b"female"]), np.array("female", ">U9")],
 )
-def test_strings_of_any_encoding_are_read(value: Any) -> None:
+def test_strings_of_any_encoding_are_read(value):
     assert opened(pickle.dumps({"v": value})).text("v") == "female"
     assert opened(npz(v=np.array(value))).text("v") == "female"
 
@@ -304,12 +301,12 @@ def test_strings_of_any_encoding_are_read(value: Any) -> None:
         (ROWS, ("F002.text", None, {"item": "v", "found": "4 x 3 float64"})),
     ],
 )  # fmt: skip
-def test_values_other_than_strings_are_refused(value: Any, found: Fault) -> None:
+def test_values_other_than_strings_are_refused(value, found):
     archive = opened(pickle.dumps({"v": value}))
     assert refused(archive.text, "v") == found
 
 
-def test_values_are_cached() -> None:
+def test_values_are_cached():
     archive = opened(npz(v=ROWS, o=np.array({}, object)))
     first = archive.get("v")
     assert isinstance(first, Deferred)
@@ -317,7 +314,7 @@ def test_values_are_cached() -> None:
     assert archive.get("o") == Opaque("object array")
 
 
-def test_half_floats_are_converted_to_single_precision(tmp_path: Path) -> None:
+def test_half_floats_are_converted_to_single_precision(tmp_path):
     """65504 is the largest half float, so comparing it with a larger number would overflow."""
     np.savez(tmp_path / "a.npz", half=np.array([0.5, 65504], "f2"))
     half = open_archive(Source.open(tmp_path / "a.npz")).array("half").values()
@@ -340,7 +337,7 @@ def window(data: bytes, folder: Path) -> FileWindow:
     return FileWindow(StoredFile(Source.open(path)))
 
 
-def test_windows_have_the_bytes_of_the_file(data: bytes, tmp_path: Path) -> None:
+def test_windows_have_the_bytes_of_the_file(data, tmp_path):
     found = window(data, tmp_path)
     assert len(found) == SIZE
     for place in (0, 7, PAGE - 1, PAGE, 2 * PAGE + 3, 5, SIZE - 1):
@@ -350,7 +347,7 @@ def test_windows_have_the_bytes_of_the_file(data: bytes, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("place", [3, (1 << 20) - 1, (1 << 20) + 9])
-def test_bytes_are_found_across_page_borders(place: int, tmp_path: Path) -> None:
+def test_bytes_are_found_across_page_borders(place, tmp_path):
     text = bytearray((1 << 20) + 99)
     text[place : place + 2] = b"ab"
     found = window(bytes(text), tmp_path)
@@ -359,7 +356,7 @@ def test_bytes_are_found_across_page_borders(place: int, tmp_path: Path) -> None
     assert found.find(b"ab", 0, place + 1) == -1
 
 
-def test_pickles_are_read_through_a_window(tmp_path: Path) -> None:
+def test_pickles_are_read_through_a_window(tmp_path):
     rows = np.arange(6.0).reshape(2, 3)
     found = window(joblib_file({"v": rows, "t": "text", "n": [1.5, 7]}), tmp_path)
     source = Source.open(tmp_path / "a.pkl")
@@ -369,7 +366,7 @@ def test_pickles_are_read_through_a_window(tmp_path: Path) -> None:
     assert (archive.get("t"), archive.get("n")) == ("text", [1.5, 7])
 
 
-def test_unused_arrays_of_large_files_are_not_read(tmp_path: Path) -> None:
+def test_unused_arrays_of_large_files_are_not_read(tmp_path):
     path = tmp_path / "a.pkl"
     path.write_bytes(joblib_file({"verts": np.zeros(34 << 20, np.uint8), "v": np.arange(3)}))
 
@@ -379,7 +376,7 @@ def test_unused_arrays_of_large_files_are_not_read(tmp_path: Path) -> None:
     assert cost(look) < 4 << 20
 
 
-def test_files_that_change_while_open_are_refused(tmp_path: Path) -> None:
+def test_files_that_change_while_open_are_refused(tmp_path):
     path = tmp_path / "a.pkl"
     path.write_bytes(joblib_file({"v": np.zeros(34 << 20, np.uint8)}))
     later = open_archive(Source.open(path)).get("v")

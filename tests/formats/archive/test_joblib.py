@@ -62,7 +62,7 @@ def values(archive: Archive | None, key: str) -> Any:
 
 
 @pytest.mark.parametrize("pack", PACK.values(), ids=PACK.keys())
-def test_compressed_and_plain_files_are_read(pack: Callable[[bytes], bytes]) -> None:
+def test_compressed_and_plain_files_are_read(pack):
     assert_array_equal(values(opened(pack(joblib_file({"v": ROWS}))), "v"), ROWS)
 
 
@@ -79,34 +79,34 @@ def test_compressed_and_plain_files_are_read(pack: Callable[[bytes], bytes]) -> 
     ],
     ids=lambda given: f"{given.dtype.str}-{given.shape}",
 )
-def test_arrays_after_their_descriptions_are_read(given: Any) -> None:
+def test_arrays_after_their_descriptions_are_read(given):
     archive = opened(joblib_file({"v": given, "after": 7}))
     assert_array_equal(values(archive, "v"), given)
     assert archive.get("after") == 7
 
 
-def test_arrays_without_padding_are_read() -> None:
+def test_arrays_without_padding_are_read():
     assert_array_equal(values(opened(joblib_file({"v": ROWS}, aligned=False)), "v"), ROWS)
 
 
-def test_people_are_keyed_by_their_numbers() -> None:
+def test_people_are_keyed_by_their_numbers():
     archive = opened(joblib_file({3: {"v": ROWS}, -1: {"v": ROWS[:1]}}))
     assert archive.keys == ("3", "-1")
     assert_array_equal(values(archive.inside("-1"), "v"), ROWS[:1])
 
 
-def test_dicts_in_lists_are_keyed_by_their_indices() -> None:
+def test_dicts_in_lists_are_keyed_by_their_indices():
     archive = opened(joblib_file([{"v": ROWS}, {"v": ROWS[:2]}]))
     assert_array_equal(values(archive.inside("1"), "v"), ROWS[:2])
 
 
-def test_dicts_with_a_default_are_read() -> None:
+def test_dicts_with_a_default_are_read():
     made = named("collections", "defaultdict") + several(named("builtins", "dict")) + b"R"
     archive = opened(finished(made + unicode("v") + whole(1) + b"s"))
     assert archive.get("v") == 1
 
 
-def test_errors_state_the_path_of_the_value() -> None:
+def test_errors_state_the_path_of_the_value():
     person = opened(joblib_file({3: {"cam": {"v": ROWS}}})).inside("3")
     assert person is not None
     inner = person.inside("cam")
@@ -115,13 +115,13 @@ def test_errors_state_the_path_of_the_value() -> None:
     assert str(fault) == "x.pkl: 3.cam.w: key not found"
 
 
-def test_compressed_files_of_other_writers_are_read() -> None:
+def test_compressed_files_of_other_writers_are_read():
     data = zlib.compress(torch_legacy({"v": ROWS}))
     assert_array_equal(values(opened(data), "v"), ROWS)
 
 
 @pytest.mark.parametrize("method", ["plain", "zlib", "gzip", "bz2", "xz", "lzma"])
-def test_files_written_by_joblib_are_read(method: str) -> None:
+def test_files_written_by_joblib_are_read(method):
     """``make_torch_files.py`` describes their contents."""
     person = open_archive(Source.open(DATA / f"joblib_{method}.pkl")).inside("3")
     rows = np.arange(6.0).reshape(2, 3)
@@ -166,13 +166,13 @@ def problem_of(data: bytes) -> str:
     ],
     ids=str,
 )  # fmt: skip
-def test_descriptions_that_contradict_the_file_are_refused(described: bytes, key: str) -> None:
+def test_descriptions_that_contradict_the_file_are_refused(described, key):
     data = saved(v=described + b"\x00" + bytes(24))
     assert problem_of(data) == key
     assert cost(lambda: refusal(data)) < BOUND
 
 
-def test_padding_beyond_the_end_is_refused() -> None:
+def test_padding_beyond_the_end_is_refused():
     assert (
         problem_of(saved(v=wrapper((0,), F8) + b"\xff"))
         == "expected {expected} more bytes, found {found} (truncated?)"
@@ -181,7 +181,7 @@ def test_padding_beyond_the_end_is_refused() -> None:
 
 @pytest.mark.parametrize("module", ["joblib.numpy_pickle", "joblib.numpy_pickle_compat"])
 @pytest.mark.parametrize("name", ["NDArrayWrapper", "ZNDArrayWrapper"])
-def test_arrays_in_other_files_are_refused(module: str, name: str) -> None:
+def test_arrays_in_other_files_are_refused(module, name):
     assert (
         problem_of(saved(v=named(module, name)))
         == "expected arrays in the file, found {name}, which stores them in separate files: "
@@ -189,7 +189,7 @@ def test_arrays_in_other_files_are_refused(module: str, name: str) -> None:
     )
 
 
-def test_objects_that_run_code_are_refused() -> None:
+def test_objects_that_run_code_are_refused():
     inner = finished(named("os", "system") + several(text("true")) + b"R")
     assert (
         problem_of(saved(v=wrapper((1,), element_type("O8", "|")) + inner))
@@ -203,7 +203,7 @@ def test_objects_that_run_code_are_refused() -> None:
     )
 
 
-def test_endlessly_nested_objects_are_refused() -> None:
+def test_endlessly_nested_objects_are_refused():
     described = wrapper((1,), element_type("O8", "|"))
     data = finished(described)
     for _ in range(9):
@@ -225,7 +225,7 @@ PACKED = {
 
 
 @pytest.mark.parametrize("data", PACKED.values(), ids=PACKED.keys())
-def test_decompressed_data_above_the_size_limit_are_refused(data: bytes) -> None:
+def test_decompressed_data_above_the_size_limit_are_refused(data):
     def look() -> None:
         with pytest.raises(FormatError) as caught:
             open_archive(Source("x.pkl", data, max_size=1 << 20))
@@ -235,13 +235,13 @@ def test_decompressed_data_above_the_size_limit_are_refused(data: bytes) -> None
 
 
 @pytest.mark.slow
-def test_decompression_bombs_are_refused() -> None:
+def test_decompression_bombs_are_refused():
     data = zlib.compress(bomb(70 << 20), 9)
     assert refusal(data)[0] == "F002.packed-size"
 
 
 @pytest.mark.parametrize("method", ["zlib", "gzip", "bz2", "xz", "lzma"])
-def test_compressed_data_of_other_formats_is_not_unpacked(method: str) -> None:
+def test_compressed_data_of_other_formats_is_not_unpacked(method):
     plain = b"balljoint a { }" * 1000
     data = {
         "zlib": zlib.compress(plain),
@@ -254,19 +254,19 @@ def test_compressed_data_of_other_formats_is_not_unpacked(method: str) -> None:
 
 
 @pytest.mark.parametrize("head", [b"\x04\x22\x4d\x18", b"ZF0x0001"])
-def test_unsupported_methods_are_refused(head: bytes) -> None:
+def test_unsupported_methods_are_refused(head):
     assert refusal(head + bytes(90))[0] == "F002.packed-method"
 
 
 @pytest.mark.parametrize("pack", [zlib.compress, bz2.compress, lzma.compress])
-def test_truncated_data_is_refused(pack: Any) -> None:
+def test_truncated_data_is_refused(pack):
     data = pack(joblib_file({"v": np.random.default_rng(0).random(999)}))
     for length in (len(data) // 2, len(data) - 1):
         assert refusal(data[:length])[0] == "F002.packed"
 
 
 @pytest.mark.slow
-def test_damaged_files_are_read_or_refused() -> None:
+def test_damaged_files_are_read_or_refused():
     data = joblib_file({"v": PLAIN_ROWS[:1], 3: {"w": np.array(["a"]), "t": unicode("x")}})
     dice = random.Random(len(data))
     for whole_file in (data, zlib.compress(data)):

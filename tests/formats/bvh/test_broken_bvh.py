@@ -6,7 +6,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from faults import Fault
 from formats.bvh.bvh_refusals import refusal
 from formats.bvh_text import GOOD, one_joint, read
 from formats.test_mutations import mutate
@@ -268,7 +267,7 @@ FRAMES = GOOD.partition("0.0333333\n")[2]
         ),
     ],
 )
-def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) -> None:
+def test_malformed_files_are_refused_with_their_line(text, fault):
     assert refusal(text) == fault
 
 
@@ -364,13 +363,13 @@ def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) ->
         ),
     ],
 )
-def test_oddities_load_with_a_warning(text: str, count: int, warnings: list[Fault]) -> None:
+def test_oddities_load_with_a_warning(text, count, warnings):
     motion, found = read(text)
     assert motion.clip.n_rows == count
     assert found == warnings
 
 
-def test_channels_of_an_end_site_are_counted_and_ignored() -> None:
+def test_channels_of_an_end_site_are_counted_and_ignored():
     text = one_joint("Xrotation", "30 40").replace("0 1.7 0 }", "0 1.7 0 CHANNELS 1 Yrotation }")
     motion, warnings = read(text)
     joint = "End Site of joint a"
@@ -407,7 +406,7 @@ Frame Time: 0.0333333
 
 
 @pytest.mark.parametrize("word", ["nan", "-NaN", "inf", "-1.#IND", "1e999"])
-def test_frames_with_numbers_that_are_not_finite_are_gaps(word: str) -> None:
+def test_frames_with_numbers_that_are_not_finite_are_gaps(word):
     text = TURNS.replace("20 0 0", f"{word} 0 0").replace("2 90", "2 -inf").replace("50", "nan")
     motion, notes = read(text)
     clip = motion.clip
@@ -423,27 +422,27 @@ def test_frames_with_numbers_that_are_not_finite_are_gaps(word: str) -> None:
     assert values["item"] == "frame 1"
 
 
-def test_gaps_are_found_without_line_ends() -> None:
+def test_gaps_are_found_without_line_ends():
     text = TURNS.replace("20 0 0", "nan 0 0")
     head, _, frames = text.partition("0.0333333\n")
     motion, _ = read(f"{head}0.0333333\n{' '.join(frames.split())}")
     assert motion.clip.timing.rows.tolist() == [0, -1, 2, 3, 4]
 
 
-def test_word_in_a_frame_is_refused_beside_gaps() -> None:
+def test_word_in_a_frame_is_refused_beside_gaps():
     text = TURNS.replace("20 0 0", "nan 0 0").replace("40 0 0", "up 0 0")
     item = "frame 3"
     assert refusal(text) == ("F002.number", 22, {"item": item, "found": b"up"})
 
 
-def test_motion_without_a_finite_frame_is_refused() -> None:
+def test_motion_without_a_finite_frame_is_refused():
     text = re.sub(r" 90 0 ", " nan 0 ", TURNS)
     key, line, values = refusal(text)
     assert (key, line, values["n"]) == ("F003.frames-lost", None, 5)
 
 
 @pytest.mark.slow
-def test_many_static_joints_in_many_frames_are_refused_before_allocating() -> None:
+def test_many_static_joints_in_many_frames_are_refused_before_allocating():
     joints = "JOINT a { OFFSET 0 1 0 } " * 20000
     text = (
         f"HIERARCHY ROOT r {{ OFFSET 0 0 0 CHANNELS 1 Xrotation {joints} }} MOTION Frames: 20000 "
@@ -458,7 +457,7 @@ def test_many_static_joints_in_many_frames_are_refused_before_allocating() -> No
     assert peak < 100e6
 
 
-def test_name_with_control_characters_is_shown_on_one_line() -> None:
+def test_name_with_control_characters_is_shown_on_one_line():
     text = GOOD.replace("LeftUpLeg", "a\x07b").replace("OFFSET 0.1", "OFFSET x")
     with pytest.raises(FormatError) as caught:
         read(text)
@@ -484,20 +483,20 @@ def check(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_mutated_file_is_read_or_refused_in_one_line(seed: int) -> None:
+def test_mutated_file_is_read_or_refused_in_one_line(seed):
     rng = random.Random(seed)
     for _ in range(150):
         check(mutate(GOOD.encode(), rng))
 
 
-def test_truncated_file_is_read_or_refused_in_one_line() -> None:
+def test_truncated_file_is_read_or_refused_in_one_line():
     for cut in range(len(GOOD)):
         check(GOOD[:cut].encode())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("token", [b"3.4e38", b"-3.4e38", b"1e-300", b"0", b"-1", b"{", b"}", b"x"])
-def test_file_with_an_inserted_word_is_read_or_refused_in_one_line(token: bytes) -> None:
+def test_file_with_an_inserted_word_is_read_or_refused_in_one_line(token):
     words = re.split(rb"(\s+)", GOOD.encode())
     for at in range(0, len(words), 2):
         check(b"".join([*words[:at], token, *words[at + 1 :]]))
@@ -505,7 +504,7 @@ def test_file_with_an_inserted_word_is_read_or_refused_in_one_line(token: bytes)
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r\r\n", b"\r"])
-def test_invalid_number_is_reported_on_its_line(end: bytes) -> None:
+def test_invalid_number_is_reported_on_its_line(end):
     lines = GOOD.encode().rstrip().split(b"\n")
     for number, line in enumerate(lines, start=1):
         if not re.search(rb"\d$", line):

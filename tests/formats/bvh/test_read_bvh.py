@@ -36,7 +36,7 @@ def worlds(motion: SkeletonMotion) -> np.ndarray:
     return world_frames(motion.figure, frames_of(motion.figure, clip, times))
 
 
-def test_reads_every_part() -> None:
+def test_reads_every_part():
     motion, warnings = read(GOOD)
     skeleton = motion.figure.skeleton
     assert warnings == []
@@ -50,7 +50,7 @@ def test_reads_every_part() -> None:
     assert ("frames", "2 at 30 fps") in motion.figure.facts
 
 
-def test_joint_positions_follow_the_channels() -> None:
+def test_joint_positions_follow_the_channels():
     motion, _ = read(GOOD)
     places = worlds(motion)[..., :3, 3]
     # In frame 0, the thigh rotates by 90 degrees about z, so the foot, 0.9 below, is 0.9 to the
@@ -66,7 +66,7 @@ def test_joint_positions_follow_the_channels() -> None:
 
 
 @pytest.mark.parametrize("order", [*itertools.permutations("XYZ"), "ZXZ", "XY", "Y", "XYZX", ""])
-def test_rotation_channels_multiply_from_left_to_right(order: str) -> None:
+def test_rotation_channels_multiply_from_left_to_right(order):
     angles = [10.0, -130.0, 75.0, 33.0][: len(order)]
     channels = " ".join(f"{axis}rotation" for axis in order) or "Xposition"
     motion, _ = read(one_joint(channels, " ".join(map(str, angles)) or "0"))
@@ -78,7 +78,7 @@ def test_rotation_channels_multiply_from_left_to_right(order: str) -> None:
 
 @pytest.mark.slow
 @given(st.permutations(["Xposition", "Zposition", "Yposition", "Zrotation", "Xrotation"]))
-def test_channels_may_be_in_any_order(channels: list[str]) -> None:
+def test_channels_may_be_in_any_order(channels):
     values = {"Xposition": 1.0, "Yposition": 2.0, "Zposition": 3.0, "Zrotation": 50, "Xrotation": 7}
     motion, _ = read(one_joint(" ".join(channels), " ".join(str(values[c]) for c in channels)))
     turn = np.eye(3)
@@ -90,7 +90,7 @@ def test_channels_may_be_in_any_order(channels: list[str]) -> None:
     np.testing.assert_allclose(world[:3, :3], turn, atol=1e-14)
 
 
-def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() -> None:
+def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time():
     text = GOOD.replace(
         "OFFSET 0.0 0.6 0.0\n\t\tCHANNELS 3", "OFFSET 0.0 0.6 0.0\n\t\tCHANNELS 4 Yposition"
     )
@@ -104,7 +104,7 @@ def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() 
 
 
 @pytest.mark.parametrize("zero", ["0", "-0.000001"])
-def test_zero_position_channels_below_the_root_keep_the_offset(zero: str) -> None:
+def test_zero_position_channels_below_the_root_keep_the_offset(zero):
     six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     text = GOOD.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
     body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + f"{zero} " * 24
@@ -114,7 +114,7 @@ def test_zero_position_channels_below_the_root_keep_the_offset(zero: str) -> Non
     np.testing.assert_allclose(worlds(motion)[0, 2, :3, 3], [0.1, -0.9, 0], atol=1e-5)
 
 
-def test_root_offset_is_replaced_by_position_channels() -> None:
+def test_root_offset_is_replaced_by_position_channels():
     motion, _ = read(GOOD.replace("OFFSET 0.0 0.0 0.0", "OFFSET 5 6 7", 1))
     np.testing.assert_allclose(worlds(motion)[:, 0, :3, 3], [[0, 1, 0], [1, 2, 3]], atol=1e-15)
 
@@ -140,21 +140,21 @@ def test_root_offset_is_replaced_by_position_channels() -> None:
     ids=["crlf", "cr", "cr cr lf", "one line", "blanks", "capitals", "small", "glued", "bom",
          "no end", "empty lines", "glued numbers", "time first", "named end"],
 )  # fmt: skip
-def test_quirks_load_without_warnings(text: str) -> None:
+def test_quirks_load_without_warnings(text):
     motion, warnings = read(text)
     assert warnings == []
     expected = worlds(read(GOOD)[0])
     np.testing.assert_array_equal(worlds(motion), expected)
 
 
-def test_names_may_be_repeated_missing_or_contain_spaces() -> None:
+def test_names_may_be_repeated_missing_or_contain_spaces():
     text = GOOD.replace("LeftUpLeg", "arm").replace("LeftFoot", "arm").replace("Head", "")
     motion, warnings = read(text.replace("Hips", "my  hips é"))
     assert motion.figure.skeleton.names == ("my  hips é", "arm", "arm", "")
     assert warnings == []
 
 
-def test_a_name_that_continues_on_the_next_line_is_joined_by_a_space() -> None:
+def test_a_name_that_continues_on_the_next_line_is_joined_by_a_space():
     assert read(GOOD.replace("Hips", "my\n hips"))[0].figure.skeleton.names[0] == "my hips"
 
 
@@ -165,7 +165,7 @@ def test_a_name_that_continues_on_the_next_line_is_joined_by_a_space() -> None:
     ("33.3333", 30.0, "C017.bvh-milliseconds"),
     ("8.33333", 120.0, "C017.bvh-milliseconds"),
 ])  # fmt: skip
-def test_rates_and_milliseconds_in_place_of_a_frame_time_are_understood(time, rate, key) -> None:
+def test_rates_and_milliseconds_in_place_of_a_frame_time_are_understood(time, rate, key):
     motion, warnings = read(GOOD.replace("0.0333333", time))
     assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-12 if rate > 30 else 1e-4)
     assert warnings == [
@@ -174,12 +174,12 @@ def test_rates_and_milliseconds_in_place_of_a_frame_time_are_understood(time, ra
 
 
 @pytest.mark.parametrize("time", ["1", "2.5", "10.000000000"])
-def test_slow_frame_times_are_seconds(time) -> None:
+def test_slow_frame_times_are_seconds(time):
     motion, warnings = read(GOOD.replace("0.0333333", time))
     assert (motion.clip.timing.frame_rate, warnings) == (pytest.approx(1.0 / float(time)), [])
 
 
-def test_the_second_offset_of_soma_is_ignored_and_said() -> None:
+def test_the_second_offset_of_soma_is_ignored_and_said():
     doubled = GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 0.0 0.0 7 8 9")
     doubled = doubled.replace("OFFSET 0.0 -0.9 0.0", "OFFSET 0.0 -0.9 0.0 7 8 9")
     motion, warnings = read(doubled)
@@ -190,13 +190,13 @@ def test_the_second_offset_of_soma_is_ignored_and_said() -> None:
 
 
 @pytest.mark.parametrize("frames", ["", "MOTION\nFrames: 0\nFrame Time: 0.04\n"])
-def test_the_offset_of_the_root_places_a_skeleton_without_frames(frames: str) -> None:
+def test_the_offset_of_the_root_places_a_skeleton_without_frames(frames):
     text = GOOD.replace("OFFSET 0.0 0.0 0.0", "OFFSET 5 90 3", 1).partition("MOTION")[0]
     places = worlds(read(text + frames)[0])[..., :3, 3]
     np.testing.assert_allclose(places[0, :3], [[5, 90, 3], [5.1, 90, 3], [5.1, 89.1, 3]])
 
 
-def test_several_roots_are_read() -> None:
+def test_several_roots_are_read():
     head, tail = GOOD.split("MOTION")
     second = "ROOT prop { OFFSET 1 0 0 CHANNELS 1 Xrotation }\n"
     lines = tail.strip().split("\n")
@@ -207,7 +207,7 @@ def test_several_roots_are_read() -> None:
     np.testing.assert_allclose(worlds(motion)[1, 4, :3, :3], about(0, 45), atol=1e-15)
 
 
-def test_joints_without_channels_stay_at_rest() -> None:
+def test_joints_without_channels_stay_at_rest():
     three = "CHANNELS 3 Zrotation Xrotation Yrotation"
     leg, foot, head = (f"{offset}\n{tabs}{three}" for offset, tabs in (
         ("OFFSET 0.1 0.0 0.0", "\t\t"),
@@ -225,7 +225,7 @@ def test_joints_without_channels_stay_at_rest() -> None:
     )
 
 
-def test_end_sites_are_the_far_ends_of_boxes() -> None:
+def test_end_sites_are_the_far_ends_of_boxes():
     skeleton = read(GOOD)[0].figure.skeleton
     boxes = skeleton.boxes
     assert skeleton.boxes_from_bones
@@ -237,7 +237,7 @@ def test_end_sites_are_the_far_ends_of_boxes() -> None:
     assert (boxes[:, 1] > boxes[:, 0]).all()
 
 
-def test_quaternions_keep_their_sign_from_frame_to_frame() -> None:
+def test_quaternions_keep_their_sign_from_frame_to_frame():
     angles = np.arange(0, 1500, 50)
     motion, _ = read(
         one_joint("Yrotation", "\n".join(str(a if a < 700 else a - 720) for a in angles))
@@ -271,9 +271,7 @@ def test_quaternions_keep_their_sign_from_frame_to_frame() -> None:
         ("0.034567", 1 / 0.034567),
     ],
 )
-def test_frame_rate_snaps_to_the_common_one_matching_the_frame_time(
-    written: str, rate: float
-) -> None:
+def test_frame_rate_snaps_to_the_common_one_matching_the_frame_time(written, rate):
     motion, warnings = read(GOOD.replace("0.0333333", written))
     assert warnings == []
     assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-15)
@@ -294,27 +292,27 @@ def of_size(unit: str, size: str, inches: str = "") -> str:
         (1e5, "", ["unit unknown (skeleton 170,000 high)"]),
     ],
 )
-def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[str]) -> None:
+def test_unit_is_guessed_from_the_height(factor, unit, warnings):
     text = one_joint("Xrotation", "0").replace("0 1.7 0", f"0 {1.7 * factor:g} 0")
     motion, found = read(text)
     assert (motion.figure.unit, found) == (unit, warnings)
     assert motion.figure.facts[0][0] == "unit"
 
 
-def test_z_is_up_if_the_head_is_above_the_feet_along_z() -> None:
+def test_z_is_up_if_the_head_is_above_the_feet_along_z():
     text = GOOD.replace("0.0 -0.9 0.0", "0 0 -0.9").replace("0.0 0.6 0.0", "0.0 0.0 0.6")
     motion, warnings = read(text.replace("0.0 1.0 0.0 0 0 0", "0 0 1 0 0 0"))
     assert motion.figure.up == "z"
     assert warnings == ["z up assumed: the head is above the feet along z"]
 
 
-def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
+def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z():
     motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
     assert motion.figure.up == "z"
     assert warnings == ["z up assumed: the rest skeleton is longest along z"]
 
 
-def test_y_is_up_if_an_animal_that_is_longest_along_z_stands_on_its_legs() -> None:
+def test_y_is_up_if_an_animal_that_is_longest_along_z_stands_on_its_legs():
     figure = figure_of(animal(length=0.8), "animal")
     points = np.array([place for _, place in animal(length=0.8).values()])
     assert np.ptp(points[:, 2]) > 2.0 * np.ptp(points[:, 1])
@@ -324,7 +322,7 @@ def test_y_is_up_if_an_animal_that_is_longest_along_z_stands_on_its_legs() -> No
     assert (up, warnings) == ("y", ())
 
 
-def test_the_axis_along_which_frames_are_upright_is_up() -> None:
+def test_the_axis_along_which_frames_are_upright_is_up():
     # The rest pose is along y, but rotated by 90 degrees about x in every frame, as in a z-up
     # world.
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
@@ -338,7 +336,7 @@ def test_the_axis_along_which_frames_are_upright_is_up() -> None:
     ]
 
 
-def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis() -> None:
+def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis():
     # The rest pose is along x, and rotated by 90 degrees about z in every frame.
     text = GOOD.replace("0.0 -0.9 0.0", "-0.9 0 0").replace("0.0 0.6 0.0", "0.6 0 0")
     rows = "0 0 1 90 0 0 0 0 0 0 0 0 0 0 0\n" * 2
@@ -352,12 +350,12 @@ def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis() ->
     ]
 
 
-def test_bvh_is_recognised_by_content() -> None:
+def test_bvh_is_recognised_by_content():
     assert detect(Source("x.bvh", GOOD.encode())) == "bvh"
     assert detect(Source("x.txt", b"  hierarchy\nroot a{}")) == "bvh"
 
 
-def test_deep_chain_loads_without_recursion() -> None:
+def test_deep_chain_loads_without_recursion():
     depth = 5000
     text = "HIERARCHY " + "".join(
         f"{'JOINT' if j else 'ROOT'} j{j} {{ OFFSET 0 0.001 0 CHANNELS 1 Xrotation "

@@ -30,7 +30,7 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> NodeFile:
 
 
 @needs_ufbx
-def test_nodes_keep_names_and_parents(strip: NodeFile) -> None:
+def test_nodes_keep_names_and_parents(strip):
     assert strip.tree.names == ("RootNode", "Body", "low", "high")
     assert strip.tree.parents.tolist() == [-1, 0, 0, 2]
     assert_allclose(strip.tree.translations[3], [0.0, 1.0, 0.0])
@@ -38,7 +38,7 @@ def test_nodes_keep_names_and_parents(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_mesh_is_split_by_material_and_quads_are_triangulated(strip: NodeFile) -> None:
+def test_mesh_is_split_by_material_and_quads_are_triangulated(strip):
     (mesh,) = strip.meshes
     assert [primitive.material for primitive in mesh.primitives] == [0, 1]
     assert [len(primitive.triangles) for primitive in mesh.primitives] == [2, 2]
@@ -52,7 +52,7 @@ def test_mesh_is_split_by_material_and_quads_are_triangulated(strip: NodeFile) -
 
 
 @needs_ufbx
-def test_influences_match_the_clusters(strip: NodeFile) -> None:
+def test_influences_match_the_clusters(strip):
     (skin,), low = strip.skins, strip.meshes[0].primitives[0]
     assert skin.joints.tolist() == [2, 3] and skin.method == "lbs"
     assert_allclose(skin.inverse_bind[1][:3, 3], [0.0, -1.0, 0.0])
@@ -64,7 +64,7 @@ def test_influences_match_the_clusters(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_blend_shapes_are_offsets_with_default_weights(strip: NodeFile) -> None:
+def test_blend_shapes_are_offsets_with_default_weights(strip):
     mesh = strip.meshes[0]
     assert mesh.target_names == ("wide",) and mesh.shape_weights.tolist() == [0.25]
     low = mesh.primitives[0]
@@ -74,7 +74,7 @@ def test_blend_shapes_are_offsets_with_default_weights(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_keys_are_baked_at_the_frame_rate_of_the_file(strip: NodeFile) -> None:
+def test_keys_are_baked_at_the_frame_rate_of_the_file(strip):
     (bend,) = strip.animations
     assert (bend.name, bend.start, bend.end) == ("Bend", 0.0, 1.0)
     channels = {(channel.node, channel.path): channel for channel in bend.read()}
@@ -88,7 +88,7 @@ def test_keys_are_baked_at_the_frame_rate_of_the_file(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_up_axis_and_unit_of_the_file_are_unchanged(tmp_path: Path) -> None:
+def test_up_axis_and_unit_of_the_file_are_unchanged(tmp_path):
     source = Source.open(write_strip(tmp_path, up="z", unit=100.0))
     content = node_file(source)
     assert (content.up, content.unit) == ("z", "m")
@@ -97,7 +97,7 @@ def test_up_axis_and_unit_of_the_file_are_unchanged(tmp_path: Path) -> None:
 
 
 @needs_ufbx
-def test_unknown_units_are_converted_to_metres(tmp_path: Path) -> None:
+def test_unknown_units_are_converted_to_metres(tmp_path):
     source = Source.open(write_strip(tmp_path, unit=30.48))  # feet
     content = node_file(source)
     assert content.unit == "m"
@@ -108,7 +108,7 @@ def test_unknown_units_are_converted_to_metres(tmp_path: Path) -> None:
 
 
 @needs_ufbx
-def test_invalid_contents_are_refused(tmp_path: Path) -> None:
+def test_invalid_contents_are_refused(tmp_path):
     path = tmp_path / "wrong.fbx"
     path.write_text("no FBX at all\n")
     with pytest.raises(FormatError) as caught:
@@ -125,9 +125,7 @@ def test_invalid_contents_are_refused(tmp_path: Path) -> None:
         ("import os\nos._exit(0)\n", "exit code 0"),
     ],
 )
-def test_failed_child_process_is_reported_on_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str, ending: str
-) -> None:
+def test_failed_child_process_is_reported_on_one_line(tmp_path, monkeypatch, library, ending):
     (tmp_path / "ufbx.py").write_text(library)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -138,9 +136,7 @@ def test_failed_child_process_is_reported_on_one_line(
     assert ending in str(caught.value)
 
 
-def test_missing_library_is_reported_by_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_library_is_reported_by_name(tmp_path, monkeypatch):
     monkeypatch.setattr("viewer.formats.fbx.contents.find_spec", lambda name: None)
     with pytest.raises(FormatError) as caught:
         node_file(Source.open(write_strip(tmp_path)))
@@ -148,7 +144,7 @@ def test_missing_library_is_reported_by_name(
     assert caught.value.diagnostic.key == "F001.fbx-extra"
 
 
-def test_truncated_message_of_the_child_is_detected() -> None:
+def test_truncated_message_of_the_child_is_detected():
     data = packed({"a": np.arange(3)}, {"b": 1})
     arrays, told = unpacked(data) or ({}, {})
     assert arrays["a"].tolist() == [0, 1, 2] and told == {"b": 1}
@@ -160,9 +156,7 @@ def test_truncated_message_of_the_child_is_detected() -> None:
     ("stack", "time", "reference"),
     [(0, 0.0, "base_0"), (1, 15 / 24, "spin_15"), (2, 20 / 24, "wiggle_20")],
 )
-def test_blender_file_matches_its_exported_frames(
-    shared_data: Path, stack: int, time: float, reference: str
-) -> None:
+def test_blender_file_matches_its_exported_frames(shared_data, stack, time, reference):
     folder = shared_data / "fbx"
     content = node_file(Source.open(folder / "blender_279_sausage_7400_binary.fbx"))
     keys = {
@@ -238,29 +232,27 @@ def material(content: bytes, textured: tuple[str, ...]) -> Any:
     return found
 
 
-def test_values_apply_without_textures() -> None:
+def test_values_apply_without_textures():
     found = material(GREY, ())
     assert (found.metallic, found.roughness) == (0.25, 0.75)
     assert found.emissive == pytest.approx((0.0, 0.0, 0.1))
 
 
-def test_textures_replace_values() -> None:
+def test_textures_replace_values():
     found = material(GREY, ("metalness", "roughness", "emission_color"))
     assert (found.metallic, found.roughness) == (1.0, 1.0)
     assert found.emissive == pytest.approx((0.5, 0.5, 0.5))
     assert found.emissive_texture.image is not None
 
 
-def test_values_replace_textures_that_cannot_be_read() -> None:
+def test_values_replace_textures_that_cannot_be_read():
     found = material(b"not an image", ("metalness", "roughness", "emission_color"))
     assert (found.metallic, found.roughness) == (0.25, 0.75)
     assert found.emissive == pytest.approx((0.0, 0.0, 0.1))
     assert found.metallic_texture.image is None
 
 
-def test_objects_of_the_library_live_until_the_process_exits(
-    monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
-) -> None:
+def test_objects_of_the_library_live_until_the_process_exits(monkeypatch, capfdbinary):
     events = []
 
     class Scene:

@@ -1,7 +1,6 @@
 """Invalid numbers in ``.fbx``: one line with the file and the place."""
 
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 from formats.fbx.tiny_fbx import write_strip
@@ -28,9 +27,7 @@ RED = '"A",1,0,0'
         ("Indexes: *2 { a: 1,2 }", "Indexes: *2 { a: 1,9 }", "from 0 to 5, found 9"),
     ],
 )
-def test_invalid_numbers_are_refused_with_their_place(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
+def test_invalid_numbers_are_refused_with_their_place(tmp_path, old, new, message):
     path = write_strip(tmp_path, edits={old: new})
     with pytest.raises(FormatError) as caught:
         viewer.load(path)
@@ -38,9 +35,7 @@ def test_invalid_numbers_are_refused_with_their_place(
     assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_products_of_valid_transforms_are_refused_when_they_are_out_of_reach(
-    tmp_path: Path,
-) -> None:
+def test_products_of_valid_transforms_are_refused_when_they_are_out_of_reach(tmp_path):
     scaled = '\nP: "Lcl Scaling", "Lcl Scaling", "", "A",1e17,1e17,1e17'
     low = 'Model: 21, "Model::low", "LimbNode" { Version: 232 }'
     edits = {
@@ -51,7 +46,7 @@ def test_products_of_valid_transforms_are_refused_when_they_are_out_of_reach(
         viewer.load(write_strip(tmp_path, edits=edits))
 
 
-def test_invalid_keys_are_refused_when_they_are_played(tmp_path: Path) -> None:
+def test_invalid_keys_are_refused_when_they_are_played(tmp_path):
     path = write_strip(
         tmp_path, edits={"KeyValueFloat: *2 { a: 0,90 }": "KeyValueFloat: *2 { a: 0,nan }"}
     )
@@ -69,9 +64,7 @@ def test_invalid_keys_are_refused_when_they_are_played(tmp_path: Path) -> None:
         ("    AnimationStack: 50", "expected the end of 1 open section"),
     ],
 )
-def test_text_that_is_cut_short_is_refused_at_its_end(
-    tmp_path: Path, end: str, message: str
-) -> None:
+def test_text_that_is_cut_short_is_refused_at_its_end(tmp_path, end, message):
     path = write_strip(tmp_path)
     text = path.read_text()
     left = text[: text.index(end)]

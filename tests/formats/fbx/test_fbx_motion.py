@@ -1,6 +1,5 @@
 """Curves of ``.fbx``: extrapolation, fast rotations, weights of blend shapes."""
 
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -74,30 +73,30 @@ def angle(actor: Actor, name: str, time: float) -> float:
         ("step", [40.0, 40.0, 40.0, 40.0]),
     ],
 )
-def test_curves_continue_as_they_say(joints: Actor, name: str, angles: list[float]) -> None:
+def test_curves_continue_as_they_say(joints, name, angles):
     # Keys are in single precision, and slopes of lines are measured over 1 ms.
     found = [angle(joints, name, time) for time in (0.6, 1.1, 1.4, 1.7)]
     assert_allclose(found, angles, atol=1e-4)
 
 
-def test_a_spin_of_more_than_a_half_rotation_per_frame_keeps_its_direction(joints: Actor) -> None:
+def test_a_spin_of_more_than_a_half_rotation_per_frame_keeps_its_direction(joints):
     # 20 rotations per second are 300 degrees per frame.
     assert angle(joints, "spin", 0.25 / 24) == pytest.approx(75.0, abs=1e-3)
     assert angle(joints, "spin", 10.5 / 24) == pytest.approx(-90.0, abs=1e-3)
 
 
-def test_steps_jump_at_their_keys(joints: Actor) -> None:
+def test_steps_jump_at_their_keys(joints):
     assert_allclose([angle(joints, "step", t) for t in (0.499, 0.501)], [0.0, 40.0], atol=1e-4)
 
 
-def test_blend_shapes_of_the_oldest_version_move(tmp_path: Path) -> None:
+def test_blend_shapes_of_the_oldest_version_move(tmp_path):
     path = tmp_path / "quad.fbx"
     path.write_text(QUAD_5000)
     (actor,) = viewer.load(path).actors
     assert posed(actor, 0.5)[:, 0].max() == pytest.approx(1.25)
 
 
-def test_weights_per_vertex_scale_a_blend_shape(tmp_path: Path) -> None:
+def test_weights_per_vertex_scale_a_blend_shape(tmp_path):
     edits = {
         "by hand": "Blender (stable FBX IO) - 2.79 (sub 0) - 3.7.13",
         "FullWeights: *1 { a: 100 }": "FullWeights: *2 { a: 100,20 }",
@@ -112,7 +111,7 @@ def test_weights_per_vertex_scale_a_blend_shape(tmp_path: Path) -> None:
     assert moved[knee].tolist() == pytest.approx([0.55, 1.0 + 0.55, 0.0], abs=1e-6)
 
 
-def test_a_full_weight_below_100_scales_a_blend_shape(tmp_path: Path) -> None:
+def test_a_full_weight_below_100_scales_a_blend_shape(tmp_path):
     edits = {"FullWeights: *1 { a: 100 }": "FullWeights: *1 { a: 50 }"}
     (actor,) = viewer.load(write_strip(tmp_path, edits=edits)).actors
     assert actor.figure.rest_shape_weights.tolist() == [0.5]  # 25 of 50
@@ -132,7 +131,7 @@ IN_BETWEEN = {
 }
 
 
-def test_in_between_targets_are_reached_on_the_way(tmp_path: Path) -> None:
+def test_in_between_targets_are_reached_on_the_way(tmp_path):
     (actor,) = viewer.load(write_strip(tmp_path, edits=IN_BETWEEN)).actors
     assert actor.figure.blend_shapes is not None
     assert actor.figure.blend_shapes.names == ("wide 60%", "wide")
@@ -144,12 +143,12 @@ def test_in_between_targets_are_reached_on_the_way(tmp_path: Path) -> None:
     assert posed(actor, 0.8)[foot].tolist() == pytest.approx([1.25, -0.25, 0.0], abs=1e-6)
 
 
-def test_weights_beyond_the_targets_are_extrapolated() -> None:
+def test_weights_beyond_the_targets_are_extrapolated():
     found = target_weights(np.array([-0.5, 1.5]), [0.5, 1.0])
     assert_allclose(found, [[-1.0, 0.0], [-1.0, 2.0]])
 
 
-def test_vertices_without_weights_follow_the_node_of_their_mesh(tmp_path: Path) -> None:
+def test_vertices_without_weights_follow_the_node_of_their_mesh(tmp_path):
     edits = {
         # The upper two vertices have no weights, and the node of the mesh moves instead of a joint.
         "Indexes: *4 { a: 2,3,4,5 }": "Indexes: *2 { a: 2,3 }",
@@ -164,7 +163,7 @@ def test_vertices_without_weights_follow_the_node_of_their_mesh(tmp_path: Path) 
         assert_allclose(found, expected, atol=1e-6)
 
 
-def test_animations_of_one_name_stay_with_their_figures(tmp_path: Path) -> None:
+def test_animations_of_one_name_stay_with_their_figures(tmp_path):
     scene = viewer.load(write_two_strips(tmp_path))
     numbers = [[each.number for each in actor.figure.animations] for actor in scene.actors]
     assert numbers == [[0], [1]]
@@ -195,7 +194,7 @@ CAMERA = {
 }
 
 
-def test_cameras_look_along_x_of_their_node(tmp_path: Path) -> None:
+def test_cameras_look_along_x_of_their_node(tmp_path):
     scene = viewer.load(write_strip(tmp_path, edits=CAMERA))
     (view,) = scene.views
     assert view.name == "Shot"
@@ -236,7 +235,7 @@ def filmed(path: Path) -> Path:
 
 
 @pytest.mark.parametrize("write", [write_strip, write_two_strips])
-def test_animated_cameras_move(tmp_path: Path, write: Callable[..., Path]) -> None:
+def test_animated_cameras_move(tmp_path, write):
     path = write(tmp_path)
     text = path.read_text()
     for old, new in CAMERA.items():
@@ -257,14 +256,14 @@ def skinned_by(kind: str, more: str = "") -> dict[str, str]:
     return {old: old.replace("101 }", f'101\n        SkinningType: "{kind}"\n{more} }}')}
 
 
-def test_skins_are_deformed_by_the_method_of_the_file(tmp_path: Path) -> None:
+def test_skins_are_deformed_by_the_method_of_the_file(tmp_path):
     (actor,) = viewer.load(write_strip(tmp_path, edits=skinned_by("DualQuaternion"))).actors
     assert file_method([actor.figure]) == ("dqs", 0.5)
     (actor,) = viewer.load(write_strip(tmp_path)).actors
     assert file_method([actor.figure]) == ("lbs", 0.5)
 
 
-def test_methods_are_blended_by_the_fraction_of_each_vertex(tmp_path: Path) -> None:
+def test_methods_are_blended_by_the_fraction_of_each_vertex(tmp_path):
     # Vertices 2 and 3, (1, 1) and (0, 1), are halfway between both joints.
     stated = "Indexes: *2 { a: 2,3 }\nBlendWeights: *2 { a: 0.25,1 }"
     (actor,) = viewer.load(write_strip(tmp_path, edits=skinned_by("Blend", stated))).actors
@@ -280,9 +279,7 @@ def test_methods_are_blended_by_the_fraction_of_each_vertex(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("is_cut", [True, False])
-def test_text_cut_before_its_takes_is_reported(
-    tmp_path: Path, is_cut: bool, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_text_cut_before_its_takes_is_reported(tmp_path, is_cut, capsys):
     """Version 6100 ends with the animations, after the connections; all braces are closed."""
     text = QUAD_5000.replace("5.0.0", "6.1.0").replace("FBXVersion: 5000", "FBXVersion: 6100")
     head, takes = text.split("Takes:  {")

@@ -22,9 +22,7 @@ def accessors(file: File) -> Accessors:
         ("H", [0, 65535, 13107, 0], [0.0, 1.0, 0.2, 0.0]),
     ],
 )
-def test_normalised_integers_are_read_as_fractions(
-    kind: str, values: list[int], fractions: list[float]
-) -> None:
+def test_normalised_integers_are_read_as_fractions(kind, values, fractions):
     file = File()
     file.accessor([values], kind, normalized=True)
     file.accessor([values], kind)
@@ -34,13 +32,13 @@ def test_normalised_integers_are_read_as_fractions(
     assert found.integers(1, ("VEC4",), "")[0].tolist() == values
 
 
-def test_large_integers_are_exact() -> None:
+def test_large_integers_are_exact():
     file = File()
     file.accessor([0, 2**32 - 1], "I")
     assert accessors(file).integers(0, ("SCALAR",), "")[:, 0].tolist() == [0, 2**32 - 1]
 
 
-def test_interleaved_attributes_are_read_by_stride() -> None:
+def test_interleaved_attributes_are_read_by_stride():
     file = File()
     rows = np.array([[1, 2, 3, 9, 8], [4, 5, 6, 7, 6]], dtype="<f4")
     view = file.view(rows.tobytes(), byteStride=20)
@@ -54,7 +52,7 @@ def test_interleaved_attributes_are_read_by_stride() -> None:
     assert found.floats(1, ("VEC2",), "", rows).tolist() == [[7, 6]]
 
 
-def test_columns_of_small_matrices_are_aligned_to_4_bytes() -> None:
+def test_columns_of_small_matrices_are_aligned_to_4_bytes():
     file = File()
     data = bytes([1, 2, 0, 0, 3, 4, 0, 0])
     file.add(
@@ -71,7 +69,7 @@ def test_columns_of_small_matrices_are_aligned_to_4_bytes() -> None:
     assert found.floats(1, ("MAT3",), "").tolist() == [[1, 2, 3, 4, 5, 6, 7, 8, 9]]
 
 
-def test_matrices_are_read_column_by_column() -> None:
+def test_matrices_are_read_column_by_column():
     file = File()
     file.accessor([[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]])
     [matrix] = accessors(file).matrices(0, "")
@@ -92,7 +90,7 @@ def sparse(file: File, indices: list[int], values: list[float], **members: objec
     file.add("accessors", {**base, "sparse": replaced, **members})
 
 
-def test_sparse_values_replace_values_of_the_view_or_zeros() -> None:
+def test_sparse_values_replace_values_of_the_view_or_zeros():
     file = File()
     sparse(file, [1, 3], [5, 6])
     sparse(file, [0], [7], bufferView=file.view(np.arange(4, dtype="<f4").tobytes()))
@@ -125,7 +123,7 @@ def test_sparse_values_replace_values_of_the_view_or_zeros() -> None:
         ({"sparse": {"count": 1}}, "F002.gltf-missing", "/sparse"),
     ],
 )
-def test_invalid_accessors_are_refused(members: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_accessors_are_refused(members, key, pointer):
     file = File()
     file.accessor([1.0, 2.0, 3.0])
     file.root["accessors"][0] |= members
@@ -135,7 +133,7 @@ def test_invalid_accessors_are_refused(members: dict[str, object], key: str, poi
     assert (found.key, found.pointer) == (key, f"/accessors/0{pointer}")
 
 
-def test_components_that_are_not_cached_do_not_count_towards_the_decoding_limit() -> None:
+def test_components_that_are_not_cached_do_not_count_towards_the_decoding_limit():
     file = File()
     # Each reading decodes 36 MB; the limit of a file is 256 MB.
     accessor = {"componentType": 5121, "count": 4_000_000, "type": "SCALAR"}
@@ -149,7 +147,7 @@ def test_components_that_are_not_cached_do_not_count_towards_the_decoding_limit(
     assert read.floats(0, ("SCALAR",), "")[3, 0] == 7.0
 
 
-def test_large_accessor_without_data_is_refused() -> None:
+def test_large_accessor_without_data_is_refused():
     file = File()
     file.add("accessors", {"componentType": 5126, "count": 2**31, "type": "MAT4"})
     with pytest.raises(FormatError) as caught:
@@ -157,7 +155,7 @@ def test_large_accessor_without_data_is_refused() -> None:
     assert caught.value.diagnostic.key == "F002.gltf-decoded"
 
 
-def test_sparse_index_out_of_range_is_refused() -> None:
+def test_sparse_index_out_of_range_is_refused():
     file = File()
     sparse(file, [1, 4], [5, 6])
     with pytest.raises(FormatError) as caught:
@@ -165,7 +163,7 @@ def test_sparse_index_out_of_range_is_refused() -> None:
     assert caught.value.diagnostic.pointer == "/accessors/0/sparse/indices"
 
 
-def test_unexpected_type_is_reported_at_the_referring_member() -> None:
+def test_unexpected_type_is_reported_at_the_referring_member():
     file = File()
     file.accessor([1.0])
     with pytest.raises(FormatError) as caught:
@@ -183,7 +181,7 @@ def test_unexpected_type_is_reported_at_the_referring_member() -> None:
         ({"byteStride": 8}, "F002.gltf-accessor", "/accessors/0"),
     ],
 )
-def test_invalid_views_are_refused(view: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_views_are_refused(view, key, pointer):
     file = File()
     file.accessor([1.0, 2.0, 3.0])
     file.root["bufferViews"][0] |= view
@@ -193,7 +191,7 @@ def test_invalid_views_are_refused(view: dict[str, object], key: str, pointer: s
     assert (found.key, found.pointer) == (key, pointer)
 
 
-def test_misaligned_components_are_read_with_a_warning() -> None:
+def test_misaligned_components_are_read_with_a_warning():
     file = File()
     view = file.view(b"\0" + np.array([2.5], "<f4").tobytes())
     file.add(

@@ -32,13 +32,13 @@ def refusals(files: Iterable[bytes]) -> list[str]:
     return found
 
 
-def test_unchanged_document_is_valid() -> None:
+def test_unchanged_document_is_valid():
     assert warned(complete()) == []
     assert len(read(source_of(complete())).figures) == 2
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_documents_with_changed_values_are_read_or_refused(seed: int) -> None:
+def test_documents_with_changed_values_are_read_or_refused(seed):
     found = refusals(changed(seed, 80))
     assert 20 < len(found) < 80
     for line in found:
@@ -46,12 +46,12 @@ def test_documents_with_changed_values_are_read_or_refused(seed: int) -> None:
         assert len(line) < 400
 
 
-def test_truncated_files_are_read_or_refused() -> None:
+def test_truncated_files_are_read_or_refused():
     for line in refusals(truncated()):
         assert line.startswith("a.gltf") and "\n" not in line
 
 
-def test_changed_documents_are_read_as_figures_or_refused() -> None:
+def test_changed_documents_are_read_as_figures_or_refused():
     for data in changed(9, 60):
         for keeps_errors in (False, True):
             source = Source("a.gltf", data, diagnostics=Collector(keeps_errors=keeps_errors))

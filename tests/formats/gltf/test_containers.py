@@ -25,19 +25,19 @@ def triangle() -> File:
     return file
 
 
-def test_text_and_binary_files_have_the_same_contents() -> None:
+def test_text_and_binary_files_have_the_same_contents():
     for data in (triangle().json(), triangle().glb(), b"\xef\xbb\xbf" + triangle().json()):
         [mesh] = read(data).meshes
         assert mesh.primitives[0].positions.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         assert warned(data) == []
 
 
-def test_binary_file_may_end_with_a_control_z() -> None:
+def test_binary_file_may_end_with_a_control_z():
     data = glb([(b"JSON", TEXT + b" "), (b"odd\x1a", b"\x1a" * 4)])
     assert source_of(data).data == data and warned(data) == []
 
 
-def test_unknown_chunks_are_skipped_and_repeated_chunks_reported() -> None:
+def test_unknown_chunks_are_skipped_and_repeated_chunks_reported():
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     chunks = [(b"JSON", text), (b"NOTE", b"?"), (b"BIN\0", file.binary), (b"BIN\0", b"more")]
@@ -54,7 +54,7 @@ def test_unknown_chunks_are_skipped_and_repeated_chunks_reported() -> None:
         ((0, 1, 2), ""),
     ],
 )
-def test_chunks_in_another_order_are_reported(order: tuple[int, ...], message: str) -> None:
+def test_chunks_in_another_order_are_reported(order, message):
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     chunks = (b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", file.binary), (b"NOTE", b"abcd")
@@ -63,7 +63,7 @@ def test_chunks_in_another_order_are_reported(order: tuple[int, ...], message: s
     assert [found.message for found in source.diagnostics] == ([message] if message else [])
 
 
-def test_numbers_beyond_double_precision_are_reported() -> None:
+def test_numbers_beyond_double_precision_are_reported():
     text = b'{"asset": {"version": "2.0"}, "extras": [1e999, -1E+400, 1e308, 1]}'
     source = source_of(text)
     read_nodes(source)
@@ -72,14 +72,14 @@ def test_numbers_beyond_double_precision_are_reported() -> None:
 
 
 @pytest.mark.parametrize("padding", [b"\0\0\0", b"   ", b"\n\t\0"])
-def test_json_chunk_may_be_padded_with_white_space_or_zeros(padding: bytes) -> None:
+def test_json_chunk_may_be_padded_with_white_space_or_zeros(padding):
     data = glb([(b"JSON", TEXT + padding)])
     assert read(data).tree.names == ("a",)
     is_odd = padding.endswith(b"\0")
     assert warned(data) == ([("G001.padding", "")] if is_odd else [])
 
 
-def test_chunks_after_padding_outside_the_chunk_length_are_found() -> None:
+def test_chunks_after_padding_outside_the_chunk_length_are_found():
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     text += b" " * ((1 - len(text)) % 4)  # one more than a multiple of 4
@@ -89,7 +89,7 @@ def test_chunks_after_padding_outside_the_chunk_length_are_found() -> None:
     assert len(read(data).meshes) == 1 and warned(data) == []
 
 
-def test_wrong_lengths_are_warnings_if_no_data_are_missing() -> None:
+def test_wrong_lengths_are_warnings_if_no_data_are_missing():
     data = triangle().glb()
     longer = data[:8] + struct.pack("<I", len(data) + 8) + data[12:]
     shorter = data[:8] + struct.pack("<I", 0) + data[12:]
@@ -98,7 +98,7 @@ def test_wrong_lengths_are_warnings_if_no_data_are_missing() -> None:
         assert warned(changed) == [("G001.length", "")]
 
 
-def test_truncated_binary_chunk_is_an_error_if_data_are_missing() -> None:
+def test_truncated_binary_chunk_is_an_error_if_data_are_missing():
     data = triangle().glb()[:-12]
     source = source_of(data)
     with pytest.raises(FormatError) as caught:
@@ -111,7 +111,7 @@ def test_truncated_binary_chunk_is_an_error_if_data_are_missing() -> None:
     ]
 
 
-def test_binary_chunk_may_be_longer_than_its_buffer() -> None:
+def test_binary_chunk_may_be_longer_than_its_buffer():
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     data = glb([(b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", file.binary + bytes(400))])
@@ -140,23 +140,23 @@ def test_binary_chunk_may_be_longer_than_its_buffer() -> None:
         (b'{"asset": {"version": 2.0}}', "F002.gltf-type"),
     ],
 )
-def test_broken_containers_are_refused(data: bytes, key: str) -> None:
+def test_broken_containers_are_refused(data, key):
     assert refused(data)[0] == key
 
 
-def test_syntax_errors_have_a_line_number() -> None:
+def test_syntax_errors_have_a_line_number():
     with pytest.raises(FormatError) as caught:
         read(b'{\n"nodes": [\n{,\n')
     assert str(caught.value).startswith("a.gltf:3: expected JSON, found a syntax error")
 
 
-def test_json_above_half_a_gigabyte_is_refused(monkeypatch) -> None:
+def test_json_above_half_a_gigabyte_is_refused(monkeypatch):
     monkeypatch.setattr("viewer.formats.gltf.document._MOST_BYTES", 50)
     assert refused(TEXT) == ("F001.gltf-text", "")
     assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
 
 
-def test_deviations_from_json_are_reported_as_warnings() -> None:
+def test_deviations_from_json_are_reported_as_warnings():
     head = b'{"asset": {"version": "2.0"}, '
     assert warned(head + b'"extras": NaN, "nodes": [], "nodes": [{}]}') == [
         ("G001.constants", ""),
@@ -170,7 +170,7 @@ def test_deviations_from_json_are_reported_as_warnings() -> None:
     assert warned(b"{}") == [("G001.no-asset", "")]
 
 
-def test_garbage_collection_is_suspended_while_json_is_parsed() -> None:
+def test_garbage_collection_is_suspended_while_json_is_parsed():
     lists = b",".join([b"[]"] * 5000)
     text = b'{"asset": {"version": "2.0"}, "extras": [' + lists + b"]}"
     phases: list[str] = []
@@ -189,7 +189,7 @@ def test_garbage_collection_is_suspended_while_json_is_parsed() -> None:
     assert usual > 1 and phases.count("start") <= usual + 1
 
 
-def test_garbage_collection_resumes_after_broken_json() -> None:
+def test_garbage_collection_resumes_after_broken_json():
     assert gc.isenabled()
     assert refused(b'{"asset": [') == ("F002.gltf-json", "")
     assert gc.isenabled()
@@ -205,7 +205,7 @@ def test_garbage_collection_resumes_after_broken_json() -> None:
         "data:,%00%00%00%00%00%00%80%3F",
     ],
 )
-def test_data_uris_are_decoded(uri: str) -> None:
+def test_data_uris_are_decoded(uri):
     file = File(nodes=[{"mesh": 0}])
     file.root["buffers"] = [{"uri": uri, "byteLength": 8}]
     file.root["bufferViews"] = [{"buffer": 0, "byteLength": 8}]
@@ -232,7 +232,7 @@ def test_data_uris_are_decoded(uri: str) -> None:
         (7, "F002.gltf-type"),
     ],
 )
-def test_unreadable_uris_are_refused(uri: object, key: str) -> None:
+def test_unreadable_uris_are_refused(uri, key):
     file = triangle()
     file.root["buffers"] = [{"uri": uri, "byteLength": 36}]
     assert refused(file) == (key, "/buffers/0/uri")
@@ -241,7 +241,7 @@ def test_unreadable_uris_are_refused(uri: object, key: str) -> None:
 @pytest.mark.parametrize(
     ("name", "uri"), [("a b.bin", "a%20b.bin"), ("ä.bin", "%C3%A4.bin"), ("50%25.bin", "50%25.bin")]
 )
-def test_external_files_are_read(tmp_path: Path, name: str, uri: str) -> None:
+def test_external_files_are_read(tmp_path, name, uri):
     file = triangle()
     (tmp_path / name).write_bytes(file.binary)
     source = Source(tmp_path / "a.gltf", file.json(uri))
@@ -249,18 +249,18 @@ def test_external_files_are_read(tmp_path: Path, name: str, uri: str) -> None:
     assert source.also_read == [tmp_path / name]
 
 
-def test_missing_external_file_is_named_in_the_error(tmp_path: Path) -> None:
+def test_missing_external_file_is_named_in_the_error(tmp_path):
     with pytest.raises(FormatError, match=r"a\.gltf#/buffers/0/uri: .*gone\.bin: cannot be read"):
         read(triangle().json("gone.bin"), tmp_path / "a.gltf")
 
 
-def test_buffer_without_data_is_refused() -> None:
+def test_buffer_without_data_is_refused():
     file = triangle()
     file.root["buffers"] = [{"byteLength": 36}]
     assert refused(file) == ("F002.gltf-no-data", "/buffers/0")
 
 
-def test_unknown_extensions_are_refused_if_required_and_reported_if_used() -> None:
+def test_unknown_extensions_are_refused_if_required_and_reported_if_used():
     file = File(extensionsUsed=["ODD_a", "KHR_mesh_quantization", "ODD_b"])
     assert warned(file) == [("F007.gltf-extensions", "/extensionsUsed")]
     file.root["extensionsRequired"] = ["KHR_mesh_quantization", "ODD_b"]
@@ -272,7 +272,7 @@ def test_unknown_extensions_are_refused_if_required_and_reported_if_used() -> No
     "name",
     ["KHR_materials_clearcoat", "KHR_texture_basisu", "EXT_lights_ies", "KHR_audio", "MSFT_lod"],
 )
-def test_required_extensions_of_the_look_are_reported(name: str) -> None:
+def test_required_extensions_of_the_look_are_reported(name):
     file = triangle()
     file.root["extensionsUsed"] = file.root["extensionsRequired"] = [name]
     source = source_of(file)
@@ -282,7 +282,7 @@ def test_required_extensions_of_the_look_are_reported(name: str) -> None:
     assert found.message.startswith(f"{name} not shown")
 
 
-def test_hidden_nodes_are_not_drawn(tmp_path: Path) -> None:
+def test_hidden_nodes_are_not_drawn(tmp_path):
     file = triangle()
     hidden = {"KHR_node_visibility": {"visible": False}}
     file.root["nodes"] = [
@@ -308,7 +308,7 @@ def opened(folder: Path, name: str) -> NodeFile:
     return content
 
 
-def test_fox_has_the_published_counts(shared_data: Path) -> None:
+def test_fox_has_the_published_counts(shared_data):
     content = opened(shared_data, "Fox.glb")
     assert [animation.name for animation in content.animations] == ["Survey", "Walk", "Run"]
     assert len(content.skins[0].joints) == 24
@@ -318,7 +318,7 @@ def test_fox_has_the_published_counts(shared_data: Path) -> None:
     assert 150 < np.ptp(primitive.positions, axis=0)[2] < 160
 
 
-def test_animations_with_late_constant_keys_are_read(shared_data: Path) -> None:
+def test_animations_with_late_constant_keys_are_read(shared_data):
     content = opened(shared_data, "fox-animations.glb")
     assert len(content.animations) == 14
     channels = [channel for animation in content.animations for channel in animation.read()]
@@ -326,7 +326,7 @@ def test_animations_with_late_constant_keys_are_read(shared_data: Path) -> None:
     assert min(animation.start for animation in content.animations) > 0.0
 
 
-def test_cesium_man_has_the_published_counts(shared_data: Path) -> None:
+def test_cesium_man_has_the_published_counts(shared_data):
     content = opened(shared_data, "cesium_man.gltf")
     weights = content.meshes[0].primitives[0].weights
     assert weights is not None
@@ -334,7 +334,7 @@ def test_cesium_man_has_the_published_counts(shared_data: Path) -> None:
     assert not content.tree.matrices  # rotations include rounding
 
 
-def test_vertices_may_have_ten_influences(shared_data: Path) -> None:
+def test_vertices_may_have_ten_influences(shared_data):
     [primitive] = (
         read_nodes(Source.open(shared_data / "gltf" / "quad_skin.glb")).meshes[0].primitives
     )
@@ -349,16 +349,14 @@ def test_vertices_may_have_ten_influences(shared_data: Path) -> None:
         ("01_morphed_cube_no_uv.gltf", "weights", ("Top",)),
     ],
 )
-def test_spline_animations_are_read(
-    shared_data: Path, name: str, path: str, names: tuple[str, ...]
-) -> None:
+def test_spline_animations_are_read(shared_data, name, path, names):
     content = opened(shared_data, name)
     [channel] = content.animations[0].read()
     assert (channel.path, channel.interpolation) == (path, "cubic")
     assert content.meshes[0].target_names == names
 
 
-def test_skeleton_without_mesh_is_read(shared_data: Path) -> None:
+def test_skeleton_without_mesh_is_read(shared_data):
     content = opened(shared_data, "rig-fox.glb")
     assert content.meshes == () and len(content.skins[0].joints) == 49
 
@@ -371,5 +369,5 @@ def test_skeleton_without_mesh_is_read(shared_data: Path) -> None:
         ("vrm1_shared_mesh.vrm", "VRMC_vrm"),
     ],
 )
-def test_characters_are_read(shared_data: Path, name: str, extension: str) -> None:
+def test_characters_are_read(shared_data, name, extension):
     assert extension in opened(shared_data, name).extensions

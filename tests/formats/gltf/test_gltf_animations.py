@@ -1,7 +1,6 @@
 """Animations: targets, interpolation, ranges, lazy reading, and omitted animations."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,7 +30,7 @@ def morphed(*values: float, **sampler: object) -> File:
     return file
 
 
-def test_linear_keys_are_read() -> None:
+def test_linear_keys_are_read():
     file = animated()
     file.root["animations"][0]["name"] = "walk"
     [animation] = read(file).animations
@@ -43,7 +42,7 @@ def test_linear_keys_are_read() -> None:
     assert channel.tangents is None
 
 
-def test_cubic_keys_consist_of_in_tangent_value_and_out_tangent() -> None:
+def test_cubic_keys_consist_of_in_tangent_value_and_out_tangent():
     rows = np.arange(18).reshape(6, 3)
     channel = only(animated("scale", rows, interpolation="CUBICSPLINE"))
     assert channel.interpolation == "cubic"
@@ -52,7 +51,7 @@ def test_cubic_keys_consist_of_in_tangent_value_and_out_tangent() -> None:
     assert channel.tangents.tolist() == [[[0, 1, 2], [6, 7, 8]], [[9, 10, 11], [15, 16, 17]]]
 
 
-def test_weight_keys_have_a_value_per_morph_target() -> None:
+def test_weight_keys_have_a_value_per_morph_target():
     channel = only(morphed(1, 2, 3, 4, interpolation="STEP"))
     assert channel.interpolation == "step"
     assert channel.values.tolist() == [[1, 2], [3, 4]]
@@ -62,7 +61,7 @@ def test_weight_keys_have_a_value_per_morph_target() -> None:
     assert channel.tangents.tolist() == [[[0, 1], [4, 5]], [[6, 7], [10, 11]]]
 
 
-def test_integer_rotations_are_normalised() -> None:
+def test_integer_rotations_are_normalised():
     file = animated("rotation")
     output = file.accessor([[0, 0, 32767, 32767], [0, 0, -20000, 0]], "h", normalized=True)
     file.root["animations"][0]["samplers"][0]["output"] = output
@@ -70,7 +69,7 @@ def test_integer_rotations_are_normalised() -> None:
     assert only(file).values == pytest.approx(np.array([[0, 0, half, half], [0, 0, -1, 0]]))
 
 
-def test_splines_of_rotations_are_not_normalised() -> None:
+def test_splines_of_rotations_are_not_normalised():
     rows = [[0, 0, 0, 0], [0, 0, 0, 2], [0, 0, 1, 0]] * 2
     channel = only(animated("rotation", rows, interpolation="CUBICSPLINE"))
     assert channel.values.tolist() == [[0, 0, 0, 2]] * 2
@@ -83,7 +82,7 @@ def pointing(file: File, pointer: str) -> None:
     channel["target"] = {"path": "pointer", "extensions": extension}
 
 
-def test_pointers_to_nodes_and_weights_are_channels() -> None:
+def test_pointers_to_nodes_and_weights_are_channels():
     file = animated()
     pointing(file, "/nodes/0/scale")
     assert (only(file).node, only(file).path) == (0, "scale")
@@ -96,14 +95,14 @@ def test_pointers_to_nodes_and_weights_are_channels() -> None:
 
 
 @pytest.mark.parametrize("pointer", ["/materials/0/emissiveFactor", "/nodes/7/scale", ""])
-def test_pointers_to_other_properties_are_ignored(pointer: str) -> None:
+def test_pointers_to_other_properties_are_ignored(pointer):
     file = animated()
     pointing(file, pointer)
     assert read(file).animations[0].read() == ()
     assert warned(file) == [("F007.gltf-channels", "/animations/0/channels/0")]
 
 
-def test_channels_without_node_or_with_unknown_path_are_ignored() -> None:
+def test_channels_without_node_or_with_unknown_path_are_ignored():
     file = animated()
     sampler = {"sampler": 0}
     file.root["animations"][0]["channels"] += [
@@ -119,7 +118,7 @@ def test_channels_without_node_or_with_unknown_path_are_ignored() -> None:
     assert [dict(found.values) for found in source.diagnostics] == [{"n": 3, "names": names}]
 
 
-def test_second_channel_of_a_property_is_ignored() -> None:
+def test_second_channel_of_a_property_is_ignored():
     file = animated()
     animation = file.root["animations"][0]
     animation["channels"] *= 2
@@ -127,7 +126,7 @@ def test_second_channel_of_a_property_is_ignored() -> None:
     assert ("G005.channel-twice", "/animations/0/channels/1/target") in warned(file)
 
 
-def test_range_spans_all_samplers() -> None:
+def test_range_spans_all_samplers():
     file = animated()
     animation = file.root["animations"][0]
     animation["samplers"].append({"input": file.times([0.5, 3.0]), "output": 1})
@@ -137,7 +136,7 @@ def test_range_spans_all_samplers() -> None:
 
 
 @pytest.mark.parametrize("members", [{}, {"min": ["0"], "max": [1]}, {"min": [5], "max": [0]}])
-def test_undeclared_range_is_read_from_the_keys(members: dict[str, object]) -> None:
+def test_undeclared_range_is_read_from_the_keys(members):
     file = animated()
     accessor = file.root["accessors"][0]
     del accessor["min"], accessor["max"]
@@ -166,7 +165,7 @@ def with_two(file: File) -> File:
         ([0.0, 1.0], [[0, 0], [0, 0]], "F002.gltf-kind"),
     ],
 )
-def test_animation_with_invalid_keys_is_omitted(times: object, values: object, key: str) -> None:
+def test_animation_with_invalid_keys_is_omitted(times, values, key):
     file = animated()
     sampler = file.root["animations"][0]["samplers"][0]
     sampler |= {"input": file.accessor(np.reshape(times, (-1, 1))), "output": file.accessor(values)}
@@ -179,7 +178,7 @@ def test_animation_with_invalid_keys_is_omitted(times: object, values: object, k
     assert [found.key for found in source.diagnostics.errors] == [key]
 
 
-def test_last_of_several_keys_at_the_same_time_is_used() -> None:
+def test_last_of_several_keys_at_the_same_time_is_used():
     file = animated()
     times, values = file.times([0.0, 1.0, 1.0]), file.accessor([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
     file.root["animations"][0]["samplers"] = [{"input": times, "output": values}]
@@ -187,19 +186,19 @@ def test_last_of_several_keys_at_the_same_time_is_used() -> None:
     assert warned(file) == [("G005.equal-times", "/animations/0/samplers")]
 
 
-def test_declared_range_that_differs_from_the_keys_is_reported() -> None:
+def test_declared_range_that_differs_from_the_keys_is_reported():
     file = animated()
     file.root["accessors"][0]["max"] = [9]
     assert read(file).animations[0].end == 9.0
     assert warned(file) == [("G005.range", "/animations/0/samplers")]
 
 
-def test_rotation_key_of_zeros_is_refused() -> None:
+def test_rotation_key_of_zeros_is_refused():
     file = animated("rotation", [[0, 0, 0, 1], [0, 0, 0, 0]])
     assert warned(file) == [("G005.animation", "/animations/0/samplers/0/output")]
 
 
-def test_keys_of_later_animations_are_read_when_played() -> None:
+def test_keys_of_later_animations_are_read_when_played():
     file = with_two(animated())
     sampler = file.root["animations"][1]["samplers"][0]
     sampler["output"] = file.accessor([[0, 0, 0], [np.nan, 0, 0]])
@@ -227,7 +226,7 @@ def test_keys_of_later_animations_are_read_when_played() -> None:
         {"name": 5},
     ],
 )
-def test_malformed_animation_is_omitted(change: dict[str, object]) -> None:
+def test_malformed_animation_is_omitted(change):
     file = with_two(animated())
     file.root["nodes"] = [{}]
     file.root["animations"][1]["channels"][0]["target"]["node"] = 0
@@ -236,9 +235,7 @@ def test_malformed_animation_is_omitted(change: dict[str, object]) -> None:
     assert [key for key, _ in warned(file)] == ["G005.animation"]
 
 
-def test_invalid_animation_does_not_block_the_others(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_invalid_animation_does_not_block_the_others(tmp_path, capsys):
     file = skinned()
     times = file.times([0.0, 1.0])
     turn, bad = file.accessor([[0, 0, 0, 1], [0, 0, 1, 0]]), file.accessor([0.0, 0.5])

@@ -379,9 +379,7 @@ def materials_of(source: Source) -> tuple[Material, ...]:
         ({"extensions": {"VRM": {"materialProperties": {}}}}, [False, True, False]),
     ],
 )
-def test_toon_materials_ignore_the_studio_light_with_a_note(
-    tmp_path: Path, members: dict[str, Any], unlit: list[bool]
-) -> None:
+def test_toon_materials_ignore_the_studio_light_with_a_note(tmp_path, members, unlit):
     color = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]}
     materials: list[dict[str, Any]] = [{"pbrMetallicRoughness": color} for _ in range(3)]
     if unlit[0] is False:
@@ -402,7 +400,7 @@ def _read(tmp_path: Path, **members: Any) -> Any:
     return materials_of(Source.open(path))[0]
 
 
-def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path: Path) -> None:
+def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path):
     toon = {"shadeColorFactor": [0.5, 0.25, 0.0], "shadingToonyFactor": 0.75}
     toon["shadingShiftFactor"] = -0.5
     material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
@@ -414,7 +412,7 @@ def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path: Path) ->
     assert plain.shade_range == pytest.approx((-0.1, 0.1), abs=1e-12)
 
 
-def test_old_toon_materials_have_srgb_colours_and_different_thresholds(tmp_path: Path) -> None:
+def test_old_toon_materials_have_srgb_colours_and_different_thresholds(tmp_path):
     told = {
         "shader": "VRM/MToon",
         "vectorProperties": {"_ShadeColor": [1.0, 0.5, 0.0, 1.0]},
@@ -439,7 +437,7 @@ def _old(tmp_path: Path, material: dict[str, Any], **told: Any) -> Any:
     )
 
 
-def test_old_textures_are_placed_like_the_main_texture(tmp_path: Path) -> None:
+def test_old_textures_are_placed_like_the_main_texture(tmp_path):
     """The offset is (0.25, 0.125) and the scale (2, 3), with v from the bottom of the image."""
     core = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
     place = {"vectorProperties": {"_MainTex": [0.25, 0.125, 2.0, 3.0]}}
@@ -450,7 +448,7 @@ def test_old_textures_are_placed_like_the_main_texture(tmp_path: Path) -> None:
     assert unlit.base_texture.matrix.tolist() == wanted and unlit.shade_color is None
 
 
-def test_old_materials_add_what_the_core_material_omits(tmp_path: Path) -> None:
+def test_old_materials_add_what_the_core_material_omits(tmp_path):
     told = {
         "textureProperties": {"_MainTex": 0, "_BumpMap": 1},
         "floatProperties": {"_BumpScale": 0.5, "_Cutoff": 0.25, "_CullMode": 0},
@@ -467,7 +465,7 @@ def test_old_materials_add_what_the_core_material_omits(tmp_path: Path) -> None:
         assert _old(tmp_path, {}, shader=f"VRM/Unlit{kind}").alpha_mode == mode
 
 
-def test_old_colours_replace_those_of_the_core_material(tmp_path: Path) -> None:
+def test_old_colours_replace_those_of_the_core_material(tmp_path):
     """Some exporters write an emission of 1 to the core material of every toon material."""
     core = {
         "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]},
@@ -483,7 +481,7 @@ def test_old_colours_replace_those_of_the_core_material(tmp_path: Path) -> None:
     assert _old(tmp_path, core, vectorProperties={"_Color": "red"}).emissive == (1.0, 1.0, 1.0)
 
 
-def test_invalid_toon_values_disable_the_shade(tmp_path: Path) -> None:
+def test_invalid_toon_values_disable_the_shade(tmp_path):
     toon = {"shadeColorFactor": "red", "shadingToonyFactor": 7}
     material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
     assert material.unlit and material.shade_color == (1.0, 1.0, 1.0)
@@ -500,7 +498,7 @@ def _warned(tmp_path: Path, **members: Any) -> tuple[Any, Any]:
     return found, note
 
 
-def test_rim_light_and_outline_are_read(tmp_path: Path) -> None:
+def test_rim_light_and_outline_are_read(tmp_path):
     toon = {
         "parametricRimColorFactor": [0.5, 0.25, 0.0],
         "parametricRimFresnelPowerFactor": 3.0,
@@ -521,13 +519,13 @@ def test_rim_light_and_outline_are_read(tmp_path: Path) -> None:
     assert note.values["names"] == []
 
 
-def test_defaults_are_those_of_the_extension(tmp_path: Path) -> None:
+def test_defaults_are_those_of_the_extension(tmp_path):
     found, _ = _warned(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": {}}}])
     assert found.outline is None and not found.rim.has_effect
     assert (found.rim.power, found.rim.lift, found.rim.mix) == (5.0, 0.0, 1.0)
 
 
-def test_members_that_are_not_drawn_are_listed(tmp_path: Path) -> None:
+def test_members_that_are_not_drawn_are_listed(tmp_path):
     toon = {
         "uvAnimationScrollXSpeedFactor": 0.5,
         "uvAnimationScrollYSpeedFactor": 0.0,
@@ -537,7 +535,7 @@ def test_members_that_are_not_drawn_are_listed(tmp_path: Path) -> None:
     assert note.values["names"] == ["uvAnimationScrollXSpeedFactor", "shadingShiftTexture"]
 
 
-def test_old_outlines_are_centimetres_or_hundredths_of_half_the_height(tmp_path: Path) -> None:
+def test_old_outlines_are_centimetres_or_hundredths_of_half_the_height(tmp_path):
     for mode, width in ((1, 0.004), (2, 0.002)):
         numbers = {"_OutlineWidthMode": mode, "_OutlineWidth": 0.4, "_ShadingGradeRate": 0.5}
         told = {
@@ -564,6 +562,6 @@ def test_old_outlines_are_centimetres_or_hundredths_of_half_the_height(tmp_path:
         {"matcapTexture": 3, "rimMultiplyTexture": {"index": "x"}},
     ],
 )
-def test_invalid_rim_lights_and_outlines_are_ignored(tmp_path: Path, toon: dict[str, Any]) -> None:
+def test_invalid_rim_lights_and_outlines_are_ignored(tmp_path, toon):
     found, _ = _warned(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
     assert found.outline is None and not found.rim.has_effect

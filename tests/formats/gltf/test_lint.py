@@ -15,7 +15,7 @@ from viewer.rig.skeleton import Skeleton
 
 
 @pytest.mark.parametrize("code", PLANTED)
-def test_planted_error_is_found(tmp_path: Path, code: str) -> None:
+def test_planted_error_is_found(tmp_path, code):
     made, pointer = PLANTED[code]
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
@@ -24,7 +24,7 @@ def test_planted_error_is_found(tmp_path: Path, code: str) -> None:
     assert (severity, path, pointer) in {(one.severity, one.file, one.pointer) for one in found}
 
 
-def test_valid_file_has_none_of_these_codes(tmp_path: Path) -> None:
+def test_valid_file_has_none_of_these_codes(tmp_path):
     path = tmp_path / "a.gltf"
     path.write_bytes(skinned().json())
     assert {finding.code for finding in lint_files([path])[1]}.isdisjoint(PLANTED)
@@ -38,9 +38,7 @@ def test_valid_file_has_none_of_these_codes(tmp_path: Path) -> None:
         (2, ["transform of a node with a skinned mesh: not used"]),
     ],
 )
-def test_transform_of_a_skinned_node_is_used_by_rigid_primitives(
-    tmp_path: Path, n_bound: int, messages: list[str]
-) -> None:
+def test_transform_of_a_skinned_node_is_used_by_rigid_primitives(tmp_path, n_bound, messages):
     file = skinned()
     bound = file.primitive
     rigid = {"attributes": {"POSITION": bound["attributes"]["POSITION"]}}
@@ -53,7 +51,7 @@ def test_transform_of_a_skinned_node_is_used_by_rigid_primitives(
     assert all(text in one for one, text in zip(found, messages, strict=True))
 
 
-def test_contents_without_a_figure_are_named(tmp_path: Path) -> None:
+def test_contents_without_a_figure_are_named(tmp_path):
     lens = {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}
     file = File(nodes=[{"camera": 0}, {"mesh": 0}], cameras=[lens])
     file.mesh()
@@ -65,7 +63,7 @@ def test_contents_without_a_figure_are_named(tmp_path: Path) -> None:
     assert "found only 1 primitive of lines, 1 camera, 2 nodes" in found.message
 
 
-def test_several_errors_are_found(tmp_path: Path) -> None:
+def test_several_errors_are_found(tmp_path):
     file = skinned()
     file.root["nodes"][1]["children"] = [2, 1]
     file.root["meshes"].append({"primitives": [{"attributes": {"POSITION": 99}}]})
@@ -76,7 +74,7 @@ def test_several_errors_are_found(tmp_path: Path) -> None:
     assert ("F002", "/meshes/1/primitives/0/attributes/POSITION") in found
 
 
-def test_findings_of_checks_have_a_json_pointer(tmp_path: Path) -> None:
+def test_findings_of_checks_have_a_json_pointer(tmp_path):
     file = skinned()
     file.root["nodes"][2]["name"] = "hip"
     # The first joint of the skin, node 1, has no name; the second is not at its bind position.
@@ -89,7 +87,7 @@ def test_findings_of_checks_have_a_json_pointer(tmp_path: Path) -> None:
     assert found["M005"].place(is_short=True) == "a.gltf#/meshes/0/primitives/0/attributes/POSITION"
 
 
-def test_findings_about_motion_refer_to_the_animation(tmp_path: Path) -> None:
+def test_findings_about_motion_refer_to_the_animation(tmp_path):
     # The node jumps by 1000 times the size of its mesh within a second.
     file = animated("translation", [[0, 0, 0], [1000, 0, 0]])
     file.mesh()
@@ -103,14 +101,14 @@ def test_findings_about_motion_refer_to_the_animation(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_errors_reported_by_the_validator_are_found(tmp_path: Path, fault: str) -> None:
+def test_errors_reported_by_the_validator_are_found(tmp_path, fault):
     made, code, pointer = FAULTS[fault]
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
     assert (code, pointer) in {(one.code, one.pointer) for one in lint_files([path])[1]}
 
 
-def test_valid_file_has_no_errors(tmp_path: Path) -> None:
+def test_valid_file_has_no_errors(tmp_path):
     file = skinned()
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
@@ -121,9 +119,7 @@ def test_valid_file_has_no_errors(tmp_path: Path) -> None:
     ("path", "end", "code"),
     [("translation", [1000, 0, 0], "C003"), ("rotation", [1, 0, 0, 0], "C004")],
 )
-def test_steps_between_keys_are_not_reported_as_jumps(
-    tmp_path: Path, path: str, end: list[float], code: str
-) -> None:
+def test_steps_between_keys_are_not_reported_as_jumps(tmp_path, path, end, code):
     rest = [0, 0, 0, 1] if path == "rotation" else [0, 0, 0]
     for interpolation, expected in (("LINEAR", True), ("STEP", False)):
         # Half a rotation takes 50 ms if it is interpolated.
@@ -152,16 +148,14 @@ def with_two_animations(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("playing", ["walk", "leap", "none"])
-def test_all_animations_are_checked(tmp_path: Path, playing: str) -> None:
+def test_all_animations_are_checked(tmp_path, playing):
     path = with_two_animations(tmp_path)
     settings = MotionSettings(animation=playing)
     (found,) = [one for one in lint_files([path], None, settings)[1] if one.code == "C003"]
     assert (found.place(), found.motion, found.animation) == (f"{path}#/animations/1", "leap", 1)
 
 
-def test_findings_in_animations_of_an_open_scene_have_the_pointers_of_the_file(
-    tmp_path: Path,
-) -> None:
+def test_findings_in_animations_of_an_open_scene_have_the_pointers_of_the_file(tmp_path):
     path = with_two_animations(tmp_path)
     scene = load(path)
     (found,) = [one for one in recheck(scene, [path]).findings if one.code == "C003"]
@@ -171,7 +165,7 @@ def test_findings_in_animations_of_an_open_scene_have_the_pointers_of_the_file(
     assert found.place() == f"{path}#/animations/1"
 
 
-def test_labels_of_many_joints_are_made_once(tmp_path: Path, monkeypatch) -> None:
+def test_labels_of_many_joints_are_made_once(tmp_path, monkeypatch):
     """A chain of 20,000 joints took minutes, as each joint without influence made all labels."""
     made: list[Skeleton] = []
     labels = skeleton._made_labels

@@ -25,14 +25,14 @@ def only(file: File) -> Primitive:
         (6, [[1, 2, 0], [2, 3, 0]]),
     ],
 )
-def test_modes_without_indices_are_read_as_triangles(mode: int, triangles: list[list[int]]) -> None:
+def test_modes_without_indices_are_read_as_triangles(mode, triangles):
     file = File()
     file.mesh(SQUARE)
     file.primitive["mode"] = mode
     assert only(file).triangles.tolist() == triangles
 
 
-def test_degenerate_triangles_of_strips_are_omitted() -> None:
+def test_degenerate_triangles_of_strips_are_omitted():
     file = File()
     file.mesh(SQUARE)
     file.primitive.update(mode=5, indices=file.accessor([0, 1, 2, 2, 1, 1, 3], "B"))
@@ -41,7 +41,7 @@ def test_degenerate_triangles_of_strips_are_omitted() -> None:
 
 
 @pytest.mark.parametrize("kind", ["B", "H", "I"])
-def test_indices_select_vertices(kind: str) -> None:
+def test_indices_select_vertices(kind):
     file = File()
     file.mesh(SQUARE)
     file.primitive["indices"] = file.accessor([3, 1, 0, 0, 2, 3, 1], kind)
@@ -49,7 +49,7 @@ def test_indices_select_vertices(kind: str) -> None:
     assert warned(file) == [("G002.corners", "/meshes/0/primitives/0/indices")]
 
 
-def test_points_and_lines_are_reported_once() -> None:
+def test_points_and_lines_are_reported_once():
     file = File()
     file.mesh()
     file.primitive["mode"] = 0
@@ -58,7 +58,7 @@ def test_points_and_lines_are_reported_once() -> None:
     assert warned(file) == [("F007.gltf-undrawn", "/meshes/0/primitives/0")]
 
 
-def test_primitives_that_share_vertices_keep_only_the_used_vertices() -> None:
+def test_primitives_that_share_vertices_keep_only_the_used_vertices():
     file = File()
     file.mesh(SQUARE, TEXCOORD_0=file.accessor([[0, 0], [1, 0], [0, 1], [1, 1]]))
     first = file.primitive
@@ -71,14 +71,14 @@ def test_primitives_that_share_vertices_keep_only_the_used_vertices() -> None:
     assert two.uvs[0].tolist() == [[1, 1], [0, 0], [1, 0]]
 
 
-def test_unused_vertices_of_other_primitives_are_kept() -> None:
+def test_unused_vertices_of_other_primitives_are_kept():
     file = File()
     file.mesh(SQUARE)
     file.primitive["indices"] = file.accessor([3, 1, 0], "B")
     assert only(file).positions.tolist() == SQUARE
 
 
-def test_v_is_0_at_the_bottom_of_images() -> None:
+def test_v_is_0_at_the_bottom_of_images():
     file = File()
     uvs = file.accessor([[0, 0], [255, 0], [0, 51]], "B", normalized=True)
     file.mesh(TEXCOORD_1=uvs)
@@ -87,7 +87,7 @@ def test_v_is_0_at_the_bottom_of_images() -> None:
     assert first.shape == (3, 2)  # materials refer to sets by number
 
 
-def test_colours_are_read_as_linear_with_opacity() -> None:
+def test_colours_are_read_as_linear_with_opacity():
     file = File()
     file.mesh(COLOR_0=file.accessor([[0.5, 0.25, 2], [0, 0, 0], [1, 1, 1]]))
     assert only(file).colors.tolist() == [[0.5, 0.25, 2, 1], [0, 0, 0, 1], [1, 1, 1, 1]]
@@ -97,7 +97,7 @@ def test_colours_are_read_as_linear_with_opacity() -> None:
     assert warned(file) == [("G002.normalized", "/accessors/0")]
 
 
-def test_quantised_attributes_are_read() -> None:
+def test_quantised_attributes_are_read():
     file = File(extensionsRequired=["KHR_mesh_quantization"])
     positions = file.accessor([[0, 0, 0, 0], [2, 0, 0, 0], [0, -3, 0, 0]], "h")
     file.root["accessors"][positions]["type"] = "VEC3"
@@ -113,7 +113,7 @@ def test_quantised_attributes_are_read() -> None:
     assert warned(file) == []
 
 
-def test_all_sets_of_influences_are_concatenated() -> None:
+def test_all_sets_of_influences_are_concatenated():
     file = skinned()
     attributes = file.primitive["attributes"]
     attributes["JOINTS_1"] = file.accessor([[1, 0, 9, 0]] * 3, "H")
@@ -124,7 +124,7 @@ def test_all_sets_of_influences_are_concatenated() -> None:
     assert warned(file) == []
 
 
-def test_joints_without_weights_are_ignored() -> None:
+def test_joints_without_weights_are_ignored():
     file = skinned()
     file.primitive["attributes"]["JOINTS_1"] = file.accessor([[1, 0, 0, 0]] * 3, "B")
     assert only(file).joints.shape == (3, 4)
@@ -135,7 +135,7 @@ def test_joints_without_weights_are_ignored() -> None:
     assert said == ["joints without weights, or weights without joints, in set 1: ignored"]
 
 
-def test_joints_must_exist_in_the_skin() -> None:
+def test_joints_must_exist_in_the_skin():
     file = skinned()
     joints = file.accessor([[0, 1, 0, 0], [0, 1, 0, 0], [0, 2, 7, 0]], "B")
     file.primitive["attributes"]["JOINTS_0"] = joints
@@ -161,7 +161,7 @@ def targets(file: File, **members: object) -> None:
     file.root["meshes"][0] |= members
 
 
-def test_morph_targets_are_read_with_names_and_weights() -> None:
+def test_morph_targets_are_read_with_names_and_weights():
     file = File(nodes=[{"mesh": 0, "weights": [0.5, 2]}])
     file.mesh()
     targets(file, weights=[0, 0.25], extras={"targetNames": ["up", "aside"]})
@@ -175,7 +175,7 @@ def test_morph_targets_are_read_with_names_and_weights() -> None:
     assert primitive.normal_targets.dense().tolist() == [[[1, 0, 0]] * 3, [[0, 0, 0]] * 3]
 
 
-def test_morph_target_names_are_read_from_several_places() -> None:
+def test_morph_target_names_are_read_from_several_places():
     file = File()
     file.mesh()
     targets(file)
@@ -187,7 +187,7 @@ def test_morph_target_names_are_read_from_several_places() -> None:
     assert read(file).meshes[0].target_names == ("", "aside")
 
 
-def test_wrong_number_of_morph_weights_is_a_warning() -> None:
+def test_wrong_number_of_morph_weights_is_a_warning():
     file = File()
     file.mesh()
     targets(file, weights=[1])
@@ -200,7 +200,7 @@ def test_wrong_number_of_morph_weights_is_a_warning() -> None:
     assert warned(file) == [("G002.weights", "/nodes/0/weights")]
 
 
-def test_primitives_must_have_the_same_morph_targets() -> None:
+def test_primitives_must_have_the_same_morph_targets():
     file = File()
     file.mesh()
     targets(file)
@@ -209,7 +209,7 @@ def test_primitives_must_have_the_same_morph_targets() -> None:
     assert refused(file) == ("F002.gltf-targets", "/meshes/0/primitives/1/targets")
 
 
-def test_non_finite_numbers_are_refused_or_replaced() -> None:
+def test_non_finite_numbers_are_refused_or_replaced():
     file = File()
     file.mesh([*TRIANGLE[:2], [0, np.nan, 0]])
     assert refused(file)[0] == "F003.gltf-positions"
@@ -237,7 +237,7 @@ def test_non_finite_numbers_are_refused_or_replaced() -> None:
         ({"targets": 1}, "F002.gltf-type", "/targets"),
     ],
 )
-def test_invalid_primitives_are_refused(members: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_primitives_are_refused(members, key, pointer):
     file = File()
     file.mesh()
     file.accessor([0, 1, 3, 0], "B")
@@ -255,18 +255,18 @@ def bound(matrices: list[list[float]]) -> File:
     return file
 
 
-def test_joints_and_matrices_are_read() -> None:
+def test_joints_and_matrices_are_read():
     [skin] = read(bound([MOVED, MOVED])).skins
     assert skin.joints.tolist() == [1, 2]
     assert skin.inverse_bind[1, :3, 3].tolist() == [1, 2, 3]
 
 
-def test_missing_matrices_are_the_identity() -> None:
+def test_missing_matrices_are_the_identity():
     [skin] = read(skinned()).skins
     assert skin.inverse_bind.tolist() == [np.eye(4).tolist()] * 2
 
 
-def test_surplus_matrices_are_ignored_with_a_warning() -> None:
+def test_surplus_matrices_are_ignored_with_a_warning():
     file = bound([MOVED] * 3)
     assert read(file).skins[0].inverse_bind.shape == (2, 4, 4)
     assert warned(file) == [("G004.bind-count", "/skins/0/inverseBindMatrices")]
@@ -281,7 +281,7 @@ def test_surplus_matrices_are_ignored_with_a_warning() -> None:
         ([[np.nan, *MOVED[1:]], MOVED], "F003.gltf-bind"),
     ],
 )
-def test_invalid_matrices_are_refused(matrices: list[list[float]], key: str) -> None:
+def test_invalid_matrices_are_refused(matrices, key):
     assert refused(bound(matrices)) == (key, "/skins/0/inverseBindMatrices")
 
 
@@ -295,13 +295,13 @@ def test_invalid_matrices_are_refused(matrices: list[list[float]], key: str) -> 
         ({"joints": [1, 2], "inverseBindMatrices": 0}, "F002.gltf-kind", "/inverseBindMatrices"),
     ],
 )
-def test_invalid_skins_are_refused(skin: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_skins_are_refused(skin, key, pointer):
     file = skinned()
     file.root["skins"] = [skin]
     assert refused(file) == (key, f"/skins/0{pointer}")
 
 
-def test_skin_without_joints_is_ignored() -> None:
+def test_skin_without_joints_is_ignored():
     file = skinned()
     file.root["skins"][0]["joints"] = []
     file.root["skins"].append({"joints": [2]})
@@ -312,7 +312,7 @@ def test_skin_without_joints_is_ignored() -> None:
     assert warned(file) == [("G004.no-joints", "/skins/0/joints")]
 
 
-def test_skeleton_that_is_not_a_node_is_ignored() -> None:
+def test_skeleton_that_is_not_a_node_is_ignored():
     file = skinned()
     file.root["skins"][0]["skeleton"] = 3
     assert warned(file) == [("G004.skeleton", "/skins/0/skeleton")]
@@ -340,14 +340,14 @@ def compressed(data: bytes = STREAM, **members: object) -> File:
     return file
 
 
-def test_positions_and_triangles_are_decoded() -> None:
+def test_positions_and_triangles_are_decoded():
     pytest.importorskip("DracoPy")
     [primitive] = read(compressed()).meshes[0].primitives
     assert primitive.positions.tolist() == SQUARE
     assert primitive.triangles.tolist() == [[0, 1, 2], [1, 3, 2]]
 
 
-def test_vertex_count_is_that_of_the_compressed_data() -> None:
+def test_vertex_count_is_that_of_the_compressed_data():
     pytest.importorskip("DracoPy")
     file = compressed()
     file.root["accessors"][0]["count"] = 2**40
@@ -367,12 +367,12 @@ def test_vertex_count_is_that_of_the_compressed_data() -> None:
         (compressed(bufferView=4), "F002.gltf-index", f"{POINTER}/bufferView"),
     ],
 )
-def test_invalid_data_are_refused(file: File, key: str, pointer: str) -> None:
+def test_invalid_data_are_refused(file, key, pointer):
     pytest.importorskip("DracoPy")
     assert refused(file) == (key, pointer)
 
 
-def test_uncompressed_data_are_required_without_the_library(monkeypatch) -> None:
+def test_uncompressed_data_are_required_without_the_library(monkeypatch):
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     assert refused(compressed()) == ("F002.gltf-draco", POINTER)
     file = compressed()

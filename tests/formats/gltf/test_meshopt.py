@@ -1,7 +1,6 @@
 """Compressed buffer views: streams written by meshoptimizer 1.0, and a group encoded by hand."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
@@ -52,12 +51,12 @@ def stream(text: str) -> np.ndarray:
     [(VERSION_0, SHORTS), (VERSION_1, SHORTS), (WITH_XOR, FLOATS)],
     ids=["version 0", "version 1", "version 1 with XOR"],
 )
-def test_attributes_are_decoded(text: str, expected: np.ndarray) -> None:
+def test_attributes_are_decoded(text, expected):
     found = decoded_attributes(stream(text), 20, 8)
     assert found is not None and found.tobytes() == expected.tobytes()
 
 
-def test_deltas_match_the_example_in_the_specification() -> None:
+def test_deltas_match_the_example_in_the_specification():
     group = "175ff0bc77a9210034b5"
     # One group of 4 bits is followed by three groups of zeros and an element of zeros.
     data = stream("a0" + "02" + group + "000000" + "00" * 32)
@@ -69,7 +68,7 @@ def test_deltas_match_the_example_in_the_specification() -> None:
 
 
 @pytest.mark.parametrize("stride", [2, 4])
-def test_triangles_and_indices_are_decoded(stride: int) -> None:
+def test_triangles_and_indices_are_decoded(stride):
     found = decoded_indices(stream(INDEX_STREAM), 18, stride)
     assert found is not None and found.view(f"<u{stride}").tolist() == TRIANGLES
     found = decoded_triangles(stream(TRIANGLE_STREAM), 18, stride)
@@ -126,8 +125,8 @@ def test_triangles_and_indices_are_decoded(stride: int) -> None:
     ids=["octahedral", "octahedral 16", "quaternion", "exponential", "color"],
 )
 def test_filters_match_the_values_given_to_the_encoder(
-    text: str, count: int, stride: int, name: str, dtype: str, expected: Any, step: int
-) -> None:
+    text, count, stride, name, dtype, expected, step
+):
     decoded = decoded_attributes(stream(text), count, stride)
     assert decoded is not None
     found = filtered(decoded, name, stride).view(dtype).reshape(count, -1).astype(np.float64)
@@ -137,7 +136,7 @@ def test_filters_match_the_values_given_to_the_encoder(
 
 
 @pytest.mark.parametrize("text", [VERSION_0, VERSION_1, WITH_XOR, TRIANGLE_STREAM, INDEX_STREAM])
-def test_damaged_streams_are_detected(text: str) -> None:
+def test_damaged_streams_are_detected(text):
     whole = stream(text)
     size = {"a": (20, 8), "e": (18, 4), "d": (18, 4)}[text[0]]
     decoders = {"a": decoded_attributes, "e": decoded_triangles, "d": decoded_indices}
@@ -182,7 +181,7 @@ def text_of(file: File) -> bytes:
 
 
 @pytest.mark.parametrize("extension", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
-def test_file_with_only_compressed_data_is_read(extension: str) -> None:
+def test_file_with_only_compressed_data_is_read(extension):
     [primitive] = read(text_of(compressed(extension))).meshes[0].primitives
     assert primitive.positions.tolist() == SHORTS[:, :3].tolist()
     assert rotated(primitive.triangles) == rotated(np.array(TRIANGLES))
@@ -203,7 +202,7 @@ def test_file_with_only_compressed_data_is_read(extension: str) -> None:
         ({"buffer": 7}, "F002.gltf-index", "/buffer"),
     ],
 )
-def test_invalid_compression_is_refused(members: dict[str, object], key: str, member: str) -> None:
+def test_invalid_compression_is_refused(members, key, member):
     file = compressed()
     file.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"].update(members)
     pointer = f"/bufferViews/0/extensions/EXT_meshopt_compression{member}"

@@ -44,7 +44,7 @@ def with_matrix(matrix: np.ndarray) -> NodeTree:
     return read(File(nodes=[{"matrix": columns}])).tree
 
 
-def test_tree_names_and_extras_are_read() -> None:
+def test_tree_names_and_extras_are_read():
     nodes = [
         {"name": "a", "children": [2]},
         {"children": [0], "extras": {"kind": 1}},
@@ -56,7 +56,7 @@ def test_tree_names_and_extras_are_read() -> None:
     assert tree.extras == {1: {"kind": 1}} and tree.extensions == {2: {"ODD": {"x": 2}}}
 
 
-def test_transforms_are_read() -> None:
+def test_transforms_are_read():
     nodes = [{}, {"translation": [1, 2, 3], "rotation": [0, 0, HALF, HALF], "scale": [2, 1, 1]}]
     tree = read(File(nodes=nodes)).tree
     assert local(tree, 0).tolist() == np.eye(4).tolist()
@@ -65,7 +65,7 @@ def test_transforms_are_read() -> None:
     assert np.abs(local(tree, 1) - expected).max() < 1e-15
 
 
-def test_quaternions_are_normalised() -> None:
+def test_quaternions_are_normalised():
     file = File(nodes=[{}, {"rotation": [0, 0, 3, 4]}, {"rotation": [0, 0, 0, 0]}])
     tree = read(file).tree
     assert tree.rotations[1] == pytest.approx([0, 0, 0.6, 0.8])
@@ -84,7 +84,7 @@ def test_quaternions_are_normalised() -> None:
     ],
     ids=["scaled", "mirrored", "mirrored and rotated", "flat", "zero"],
 )
-def test_matrices_are_decomposed(linear: list[list[float]]) -> None:
+def test_matrices_are_decomposed(linear):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = linear, (1, 2, 3)
     tree = with_matrix(matrix)
@@ -93,14 +93,14 @@ def test_matrices_are_decomposed(linear: list[list[float]]) -> None:
     assert np.abs(local(tree, 0) - matrix).max() < 1e-14
 
 
-def test_sheared_matrices_are_kept_exactly() -> None:
+def test_sheared_matrices_are_kept_exactly():
     matrix = np.array([[1, 0.5, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1.0]])
     tree = with_matrix(matrix)
     assert tree.matrices[0].tolist() == matrix.tolist()
     assert tree.translations.tolist() == [[0, 0, 0]] and tree.scales.tolist() == [[1, 1, 1]]
 
 
-def test_rounding_is_not_treated_as_shear() -> None:
+def test_rounding_is_not_treated_as_shear():
     # A rotation by 30 degrees, rounded to six digits as by exporters to text.
     matrix = np.eye(4)
     matrix[:2, :2] = [[0.866025, -0.5], [0.5, 0.866025]]
@@ -128,11 +128,11 @@ def test_rounding_is_not_treated_as_shear() -> None:
         ([{"matrix": [1] * 16}], "F002.gltf-affine", "/nodes/0/matrix"),
     ],
 )
-def test_invalid_nodes_are_refused(nodes: list[object], key: str, pointer: str) -> None:
+def test_invalid_nodes_are_refused(nodes, key, pointer):
     assert refused(File(nodes=nodes)) == (key, pointer)
 
 
-def test_all_errors_are_reported_if_errors_are_collected() -> None:
+def test_all_errors_are_reported_if_errors_are_collected():
     nodes = [{"children": [1, 1]}, {"children": [0]}, {"children": [1]}]
     source = Source("a.gltf", File(nodes=nodes).json(), diagnostics=Collector(keeps_errors=True))
     tree = read_nodes(source).tree
@@ -143,21 +143,21 @@ def test_all_errors_are_reported_if_errors_are_collected() -> None:
     assert tree.parents.tolist() == [-1, 0, -1]
 
 
-def test_deep_trees_are_read_without_recursion() -> None:
+def test_deep_trees_are_read_without_recursion():
     count = 20_000
     nodes = [{"children": [index + 1]} for index in range(count - 1)] + [{}]
     tree = read(File(nodes=nodes)).tree
     assert tree.parents.tolist() == list(range(-1, count - 1))
 
 
-def test_matrix_overrides_other_transforms() -> None:
+def test_matrix_overrides_other_transforms():
     columns = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]
     file = File(nodes=[{"matrix": columns, "translation": [1, 1, 1]}])
     assert read(file).tree.translations.tolist() == [[5, 0, 0]]
     assert warned(file) == [("G003.matrix-and", "/nodes/0/matrix")]
 
 
-def test_shown_roots_are_those_of_the_default_or_first_scene() -> None:
+def test_shown_roots_are_those_of_the_default_or_first_scene():
     nodes = [{"children": [1]}, {}, {}, {}]
     scenes = [{"nodes": [2]}, {"name": "main", "nodes": [3, 0]}]
     assert read(File(nodes=nodes)).roots == (0, 2, 3)
@@ -172,7 +172,7 @@ def test_shown_roots_are_those_of_the_default_or_first_scene() -> None:
     assert refused(File(nodes=nodes, scene=0)) == ("F002.gltf-index", "/scene")
 
 
-def test_cameras_are_read() -> None:
+def test_cameras_are_read():
     file = File(
         nodes=[{"camera": 1}],
         cameras=[
@@ -189,7 +189,7 @@ def test_cameras_are_read() -> None:
     assert warned(file) == [("G003.camera", "/cameras/2/perspective/yfov")]
 
 
-def test_application_data_are_preserved() -> None:
+def test_application_data_are_preserved():
     file = File(nodes=[{}], extras=[1], extensions={"VRMC_vrm": {"specVersion": "1.0"}})
     file.root["asset"]["generator"] = "by hand"
     content = read_nodes(source_of(file, "folder/hero.gltf"))
@@ -234,7 +234,7 @@ def center(view: Any) -> np.ndarray:
     return -view.rotation.T @ view.translation
 
 
-def test_camera_moves_with_its_joint(tmp_path: Path) -> None:
+def test_camera_moves_with_its_joint(tmp_path):
     scene = viewer.load(saved(carried(), tmp_path))
     (view,) = scene.views
     assert_allclose(center(view_in(view, scene)), [3, 3, 0], atol=1e-12)
@@ -249,7 +249,7 @@ def test_camera_moves_with_its_joint(tmp_path: Path) -> None:
     assert_allclose(center(drawn), [-2, 4, 0], atol=1e-12)
 
 
-def test_view_through_a_camera_follows_its_joint(tmp_path: Path) -> None:
+def test_view_through_a_camera_follows_its_joint(tmp_path):
     scene = viewer.load(saved(carried(), tmp_path))
     (view,) = scene.views
     camera = camera_from_view(view, SIZE, "y", seen=view_in(view, scene))
@@ -259,7 +259,7 @@ def test_view_through_a_camera_follows_its_joint(tmp_path: Path) -> None:
     assert_allclose(np.linalg.inv(camera.view_matrix())[:3, 3], [-2, 4, 0], atol=1e-12)
 
 
-def test_projection_is_that_of_gltf(tmp_path: Path) -> None:
+def test_projection_is_that_of_gltf(tmp_path):
     (view,) = viewer.load(saved(carried(), tmp_path)).views
     camera = camera_from_view(view, SIZE, "y")
     # x / (a tan(yfov / 2)) and y / tan(yfov / 2), divided by the distance 4 along -z.
@@ -270,7 +270,7 @@ def test_projection_is_that_of_gltf(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [(), ("--fps", "20")], ids=["keys", "frames"])
-def test_camera_is_written_below_its_joint(tmp_path: Path, options: tuple[str, ...]) -> None:
+def test_camera_is_written_below_its_joint(tmp_path, options):
     path = tmp_path / "b.glb"
     source = saved(carried(), tmp_path)
     assert run(["convert", str(source), "-o", str(path), *options]) == 0
@@ -286,9 +286,7 @@ def test_camera_is_written_below_its_joint(tmp_path: Path, options: tuple[str, .
     assert_allclose(center(view_in(scene.views[0], scene)), [-2, 4, 0], atol=1e-6)
 
 
-def test_helper_nodes_that_are_not_written_are_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_helper_nodes_that_are_not_written_are_named(tmp_path, capsys):
     file = skinned()
     file.root["nodes"] += [
         {"name": "Armature", "children": [0, 1], "extras": {"kind": 1}},
@@ -348,9 +346,7 @@ def assert_path(path: Path, atol: float = 1e-12) -> None:
 
 
 @pytest.mark.parametrize("only", [False, True])
-def test_animated_nodes_beside_figures_move_a_camera(
-    tmp_path: Path, only: bool, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_animated_nodes_beside_figures_move_a_camera(tmp_path, only, capsys):
     source = saved(dolly(only), tmp_path)
     assert_path(source, 1e-7)
     assert run(["info", str(source)]) == 0
@@ -358,7 +354,7 @@ def test_animated_nodes_beside_figures_move_a_camera(
     assert "Shot: 0 to 1 s" in said.out and "omitted" not in said.out + said.err
 
 
-def test_camera_keeps_its_own_animation_below_a_still_joint(tmp_path: Path) -> None:
+def test_camera_keeps_its_own_animation_below_a_still_joint(tmp_path):
     file = dolly()
     # The camera itself is animated, below a joint at (0, 1, 0) that stays at rest.
     file.root["nodes"][2]["children"] = [4]
@@ -371,9 +367,7 @@ def test_camera_keeps_its_own_animation_below_a_still_joint(tmp_path: Path) -> N
     assert_allclose(center(view_in(scene.views[0], scene)), [4, 1, 5], atol=1e-12)
 
 
-def test_animated_cameras_are_written_with_their_keys(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_animated_cameras_are_written_with_their_keys(tmp_path, capsys):
     source, path = saved(dolly(), tmp_path), tmp_path / "b.glb"
     assert run(["convert", str(source), "-o", str(path)]) == 0
     said = capsys.readouterr().out
@@ -387,9 +381,7 @@ def test_animated_cameras_are_written_with_their_keys(
 
 
 @pytest.mark.parametrize(("only", "options"), [(True, ()), (False, ("--fps", "20"))])
-def test_camera_motions_that_are_not_written_are_named(
-    tmp_path: Path, only: bool, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_camera_motions_that_are_not_written_are_named(tmp_path, only, options, capsys):
     source, path = saved(dolly(only), tmp_path), tmp_path / "b.glb"
     assert run(["convert", str(source), "-o", str(path), *options]) == 0
     assert "1 camera is written at the first frame only, without its motion: eye" in (
@@ -397,7 +389,7 @@ def test_camera_motions_that_are_not_written_are_named(
     )
 
 
-def test_videos_frame_the_whole_path_of_a_carried_camera(tmp_path: Path) -> None:
+def test_videos_frame_the_whole_path_of_a_carried_camera(tmp_path):
     scene = viewer.load(saved(dolly(), tmp_path))
     options = DisplayOptions(cameras=True)
     times = np.array([0.0, 1.0])

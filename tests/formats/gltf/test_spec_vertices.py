@@ -5,8 +5,6 @@ keeps the rest matrices of bones as head, tail and roll in single precision, so 
 only within 4e-5. With these matrices, the same formulas reproduce its vertices.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from spec_evaluator import Evaluator
@@ -45,7 +43,7 @@ def corners(figure: Figure, animation: int | None, time: float) -> np.ndarray:
         "vrm1_shared_mesh.vrm",
     ],
 )
-def test_vertices_match_the_specification(shared_data: Path, name: str) -> None:
+def test_vertices_match_the_specification(shared_data, name):
     path = shared_data / "gltf" / name
     plain, group = Evaluator(path), read(Source.open(path))
     assert isinstance(group, FigureGroup)

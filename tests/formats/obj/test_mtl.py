@@ -295,7 +295,7 @@ def test_statements_that_are_not_drawn_are_reported(read):
     assert read(text)[1] == ["F007.mtl-statements"]
 
 
-def test_missing_library_with_spaces_in_its_name_is_reported_once(tmp_path) -> None:
+def test_missing_library_with_spaces_in_its_name_is_reported_once(tmp_path):
     path = tmp_path / "a.obj"
     path.write_text(f"mtllib Part Studio 1.mtl\nusemtl a\n{FACE}f 1 2 3\n")
     source = Source.open(path)

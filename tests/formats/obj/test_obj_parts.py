@@ -11,7 +11,7 @@ def mesh_of(text: str) -> Mesh:
     return read(Source("a.obj", text.encode())).require_mesh()
 
 
-def test_several_objects_or_else_groups_are_parts() -> None:
+def test_several_objects_or_else_groups_are_parts():
     text = SQUARE + "f 1 2 3\no box\ng low\nf 1 2 4\ng high\nf 2 3 4\no lid\no ball\nf 1 3 4\n"
     mesh = mesh_of(text)
     assert mesh.parts == ("box", "ball")
@@ -23,7 +23,7 @@ def test_several_objects_or_else_groups_are_parts() -> None:
     assert mesh.parts == ()
 
 
-def test_faces_of_two_corners_are_omitted_without_moving_other_parts() -> None:
+def test_faces_of_two_corners_are_omitted_without_moving_other_parts():
     text = SQUARE + "f 1 2\no low\nf 1 2 3\nf 3 4\no high\nf 2\nf 2 3 4\n"
     source = Source("a.obj", text.encode())
     mesh = read(source).require_mesh()

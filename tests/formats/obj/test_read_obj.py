@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from faults import Fault, refusal_of
+from faults import refusal_of
 
 import viewer
 from viewer.errors import FormatError
@@ -29,7 +29,7 @@ def silent(text):
     return figure
 
 
-def test_triangles_keep_vertices_and_order() -> None:
+def test_triangles_keep_vertices_and_order():
     figure = silent(SQUARE + "f 1 2 3\nf 3 4 1\n")
     assert figure.mesh.positions.tolist() == [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [2, 3, 0]]
@@ -38,13 +38,13 @@ def test_triangles_keep_vertices_and_order() -> None:
     assert (figure.name, figure.up, figure.unit) == ("a", "y", "")
 
 
-def test_missing_normals_are_computed_and_listed_in_the_facts() -> None:
+def test_missing_normals_are_computed_and_listed_in_the_facts():
     figure = silent(SQUARE + "f 1 2 3\n")
     assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1]] * 3
     assert figure.facts == (("normals", "none in the file: computed from the triangles"),)
 
 
-def test_comments_may_follow_the_numbers_of_a_line() -> None:
+def test_comments_may_follow_the_numbers_of_a_line():
     text = (
         "# top\nv 0 0 0 # 7 8 9\nv 2 0 0#end\nv 2 2 0\nv 0 2 0 # last\n"
         "vt 0 1 # uv\no a#b\nusemtl c # d\nf 1/1 2/1 3/1 # 4/1\no e\nf 3/1 4/1 1/1\n"
@@ -57,7 +57,7 @@ def test_comments_may_follow_the_numbers_of_a_line() -> None:
         read("v 0 0 0 # 1\n# 2 3\nv 1 2 # 3\nf 1 2 1\n")
 
 
-def test_corners_refer_to_texture_coordinates_and_normals() -> None:
+def test_corners_refer_to_texture_coordinates_and_normals():
     text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt .5 .25 0\nvn 0 1 0\nvn 1 0 0\n"
     figure = silent(text + "f 1/1/1 2/2/2 3/3/1\nf 3/4/1 4/1/1 1/2/1\n")
     mesh = figure.mesh
@@ -66,14 +66,14 @@ def test_corners_refer_to_texture_coordinates_and_normals() -> None:
     assert mesh.normals.tolist() == [[0, 1, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]]
 
 
-def test_normals_without_texture_coordinates() -> None:
+def test_normals_without_texture_coordinates():
     mesh = silent(SQUARE + "vn 0 1 0\nf 1//1 2//1 3//1\n").mesh
     assert mesh.uvs is None
     # The fourth vertex has no normal and no triangle.
     assert mesh.normals.tolist() == [[0, 1, 0]] * 4
 
 
-def test_faces_with_different_corner_formats_may_be_mixed() -> None:
+def test_faces_with_different_corner_formats_may_be_mixed():
     figure, warnings = read(
         SQUARE + "vt 1 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1/1/1 3/1/1 4/1/1\nf 1 2 4"
     )
@@ -83,12 +83,12 @@ def test_faces_with_different_corner_formats_may_be_mixed() -> None:
     assert warnings == ["a.obj: 6 triangle corners without vt: 0 0 used"]
 
 
-def test_negative_indices_count_back_from_their_line() -> None:
+def test_negative_indices_count_back_from_their_line():
     text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -1 -3 -2\nf 1 -1 2\n"
     assert silent(text).mesh.triangles.tolist() == [[0, 1, 2], [3, 1, 2], [0, 3, 1]]
 
 
-def test_negative_indices_may_refer_to_earlier_chunks() -> None:
+def test_negative_indices_may_refer_to_earlier_chunks():
     # 40,000 quads with four vertices each span several chunks of the file.
     block = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n"
     mesh = silent(block * 40_000).mesh
@@ -97,11 +97,11 @@ def test_negative_indices_may_refer_to_earlier_chunks() -> None:
     assert np.array_equal(mesh.triangles[1::2], expected[:, [0, 2, 3]])
 
 
-def test_indices_may_point_forward() -> None:
+def test_indices_may_point_forward():
     assert silent("f 1 2 3\n" + SQUARE).mesh.triangles.tolist() == [[0, 1, 2]]
 
 
-def test_polygons_are_triangulated_and_counted() -> None:
+def test_polygons_are_triangulated_and_counted():
     text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 3 0\nv 0 2 0\nf 1 2 3 4 5\nf 1 2 3 5\nf 1 2 3\n"
     figure = silent(text)
     triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 1, 2], [0, 2, 4], [0, 1, 2]]
@@ -110,7 +110,7 @@ def test_polygons_are_triangulated_and_counted() -> None:
     assert ("polygons", text) in figure.facts
 
 
-def test_concave_quad_is_split_at_its_reflex_corner() -> None:
+def test_concave_quad_is_split_at_its_reflex_corner():
     # The fourth corner is inside the triangle of the others, so only its diagonal is inside the
     # quad.
     text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 0\nf 1 2 4 3\nf 4 3 1 2\nf 2 4 3 1\nf 3 1 2 4\n"
@@ -123,7 +123,7 @@ def test_concave_quad_is_split_at_its_reflex_corner() -> None:
 
 
 @pytest.mark.parametrize("turn", range(0, 12, 3))
-def test_concave_polygon_is_covered_exactly(turn: int) -> None:
+def test_concave_polygon_is_covered_exactly(turn):
     # A comb with three teeth has 12 corners in a slanted plane; the shoelace formula gives the
     # area.
     flat = [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3),
@@ -139,7 +139,7 @@ def test_concave_polygon_is_covered_exactly(turn: int) -> None:
     assert crosses.sum() == pytest.approx(shoelace)
 
 
-def test_polygon_with_very_many_corners_is_triangulated_quickly() -> None:
+def test_polygon_with_very_many_corners_is_triangulated_quickly():
     angles = np.linspace(0, 2 * np.pi, 60_000, endpoint=False)
     radii = 1.0 + 0.1 * np.cos(9 * angles)  # nine dents make it concave
     points = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
@@ -150,21 +150,21 @@ def test_polygon_with_very_many_corners_is_triangulated_quickly() -> None:
     assert time.process_time() - start < 5.0
 
 
-def test_triangles_of_a_closed_box_of_quads_enclose_its_volume() -> None:
+def test_triangles_of_a_closed_box_of_quads_enclose_its_volume():
     corners = "".join(f"v {x} {y} {z}\n" for x in (0, 2) for y in (0, 3) for z in (0, 5))
     quads = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
     mesh = silent(corners + quads).mesh
     assert volume(mesh.positions, mesh.triangles) == pytest.approx(30.0)
 
 
-def test_weights_of_vertices_are_ignored_with_a_note() -> None:
+def test_weights_of_vertices_are_ignored_with_a_note():
     figure, warnings = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1 2\nv 0 0 1 1\nf 1 2 3\n")
     assert figure.mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     assert warnings == ["a.obj:4: w of 1 vertex ignored"]
 
 
 @pytest.mark.parametrize(("half", "most"), [("0.5", "1"), ("127.5", "255")])
-def test_vertex_colours_are_converted_to_linear(half: str, most: str) -> None:
+def test_vertex_colours_are_converted_to_linear(half, most):
     """sRGB 0.5 is 0.2140 in linear light; vertices without a colour are white."""
     mesh = silent(
         f"v 0 0 0 {most} 0 {half}\nv 1 0 0\nv 0 1 0 0 {half} 0 0.25\nf 1 2 3\nf 3 2 1\n"
@@ -174,23 +174,23 @@ def test_vertex_colours_are_converted_to_linear(half: str, most: str) -> None:
     assert silent("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh.colors is None
 
 
-def test_continued_lines_comments_and_white_space_are_read() -> None:
+def test_continued_lines_comments_and_white_space_are_read():
     text = "# a comment \\\nstill one\r\n\n  v 0 \\\n  0 0\n\tv 1 0 0 \nv 0 1\\\r\n 0\nf 1 \\\n2 3"
     assert silent(text).mesh.triangles.tolist() == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize("end", ["\r\n", "\r", "\r\r\n"])
-def test_line_endings_may_vary(end: str) -> None:
+def test_line_endings_may_vary(end):
     mesh = silent((SQUARE + "f 1 2 3\n").replace("\n", end)).mesh
     assert mesh.positions.shape == (4, 3) and mesh.triangles.tolist() == [[0, 1, 2]]
 
 
-def test_unused_vertices_are_kept() -> None:
+def test_unused_vertices_are_kept():
     mesh = silent("v 9 9 9\n" + SQUARE + "f 2 3 4\n").mesh
     assert mesh.n_vertices == 5 and mesh.triangles.tolist() == [[1, 2, 3]]
 
 
-def test_vertex_with_several_normals_gets_their_mean() -> None:
+def test_vertex_with_several_normals_gets_their_mean():
     text = SQUARE + "vn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 3//1 4//1\nf 1//2 4//1 2//1\n"
     figure, warnings = read(text)
     # Two faces share the second normal, which is averaged once: (0, 1, 1) / sqrt(2).
@@ -205,7 +205,7 @@ def test_vertex_with_several_normals_gets_their_mean() -> None:
     ]
 
 
-def test_normals_of_length_0_are_computed() -> None:
+def test_normals_of_length_0_are_computed():
     figure, warnings = read(SQUARE + "vn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//2\n")
     assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1], [1, 0, 0], [1, 0, 0]]
     assert warnings == [
@@ -213,7 +213,7 @@ def test_normals_of_length_0_are_computed() -> None:
     ]
 
 
-def test_materials_apply_to_runs_of_triangles() -> None:
+def test_materials_apply_to_runs_of_triangles():
     figure = silent(
         SQUARE + "f 1 2 3\nusemtl red\nf 1 2 3\nf 1 2 4\nusemtl a b\nf 1 2 3\nusemtl red\nf 2 3 4"
     )
@@ -221,14 +221,14 @@ def test_materials_apply_to_runs_of_triangles() -> None:
     assert figure.mesh.material_indices.tolist() == [-1, 0, 0, 1, 0]
 
 
-def test_groups_are_used_as_materials_if_there_are_none() -> None:
+def test_groups_are_used_as_materials_if_there_are_none():
     figure = silent(SQUARE + "o body\nf 1 2 3\ng shoe\nf 1 2 3 4\no body\nf 2 3 4")
     assert [material.name for material in figure.mesh.materials] == ["body", "shoe"]
     assert figure.mesh.material_indices.tolist() == [0, 1, 1, 0]
     assert ("parts", "2 groups and objects") in figure.facts
 
 
-def test_groups_within_objects_are_named_as_ignored() -> None:
+def test_groups_within_objects_are_named_as_ignored():
     vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
     faces = "usemtl red\no body\ng arm\nf 1 2 3\ng leg\nf 1 3 2\no hat\ng hat\nf 2 3 1\n"
     figure, warnings = read(vertices + faces)
@@ -241,12 +241,12 @@ def test_groups_within_objects_are_named_as_ignored() -> None:
     assert not any("groups within" in str(warning) for warning in warnings)
 
 
-def test_single_object_is_not_used_as_a_material() -> None:
+def test_single_object_is_not_used_as_a_material():
     figure = silent("o body\n" + SQUARE + "s 1\nf 1 2 3\n")
     assert figure.mesh.materials == ()
 
 
-def test_textures_are_read_from_the_library(tmp_path) -> None:
+def test_textures_are_read_from_the_library(tmp_path):
     pixels = np.full((2, 2, 4), 255, np.uint8)
     (tmp_path / "two words.png").write_bytes(encode_png(pixels))
     (tmp_path / "m.mtl").write_text(
@@ -266,7 +266,7 @@ def test_textures_are_read_from_the_library(tmp_path) -> None:
     assert mesh.materials[1].image is None
 
 
-def test_missing_library_entries_are_reported(tmp_path) -> None:
+def test_missing_library_entries_are_reported(tmp_path):
     (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd gone.png\nnewmtl b\nmap_Kd ../b.png\n")
     text = SQUARE + "vt 0 0\nmtllib m.mtl none.mtl ../up.mtl\n"
     text += "".join(f"usemtl {name}\nf 1/1 2/1 3/1\n" for name in "abc")
@@ -285,7 +285,7 @@ def test_missing_library_entries_are_reported(tmp_path) -> None:
     ]
 
 
-def test_unsupported_elements_are_reported() -> None:
+def test_unsupported_elements_are_reported():
     text = SQUARE + "f 1 2 3\nl 1 2 3\nl 2 3\np 1\ncstype bezier\ncstype bezier\nvp 0 0\n"
     _, warnings = read(text)
     assert warnings == [
@@ -295,7 +295,7 @@ def test_unsupported_elements_are_reported() -> None:
     ]
 
 
-def test_file_with_only_points_is_read_with_a_warning() -> None:
+def test_file_with_only_points_is_read_with_a_warning():
     figure, warnings = read(SQUARE)
     assert figure.mesh.n_triangles == 0
     assert warnings == ["a.obj: no faces: 4 points, not drawn"]
@@ -367,17 +367,17 @@ def test_file_with_only_points_is_read_with_a_warning() -> None:
          ('F002.obj-corner', 5, {'found': b'99999999999999999999'})),
     ],
 )  # fmt: skip
-def test_invalid_files_are_reported_with_location_and_reason(text: str, fault: Fault) -> None:
+def test_invalid_files_are_reported_with_location_and_reason(text, fault):
     assert refusal_of(lambda: read(text)) == fault
 
 
-def test_format_is_detected_by_content_and_suffix() -> None:
+def test_format_is_detected_by_content_and_suffix():
     assert detect(Source("a.obj", b"# made by hand\n" + SQUARE.encode())) == "obj"
     assert detect(Source("a.txt", SQUARE.encode())) == "obj"
     assert detect(Source("a.obj", b"g nothing\n")) == "obj"
 
 
-def test_exported_files_round_trip(tmp_path) -> None:
+def test_exported_files_round_trip(tmp_path):
     actor = viewer.load().actors[0]
     viewer.export(actor, tmp_path / "fox.obj")
     scene = viewer.load(tmp_path / "fox.obj")
@@ -393,13 +393,13 @@ def test_exported_files_round_trip(tmp_path) -> None:
     assert np.array_equal(mesh.materials[0].image, written.materials[0].image)
 
 
-def test_exported_files_record_the_up_axis() -> None:
+def test_exported_files_record_the_up_axis():
     figure = silent("# pig: z up, metres\n" + SQUARE + "f 1 2 3\n")
     assert (figure.up, figure.unit) == ("z", "m")
 
 
 @pytest.mark.slow
-def test_randomly_damaged_file_is_refused_in_one_line_or_read() -> None:
+def test_randomly_damaged_file_is_refused_in_one_line_or_read():
     good = (
         SQUARE
         + "vt 0 0\nvt 1 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1 4/2/1\nf -1//1 -2//1 -3//1\n"
@@ -481,7 +481,7 @@ def test_invalid_corners_are_refused_at_their_line(face):
         mesh_of_faces(face + "\n")
 
 
-def test_normals_of_many_vertices_are_averaged_without_overflow() -> None:
+def test_normals_of_many_vertices_are_averaged_without_overflow():
     # The number of pairs of 50,000 vertices and 50,000 normals does not fit into 32 bits.
     count = 50_000
     text = "v 0 0 0\n" * (count - 3) + "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -525,7 +525,7 @@ def test_table_is_widened_for_large_numbers():
     assert table.rows().tolist() == [1, 1 << 40]
 
 
-def test_hard_edges_of_large_meshes_get_mean_normals() -> None:
+def test_hard_edges_of_large_meshes_get_mean_normals():
     # The product of the numbers of vertices and normals does not fit into 32 bits.
     count = 50_000
     places = "".join(f"v {n} {n % 7} {n % 3}\n" for n in range(count))

@@ -36,7 +36,7 @@ TEXT = pickle.dumps({"v": np.arange(3), "t": "grün", "n": [1.5, 1 << 40, True, 
 
 
 @pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
-def test_file_truncated_anywhere_is_read_or_refused_in_one_line(data: bytes) -> None:
+def test_file_truncated_anywhere_is_read_or_refused_in_one_line(data):
     self_contained(data)
     for length in range(len(data)):
         with pytest.raises(FormatError) as caught:
@@ -45,14 +45,14 @@ def test_file_truncated_anywhere_is_read_or_refused_in_one_line(data: bytes) -> 
 
 
 @pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
-def test_file_with_any_byte_changed_is_read_or_refused_in_one_line(data: bytes) -> None:
+def test_file_with_any_byte_changed_is_read_or_refused_in_one_line(data):
     for place in range(len(data)):
         for change in (0x01, 0x20, 0x80, 0xFF):
             self_contained(data[:place] + bytes([data[place] ^ change]) + data[place + 1 :])
 
 
 @pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
-def test_file_with_random_damage_is_read_or_refused_in_one_line(data: bytes) -> None:
+def test_file_with_random_damage_is_read_or_refused_in_one_line(data):
     dice = random.Random(len(data))
     for _ in range(1500):
         damaged = bytearray(data)
@@ -65,7 +65,7 @@ def test_file_with_random_damage_is_read_or_refused_in_one_line(data: bytes) -> 
         self_contained(bytes(damaged))
 
 
-def test_random_opcodes_are_read_or_refused_in_one_line() -> None:
+def test_random_opcodes_are_read_or_refused_in_one_line():
     dice = random.Random(1)
     steps = b"(0123NKMJ)]}taeuslbdR\x81\x85\x86\x87\x88\x93qhj\x94\x95co"
     names = [named("numpy", "dtype"), named("chumpy.ch", "Ch"), named("numpy", "ndarray")]

@@ -84,20 +84,20 @@ def values(data: bytes, key: str = "v") -> Any:
     return loaded
 
 
-def test_protocol_0_of_python_2_is_read() -> None:
+def test_protocol_0_of_python_2_is_read():
     assert_array_equal(values(PYTHON_2_TEXT), [[1.5, -2.0]])
 
 
-def test_protocol_0_escapes_quotes_and_backslashes() -> None:
+def test_protocol_0_escapes_quotes_and_backslashes():
     data = b"(dp1\nS'v'\n" + rb"""S"it's \\ \x41\n\t\'" """.strip() + b"\ns."
     assert opened(data).get("v") == "it's \\ A\n\t'"
 
 
-def test_protocol_1_of_python_2_is_read() -> None:
+def test_protocol_1_of_python_2_is_read():
     assert_array_equal(values(b"}q\x01U\x01vq\x02" + array(ROWS) + b"s."), ROWS)
 
 
-def test_protocol_2_of_python_2_is_read() -> None:
+def test_protocol_2_of_python_2_is_read():
     assert_array_equal(values(saved(v=array(ROWS))), ROWS)
 
 
@@ -121,14 +121,14 @@ def test_protocol_2_of_python_2_is_read() -> None:
     ],
     ids=lambda given: f"{given.dtype.str}-{given.shape}",
 )
-def test_every_protocol_of_python_3_is_read(given: Any, protocol: int) -> None:
+def test_every_protocol_of_python_3_is_read(given, protocol):
     found = values(pickle.dumps({"v": given}, protocol))
     assert_array_equal(found, given)
     assert found.dtype == given.dtype.newbyteorder("=")
 
 
 @pytest.mark.parametrize("protocol", [2, 4, 5])
-def test_module_names_of_numpy_1_are_read(protocol: int) -> None:
+def test_module_names_of_numpy_1_are_read(protocol):
     data = pickle.dumps({"v": ROWS, "s": np.float32(0.5)}, protocol)
     if protocol > 2:
         data = unframed(data)
@@ -141,7 +141,7 @@ def test_module_names_of_numpy_1_are_read(protocol: int) -> None:
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 5])
-def test_plain_data_are_read(protocol: int) -> None:
+def test_plain_data_are_read(protocol):
     given = {
         "text": "grün €",
         "bytes": b"\x00\xff",
@@ -157,7 +157,7 @@ def test_plain_data_are_read(protocol: int) -> None:
         assert archive.get(key) == value, key
 
 
-def test_numpy_scalars_are_read_as_python_numbers() -> None:
+def test_numpy_scalars_are_read_as_python_numbers():
     given = {"f": np.float64(1.5), "i": np.int32(-7), "b": np.True_, "s": np.str_("x"), "e": ""}
     for protocol in (0, 2, 5):
         archive = opened(pickle.dumps(given, protocol))
@@ -165,7 +165,7 @@ def test_numpy_scalars_are_read_as_python_numbers() -> None:
         assert type(archive.get("f")) is float
 
 
-def test_sets_and_ordered_dicts_of_python_2_are_read() -> None:
+def test_sets_and_ordered_dicts_of_python_2_are_read():
     items = b"](" + text("b") + text("a") + b"e"
     pairs = b"](](" + text("k") + whole(1) + b"ee"
     data = saved(
@@ -177,25 +177,25 @@ def test_sets_and_ordered_dicts_of_python_2_are_read() -> None:
     assert archive.get("d") == {"k": 1}
 
 
-def test_sets_of_protocol_4_are_read_as_lists() -> None:
+def test_sets_of_protocol_4_are_read_as_lists():
     archive = opened(pickle.dumps({"s": {1}, "f": frozenset({2})}, 4))
     assert (archive.get("s"), archive.get("f")) == ([1], [2])
 
 
-def test_python_2_strings_are_read_as_latin_1() -> None:
+def test_python_2_strings_are_read_as_latin_1():
     assert opened(finished(b"}" + text("gr\xfcn") + text("\xe9") + b"s")).get("grün") == "é"
 
 
-def test_protocol_0_text_may_have_any_character() -> None:
+def test_protocol_0_text_may_have_any_character():
     data = b"(dp0\nV\\u20ac\np1\nVgr\xfcn\ns."
     assert opened(data).get("€") == "grün"
 
 
-def test_names_may_be_byte_strings() -> None:
+def test_names_may_be_byte_strings():
     assert opened(pickle.dumps({b"v": 1})).get("v") == 1
 
 
-def test_arrays_are_views_of_the_file() -> None:
+def test_arrays_are_views_of_the_file():
     data = saved(v=array(ROWS))
     found = values(data)
     base = found
@@ -205,7 +205,7 @@ def test_arrays_are_views_of_the_file() -> None:
     assert frozen("v", found, (4, 3)) is found
 
 
-def test_pickled_values_are_read_once() -> None:
+def test_pickled_values_are_read_once():
     archive = opened(saved(v=array(ROWS)))
     later = archive.get("v")
     assert isinstance(later, Deferred)
@@ -214,7 +214,7 @@ def test_pickled_values_are_read_once() -> None:
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 4])
-def test_objects_pickled_by_python_are_read(monkeypatch: pytest.MonkeyPatch, protocol: int) -> None:
+def test_objects_pickled_by_python_are_read(monkeypatch, protocol):
     sparse = fake_class(monkeypatch, "scipy.sparse.csc", "csc_matrix")()
     sparse.__dict__ = {"_shape": (1, 1), "data": np.ones(1), "indices": np.zeros(1, "i4")}
     sparse.indptr = np.array([0, 1], "i4")
@@ -236,17 +236,17 @@ def ch(inner: bytes) -> bytes:
     return created("chumpy.ch", "Ch", mapping(x=inner, _dirty_vars=whole(0)))
 
 
-def test_chumpy_selection_of_an_array_is_read() -> None:
+def test_chumpy_selection_of_an_array_is_read():
     found = values(saved(v=select(ch(array(ROWS)), [0, 3, 11, 0], 2, 2)))
     assert found.tolist() == [[0, 0.375], [1.375, 0]]
 
 
-def test_chumpy_selection_of_a_selection_is_read() -> None:
+def test_chumpy_selection_of_a_selection_is_read():
     inner = select(array(ROWS), [5, 6, 7], 3)
     assert values(saved(v=ch(select(inner, [2, 0], 2)))).tolist() == [0.875, 0.625]
 
 
-def test_chumpy_handle_is_read() -> None:
+def test_chumpy_handle_is_read():
     data = saved(v=created("chumpy.ch", "ChHandle", mapping(x=ch(array(ROWS)))))
     assert_array_equal(values(data), ROWS)
 
@@ -262,7 +262,7 @@ def test_chumpy_handle_is_read() -> None:
         ("chumpy.reordering", "AtleastNd"),
     ],
 )
-def test_other_chumpy_expressions_are_not_computed(module: str, name: str) -> None:
+def test_other_chumpy_expressions_are_not_computed(module, name):
     built = created(module, name, mapping(a=ch(array(ROWS)), b=ch(array(ROWS))))
     archive = opened(saved(v=built, w=ch(built), x=select(built, [0], 1), good=array(ROWS)))
     what = Phrase("{name} expression", name=f"{module}.{name}")
@@ -277,7 +277,7 @@ def test_other_chumpy_expressions_are_not_computed(module: str, name: str) -> No
     )
 
 
-def test_object_arrays_are_opaque() -> None:
+def test_object_arrays_are_opaque():
     given = {"v": np.array({"L_Hip": 1}, dtype=object), "w": np.array([[1], None], dtype=object)}
     for protocol in (2, 5):
         archive = opened(pickle.dumps(given, protocol))
@@ -294,21 +294,21 @@ def test_object_arrays_are_opaque() -> None:
     ],
     ids=["record", "void", "complex", "date"],
 )
-def test_arrays_of_other_types_are_opaque(given: Any, what: Phrase) -> None:
+def test_arrays_of_other_types_are_opaque(given, what):
     assert opened(pickle.dumps({"v": given}, 2)).get("v") == Opaque(what)
 
 
-def test_lists_of_arrays_are_read_as_lists() -> None:
+def test_lists_of_arrays_are_read_as_lists():
     found = opened(saved(v=b"](" + array(ROWS) * 2 + b"e")).get("v")
     assert isinstance(found, list)
     assert [part.shape for part in found] == [(4, 3), (4, 3)]
 
 
-def test_bool_bytes_other_than_0_and_1_are_true() -> None:
+def test_bool_bytes_other_than_0_and_1_are_true():
     assert values(saved(v=array_of((3,), b"\0\1\7", "b1", "|"))).tolist() == [False, True, True]
 
 
-def test_invalid_code_points_are_refused() -> None:
+def test_invalid_code_points_are_refused():
     line = refusal(saved(v=array_of((1,), b"\xff\xff\xff\x7f", "U1")))
     assert line == (
         "F002.archive-value",
@@ -317,25 +317,25 @@ def test_invalid_code_points_are_refused() -> None:
     )
 
 
-def test_old_dtype_without_state_is_read() -> None:
+def test_old_dtype_without_state_is_read():
     plain = named("numpy", "dtype") + several(text("f8"), b"\x89", b"\x88") + b"R"
     built = array(ROWS).replace(element_type(), plain)
     assert plain in built
     assert_array_equal(values(saved(v=built)), ROWS)
 
 
-def test_array_bytes_stored_as_unicode_are_read() -> None:
+def test_array_bytes_stored_as_unicode_are_read():
     built = array(ROWS).replace(payload(ROWS.tobytes()), unicode(ROWS.tobytes().decode("latin-1")))
     assert_array_equal(values(saved(v=built)), ROWS)
 
 
-def test_bytes_after_the_end_are_reported_in_a_warning() -> None:
+def test_bytes_after_the_end_are_reported_in_a_warning():
     source = Source("model.pkl", saved(v=whole(1)) + b"more")
     assert open_archive(source).get("v") == 1
     assert warnings_of(source.diagnostics) == [("F006.pickle-rest", None, {"n": 4})]
 
 
-def test_synthetic_pickle_equals_its_npz() -> None:
+def test_synthetic_pickle_equals_its_npz():
     folder = DATA / "smpl_synthetic"
     if not folder.is_dir():
         pytest.skip("no synthetic model next to the checkout")
@@ -350,7 +350,7 @@ def test_synthetic_pickle_equals_its_npz() -> None:
     assert_array_equal(weights, dense.array("J_regressor").values()[rows, columns])
 
 
-def test_pig_pickle_has_the_published_shapes() -> None:
+def test_pig_pickle_has_the_published_shapes():
     path = DATA / "pig" / "PIG_core.pkl"
     if not path.is_file():
         pytest.skip("no PIG model next to the checkout")
@@ -370,7 +370,7 @@ def test_pig_pickle_has_the_published_shapes() -> None:
     ],
 )
 @pytest.mark.parametrize("shape_key", ["_shape", "shape"])
-def test_sparse_columns_are_read(module: str, name: str, shape_key: str) -> None:
+def test_sparse_columns_are_read(module, name, shape_key):
     found = opened(saved(v=matrix(module=module, name=name, shape_key=shape_key))).get("v")
     assert isinstance(found, Sparse)
     assert (found.shape, found.layout) == ((2, 3), "csc")
@@ -378,7 +378,7 @@ def test_sparse_columns_are_read(module: str, name: str, shape_key: str) -> None
 
 
 @pytest.mark.parametrize("module", ["scipy.sparse.csr", "scipy.sparse._csr"])
-def test_sparse_rows_are_read(module: str) -> None:
+def test_sparse_rows_are_read(module):
     built = matrix(sides=(3, 2), module=module, name="csr_matrix")
     found = opened(saved(v=built)).sparse("v", ("J", "V"))
     assert (found.shape, found.layout) == ((3, 2), "csr")
@@ -394,7 +394,7 @@ def entries(rows: bytes, columns: bytes, is_new: bool, name: str = "coo_matrix")
 
 
 @pytest.mark.parametrize("is_new", [True, False])
-def test_sparse_entries_are_read(is_new: bool) -> None:
+def test_sparse_entries_are_read(is_new):
     rows, columns = array(np.array([1, 0, 0], "i4")), array(np.array([1, 1, 1], "i4"))
     archive = opened(saved(v=entries(rows, columns, is_new)))
     found = archive.sparse("v", ("J", "V"))
@@ -403,7 +403,7 @@ def test_sparse_entries_are_read(is_new: bool) -> None:
 
 
 @pytest.mark.parametrize("places", [([1, 2, 0], [1, 1, 1]), ([1, 0, 0], [1, -1, 1]), ([0], [0])])
-def test_sparse_entries_outside_the_matrix_are_refused(places: tuple[list[int], ...]) -> None:
+def test_sparse_entries_outside_the_matrix_are_refused(places):
     rows, columns = (array(np.array(each, "i4")) for each in places)
     with pytest.raises(FormatError) as refused:
         opened(saved(v=entries(rows, columns, is_new=True))).sparse("v")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults import Fault
 from formats.pickle_bytes import (
     array,
     created,
@@ -52,7 +51,7 @@ def written(marker: Path) -> str:
     return f"__import__('pathlib').Path({str(marker)!r}).touch()"
 
 
-def test_attacks_in_this_file_work_with_the_standard_unpickler(tmp_path: Path) -> None:
+def test_attacks_in_this_file_work_with_the_standard_unpickler(tmp_path):
     path = tmp_path / "proof"
     pickle.loads(saved(v=reduced("builtins", "eval", text(written(path)))))
     assert path.exists()
@@ -106,7 +105,7 @@ def test_attacks_in_this_file_work_with_the_standard_unpickler(tmp_path: Path) -
         ("numpy.ndarray", ""),
     ],
 )
-def test_globals_outside_the_table_are_refused(module: str, name: str, marker: Path) -> None:
+def test_globals_outside_the_table_are_refused(module, name, marker):
     argument = text(written(marker))
     problem = Phrase(
         'expected arrays and plain data, found the global "{name}", which is not allowed; '
@@ -156,7 +155,7 @@ CODE = text("f8")
         "chumpy.ch.Ch")})),
     ],
 )  # fmt: skip
-def test_calls_of_non_functions_are_refused(body: bytes, line: Fault) -> None:
+def test_calls_of_non_functions_are_refused(body, line):
     assert refusal(saved(v=body)) == line
 
 
@@ -196,9 +195,7 @@ RECONSTRUCT = ("numpy.core.multiarray", "_reconstruct")
         ("numpy.core.multiarray", "scalar", [text("f8"), text("x" * 8)], "a string, a string"),
     ],
 )  # fmt: skip
-def test_unusual_arguments_are_refused(
-    module: str, name: str, arguments: list[bytes], found: str
-) -> None:
+def test_unusual_arguments_are_refused(module, name, arguments, found):
     key, _, values = refusal(saved(v=reduced(module, name, *arguments)))
     problem = values["problem"]
     assert (key, problem.sentence) == (
@@ -230,7 +227,7 @@ def test_unusual_arguments_are_refused(
          {"problem": "expected a new instance of a known class, found a list"})),
     ],
 )  # fmt: skip
-def test_new_objects_of_other_classes_are_refused(body: bytes, found: Fault) -> None:
+def test_new_objects_of_other_classes_are_refused(body, found):
     assert refusal(saved(v=body)) == found
 
 
@@ -272,11 +269,11 @@ SLOTS = several(b"N", mapping(toarray=whole(1)))
          {"problem": "expected the state of a dtype, found a tuple"})),
     ],
 )  # fmt: skip
-def test_malformed_states_are_refused(body: bytes, line: Fault) -> None:
+def test_malformed_states_are_refused(body, line):
     assert refusal(saved(v=body)) == line
 
 
-def test_states_set_no_attributes_of_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_set_no_attributes_of_objects(monkeypatch):
     state = mapping(
         x=array(np.ones(2)),
         __class__=whole(1),
@@ -292,7 +289,7 @@ def test_states_set_no_attributes_of_objects(monkeypatch: pytest.MonkeyPatch) ->
     assert archive.get("b") == Opaque("chumpy.ch.Ch without values")
 
 
-def test_pickles_share_no_state() -> None:
+def test_pickles_share_no_state():
     refusal(saved(v=named(*MATRIX) + mapping(role=text("x")) + b"b"))
     assert opened(saved(v=matrix())).sparse("v").shape == (2, 3)
 
@@ -323,7 +320,7 @@ def test_pickles_share_no_state() -> None:
         "buffer, which is not allowed; nothing was executed")})),
     ],
 )  # fmt: skip
-def test_opcodes_with_out_of_range_references_are_refused(body: bytes, found: Fault) -> None:
+def test_opcodes_with_out_of_range_references_are_refused(body, found):
     assert refusal(saved(v=body)) == found
 
 
@@ -423,5 +420,5 @@ def test_opcodes_with_out_of_range_references_are_refused(body: bytes, found: Fa
     ],
     ids=lambda value: repr(value[:12]),
 )  # fmt: skip
-def test_damaged_opcodes_are_refused(body: bytes, line: Fault) -> None:
+def test_damaged_opcodes_are_refused(body, line):
     assert refusal(b"\x80\x02}" + text("vv") + body + b"s.") == line

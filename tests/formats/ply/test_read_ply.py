@@ -69,7 +69,7 @@ def binary(order, elements, comments=()) -> bytes:
     return "\n".join([*lines, "end_header\n"]).encode() + body
 
 
-def test_ascii_file_is_read() -> None:
+def test_ascii_file_is_read():
     figure = silent(GOOD)
     assert figure.mesh.positions.tolist() == SQUARE
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
@@ -84,9 +84,7 @@ def test_ascii_file_is_read() -> None:
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize("number", ["float", "double", "short"])
 @pytest.mark.parametrize("index", ["uchar", "short", "int", "uint"])
-def test_binary_file_of_every_type_and_byte_order_is_read(
-    order: str, number: str, index: str
-) -> None:
+def test_binary_file_of_every_type_and_byte_order_is_read(order, number, index):
     vertices = [[x, y, z] for x, y, z in [(0, 0, 0), (2, 0, 0), (2, 2, 0), (-3, 2, 7)]]
     faces = [[[0, 1, 2]], [[0, 2, 3]]]
     data = binary(
@@ -102,7 +100,7 @@ def test_binary_file_of_every_type_and_byte_order_is_read(
 
 
 @pytest.mark.parametrize("order", "<>")
-def test_properties_may_be_in_any_order_and_unknown_elements_are_skipped(order: str) -> None:
+def test_properties_may_be_in_any_order_and_unknown_elements_are_skipped(order):
     data = binary(
         order,
         [
@@ -126,7 +124,7 @@ def test_properties_may_be_in_any_order_and_unknown_elements_are_skipped(order: 
     assert warnings == [unused("element camera", "vertex red", "face flags", "face quality")]
 
 
-def test_vertex_colours_are_converted_to_linear() -> None:
+def test_vertex_colours_are_converted_to_linear():
     """sRGB 188 is 0.5029 in linear light, and 0.5 is 0.2140; floats are clamped to 0 to 1."""
     triangle = ("face", ["list uchar uchar vertex_indices"], [[[0, 1, 2]]])
     places = ["float x", "float y", "float z"]
@@ -144,7 +142,7 @@ def test_vertex_colours_are_converted_to_linear() -> None:
     np.testing.assert_allclose(figure.mesh.colors, wanted, atol=1e-6)
 
 
-def test_texture_replaces_vertex_colours(tmp_path) -> None:
+def test_texture_replaces_vertex_colours(tmp_path):
     (tmp_path / "a.png").write_bytes(encode_png(np.full((1, 1, 4), 255, np.uint8)))
     names = ["float x", "float y", "float z", "float s", "float t", "uchar red", "uchar green"]
     rows = [[0, 0, 0, 0, 0, 9, 9, 9], [1, 0, 0, 0, 0, 9, 9, 9], [0, 1, 0, 0, 0, 9, 9, 9]]
@@ -158,14 +156,14 @@ def test_texture_replaces_vertex_colours(tmp_path) -> None:
     assert read(data, tmp_path / "a.ply")[0].mesh.colors is not None
 
 
-def test_trailing_ctrl_z_byte_of_binary_data_is_kept() -> None:
+def test_trailing_ctrl_z_byte_of_binary_data_is_kept():
     data = binary("<", [("vertex", ["float x", "float y", "uchar z"], [[0, 0, 26]] * 3),
                         ("face", ["list uchar uchar vertex_indices"], [])])  # fmt: skip
     mesh, _ = read(data)
     assert mesh.mesh.positions[:, 2].tolist() == [26] * 3
 
 
-def test_texture_coordinates_per_corner_are_read_as_seams() -> None:
+def test_texture_coordinates_per_corner_are_read_as_seams():
     data = binary(
         "<",
         [
@@ -184,7 +182,7 @@ def test_texture_coordinates_per_corner_are_read_as_seams() -> None:
     assert len(mesh.uvs) == 5  # (1, 1) is shared by two corners
 
 
-def test_texture_coordinates_other_than_two_per_corner_are_ignored() -> None:
+def test_texture_coordinates_other_than_two_per_corner_are_ignored():
     text = GOOD.replace("indices\nend", "indices\nproperty list uchar float texcoord\nend")
     text = text.replace("3 0 1 2\n", "3 0 1 2 0\n").replace("0 1 2 3\n", "0 1 2 3 2 .5 .5\n")
     figure, warnings = read(text)
@@ -193,7 +191,7 @@ def test_texture_coordinates_other_than_two_per_corner_are_ignored() -> None:
     assert warnings == [texcoord, unused("face texcoord")]
 
 
-def test_texture_name_is_read_from_a_comment(tmp_path) -> None:
+def test_texture_name_is_read_from_a_comment(tmp_path):
     pixels = np.full((2, 2, 4), 128, np.uint8)
     (tmp_path / "my skin.png").write_bytes(encode_png(pixels))
     text = GOOD.replace("float z\n", "float z\nproperty float u\nproperty float v\n")
@@ -209,7 +207,7 @@ def test_texture_name_is_read_from_a_comment(tmp_path) -> None:
     assert mesh.material_indices.tolist() == [0, 0, 0]
 
 
-def test_header_line_endings_may_vary() -> None:
+def test_header_line_endings_may_vary():
     assert silent(GOOD.replace("\n", "\r\n")).mesh.n_triangles == 3
     assert silent(GOOD.replace("\n", "\r")).mesh.n_triangles == 3
     rows = [[10.0, 0, 0]] * 3  # the bytes of value 10 must not be read as line ends
@@ -221,19 +219,19 @@ def test_header_line_endings_may_vary() -> None:
     assert read(carriage)[0].mesh.positions.tolist() == [[10, 1, 2]] * 3
 
 
-def test_file_with_only_points_is_read_with_a_warning() -> None:
+def test_file_with_only_points_is_read_with_a_warning():
     figure, warnings = read(f"{HEAD}{VERTEX}end_header\n{POINTS}")
     assert figure.mesh.n_vertices == 4 and figure.mesh.n_triangles == 0
     assert warnings == [("F007.ply-no-faces", None, {"n": 4})]
 
 
-def test_trailing_data_is_reported() -> None:
+def test_trailing_data_is_reported():
     assert read(GOOD + "1 2 3\n")[1] == [("F006.ply-lines", None, {"n": 1})]
     data = binary("<", [("vertex", ["float x", "float y", "float z"], SQUARE)])
     assert read(data + b"abc")[1][0] == ("F006.ply-bytes", None, {"n": 3})
 
 
-def test_faces_with_fewer_than_three_corners_are_left_out() -> None:
+def test_faces_with_fewer_than_three_corners_are_left_out():
     figure, warnings = read(GOOD.replace("3 0 1 2\n", "2 0 1\n"))
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert warnings == [("F007.ply-small-faces", None, {"n": 1, "face": 0})]
@@ -319,11 +317,11 @@ def changed(old: str, new: str) -> str:
         ),
     ],
 )
-def test_invalid_ascii_files_are_reported_with_location_and_reason(text: str, fault: Fault) -> None:
+def test_invalid_ascii_files_are_reported_with_location_and_reason(text, fault):
     assert refusal(text) == fault
 
 
-def test_invalid_binary_files_are_reported_with_location_and_reason() -> None:
+def test_invalid_binary_files_are_reported_with_location_and_reason():
     elements = [
         ("vertex", ["float x", "float y", "float z"], SQUARE),
         ("face", ["list char int vertex_indices"], [[[0, 1, 2]], [[0, 1, 2, 3]]]),
@@ -344,12 +342,12 @@ def test_invalid_binary_files_are_reported_with_location_and_reason() -> None:
     assert refusal(negative) == ("F002.ply-list", None, {"item": face, "found": -1})
 
 
-def test_format_is_detected_by_content() -> None:
+def test_format_is_detected_by_content():
     assert detect(Source("a.ply", GOOD.encode())) == "ply"
     assert detect(Source("a.txt", GOOD.encode())) == "ply"
 
 
-def test_exported_files_round_trip(tmp_path) -> None:
+def test_exported_files_round_trip(tmp_path):
     actor = viewer.load().actors[0]
     viewer.export(actor, tmp_path / "fox.ply")
     scene = viewer.load(tmp_path / "fox.ply")
@@ -363,7 +361,7 @@ def test_exported_files_round_trip(tmp_path) -> None:
     np.testing.assert_allclose(mesh.uvs[mesh.uv_triangles], written.uvs[corners], atol=1e-7)
 
 
-def test_randomly_damaged_file_is_refused_in_one_line_or_read() -> None:
+def test_randomly_damaged_file_is_refused_in_one_line_or_read():
     good = [
         GOOD.encode(),
         binary(

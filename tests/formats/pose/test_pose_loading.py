@@ -1,7 +1,6 @@
 """Poses and images that are opened together with a figure."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -236,7 +235,7 @@ def turns(shifts=SHIFTS, rotations=None) -> JointRotations:
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
 @pytest.mark.parametrize("shifts", [SHIFTS, np.zeros((5, 3))])
-def test_rotations_round_trip(tmp_path: Path, suffix, shifts):
+def test_rotations_round_trip(tmp_path, suffix, shifts):
     path = tmp_path / f"a{suffix}"
     viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(shifts)), path)
     source = Source(path, path.read_bytes())
@@ -250,7 +249,7 @@ def test_rotations_round_trip(tmp_path: Path, suffix, shifts):
 
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
-def test_rotations_below_the_dofs_round_trip(tmp_path: Path, suffix):
+def test_rotations_below_the_dofs_round_trip(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(rotations=BENEATH)), path)
     source = Source(path, path.read_bytes())

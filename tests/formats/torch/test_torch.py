@@ -53,14 +53,14 @@ def values(archive: Archive | None, key: str = "v") -> Any:
 
 @pytest.mark.parametrize("code", STORAGES)
 @pytest.mark.parametrize("write", [torch_zip, torch_legacy], ids=["zip", "legacy"])
-def test_element_types_are_read(code: str, write: Any) -> None:
+def test_element_types_are_read(code, write):
     given = np.array([[0, 1, 2], [3, 1, 0]]).astype(code)
     found = values(opened(write({"v": given})))
     assert_array_equal(found, given)
     assert found.dtype == np.dtype(code)
 
 
-def test_bfloat16_is_the_upper_half_of_a_float() -> None:
+def test_bfloat16_is_the_upper_half_of_a_float():
     data = np.array([1.5, -2.0, 3.25], np.float32).view(np.uint32) >> 16
     body = mapping(v=tensor(storage("BFloat16Storage", "0", 3), 0, (3,), (1,)))
     found = values(opened(zip_file(body, {"0": data.astype("<u2").tobytes()})))
@@ -68,17 +68,17 @@ def test_bfloat16_is_the_upper_half_of_a_float() -> None:
     assert found.tolist() == [1.5, -2.0, 3.25]
 
 
-def test_half_floats_become_doubles_in_requested_arrays() -> None:
+def test_half_floats_become_doubles_in_requested_arrays():
     archive = opened(torch_zip({"v": np.array([65504.0], np.float16)}))
     assert archive.array("v", (1,)).values().dtype == np.float64
 
 
 @pytest.mark.parametrize("order", ["little", "big"])
-def test_byte_orders_are_read(order: str) -> None:
+def test_byte_orders_are_read(order):
     assert_array_equal(values(opened(torch_zip({"v": ROWS}, order))), ROWS)
 
 
-def test_bool_bytes_of_tensors_other_than_0_and_1_are_true() -> None:
+def test_bool_bytes_of_tensors_other_than_0_and_1_are_true():
     body = mapping(v=tensor(storage("BoolStorage", "0", 3), 0, (3,), (1,)))
     assert values(opened(zip_file(body, {"0": b"\0\1\7"}))).tolist() == [False, True, True]
 
@@ -96,12 +96,12 @@ def test_bool_bytes_of_tensors_other_than_0_and_1_are_true() -> None:
     ],
     ids=["transposed", "rows", "column", "expanded", "number", "empty", "empty at the end"],
 )
-def test_strided_views_are_read(offset: int, size: Any, stride: Any, wanted: Any) -> None:
+def test_strided_views_are_read(offset, size, stride, wanted):
     body = mapping(v=tensor(storage("FloatStorage", "0", 12), offset, size, stride))
     assert_array_equal(values(opened(zip_file(body, {"0": ROWS.tobytes()}))), wanted)
 
 
-def test_shared_storages_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shared_storages_are_read_once(monkeypatch):
     kept = storage("FloatStorage", "0", 12)
     body = mapping(v=tensor(kept, 0, (12,), (1,)), w=tensor(kept, 3, (9,), (1,)))
     archive, reads = opened(zip_file(body, {"0": ROWS.tobytes()})), []
@@ -116,7 +116,7 @@ def test_shared_storages_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert reads == ["archive/data/0"]
 
 
-def test_unused_storages_are_never_read() -> None:
+def test_unused_storages_are_never_read():
     data = bytearray(torch_zip({"v": ROWS, "big": np.arange(99.0), "n": {"w": ROWS}}))
     at = data.index(np.arange(99.0).tobytes())
     data[at : at + 8] = b"\xff" * 8  # this invalidates its checksum
@@ -125,7 +125,7 @@ def test_unused_storages_are_never_read() -> None:
     assert_array_equal(values(archive.inside("n"), "w"), ROWS)
 
 
-def test_nested_dicts_lists_and_plain_data_are_read() -> None:
+def test_nested_dicts_lists_and_plain_data_are_read():
     given = {"a": {"b": {"c": ROWS}, "t": "text"}, "l": [{"v": ROWS}, {"v": ROWS[:1]}], "n": 2.5}
     archive = opened(torch_zip(given))
     assert (archive.kind, archive.keys, archive.get("n")) == ("torch", ("a", "l", "n"), 2.5)
@@ -140,7 +140,7 @@ def test_nested_dicts_lists_and_plain_data_are_read() -> None:
     assert archive.inside("n") is None
 
 
-def test_parameters_sizes_devices_and_types_are_read() -> None:
+def test_parameters_sizes_devices_and_types_are_read():
     made = tensor(storage("FloatStorage", "0", 12), 0, (4, 3), (3, 1))
     hooks = named("collections", "OrderedDict") + b")R"
     body = mapping(
@@ -154,7 +154,7 @@ def test_parameters_sizes_devices_and_types_are_read() -> None:
     assert (archive.get("size"), archive.get("device")) == ((1, 2), "cuda")
 
 
-def test_types_that_only_newer_versions_store_are_read() -> None:
+def test_types_that_only_newer_versions_store_are_read():
     hooks = named("collections", "OrderedDict") + b")R"
     stored = storage("UntypedStorage", "0", 4)
     kind = named("torch", "uint16")
@@ -164,33 +164,33 @@ def test_types_that_only_newer_versions_store_are_read() -> None:
     assert (found.dtype, found.tolist()) == (np.uint16, [1, 65535])
 
 
-def test_tensors_in_a_plain_pickle_are_read() -> None:
+def test_tensors_in_a_plain_pickle_are_read():
     data = finished(mapping(v=nested_tensor(ROWS), w=nested_tensor(np.arange(3))))
     assert_array_equal(values(opened(data)), ROWS)
     assert values(opened(data), "w").tolist() == [0, 1, 2]
 
 
-def test_tensors_in_an_array_of_objects_are_read() -> None:
+def test_tensors_in_an_array_of_objects_are_read():
     archive = opened(object_npy({"pred_trans": ROWS, "frame": np.arange(4), "name": "a"}))
     assert (archive.kind, archive.keys) == ("npy", ("pred_trans", "frame", "name"))
     assert_array_equal(values(archive, "pred_trans"), ROWS)
 
 
-def test_big_endian_legacy_streams_are_read() -> None:
+def test_big_endian_legacy_streams_are_read():
     kept = storage("FloatStorage", "0", 12)
     body = mapping(v=tensor(kept, 0, (4, 3), (3, 1)))
     data = legacy_file(body, {"0": (12, ROWS.astype(">f4").tobytes())}, is_little=False)
     assert_array_equal(values(opened(data)), ROWS)
 
 
-def test_files_may_end_with_any_byte() -> None:
+def test_files_may_end_with_any_byte():
     given = np.array([0x1A], np.uint8)
     source = Source("x.pt", torch_legacy({"v": given}))
     assert values(open_archive(source)).tolist() == [0x1A]
     assert warnings_of(source.diagnostics) == []
 
 
-def test_repacked_files_may_be_deflated() -> None:
+def test_repacked_files_may_be_deflated():
     tensors = Tensors()
     body = value({"v": ROWS}, tensors.array)
     data = zip_file(body, tensors.stored, method=zipfile.ZIP_DEFLATED)
@@ -198,7 +198,7 @@ def test_repacked_files_may_be_deflated() -> None:
 
 
 @pytest.mark.parametrize("name", ["torch_zip.pt", "torch_legacy.pt", "torch_nested.npy"])
-def test_files_written_by_torch_are_read(name: str) -> None:
+def test_files_written_by_torch_are_read(name):
     """``make_torch_files.py`` describes their contents."""
     archive = open_archive(Source.open(DATA / name))
     assert_array_equal(values(archive, "rows"), np.arange(6.0).reshape(2, 3))
@@ -239,7 +239,7 @@ def problem_of(data: bytes) -> str:
         (0, (1 << 61, 1 << 61), (0, 0)),
     ],
 )
-def test_views_beyond_their_storage_are_refused(offset: int, size: Any, stride: Any) -> None:
+def test_views_beyond_their_storage_are_refused(offset, size, stride):
     assert (
         problem_of(view(offset, size, stride))
         == "expected a tensor within {found} of its storage, found {shape} with strides "
@@ -251,14 +251,14 @@ def test_views_beyond_their_storage_are_refused(offset: int, size: Any, stride: 
     ("offset", "size", "stride"),
     [(-1, (1,), (1,)), (0, (2,), (-1,)), (0, (-2,), (1,)), (0, (1, 1), (1,)), (0, (1,) * 33, ())],
 )
-def test_impossible_views_are_refused(offset: int, size: Any, stride: Any) -> None:
+def test_impossible_views_are_refused(offset, size, stride):
     assert (
         problem_of(view(offset, size, stride))
         == "expected the usual arguments of {name}, found ({found})"
     )
 
 
-def test_views_that_expand_without_bounds_are_refused() -> None:
+def test_views_that_expand_without_bounds_are_refused():
     data = view(0, (1 << 28, 2), (0, 0))
     assert (
         problem_of(data)
@@ -318,7 +318,7 @@ def test_views_that_expand_without_bounds_are_refused() -> None:
     ],
     ids=lambda given: given if isinstance(given, str) else "",
 )
-def test_storages_that_contradict_the_archive_are_refused(stored: bytes, key: str) -> None:
+def test_storages_that_contradict_the_archive_are_refused(stored, key):
     body = mapping(v=tensor(stored, 0, (11,), (1,)))
     data = zip_file(body, {"0": PLAIN_ROWS.tobytes()})
     assert problem_of(data) == key
@@ -326,7 +326,7 @@ def test_storages_that_contradict_the_archive_are_refused(stored: bytes, key: st
 
 
 @pytest.mark.parametrize("name", ["archive/constants.pkl", "archive/other/data.pkl"])
-def test_compiled_modules_are_refused(name: str) -> None:
+def test_compiled_modules_are_refused(name):
     data = zip_file(
         mapping(v=KEPT), {"0": PLAIN_ROWS.tobytes()}, **{name.removeprefix("archive/"): b""}
     )
@@ -350,7 +350,7 @@ def test_compiled_modules_are_refused(name: str) -> None:
         ("builtins", "eval"),
     ],
 )
-def test_other_names_are_refused_everywhere(module: str, name: str, tmp_path: Path) -> None:
+def test_other_names_are_refused_everywhere(module, name, tmp_path):
     marker = tmp_path / "marker"
     call = named(module, name) + several(unicode(f"touch {marker}")) + b"R"
     nested = named("torch.storage", "_load_from_bytes")
@@ -387,12 +387,12 @@ def test_other_names_are_refused_everywhere(module: str, name: str, tmp_path: Pa
         ({}, "expected a storage for each tensor, found none"),
     ],
 )
-def test_legacy_storages_that_contradict_the_pickle_are_refused(stored: Any, key: str) -> None:
+def test_legacy_storages_that_contradict_the_pickle_are_refused(stored, key):
     data = legacy_file(mapping(v=tensor(KEPT, 0, (12,), (1,))), stored)
     assert problem_of(data) == key
 
 
-def test_duplicate_legacy_storages_are_refused() -> None:
+def test_duplicate_legacy_storages_are_refused():
     data = legacy_file(mapping(v=KEPT), {"0": (12, PLAIN_ROWS.tobytes())})
     keys = finished(value(["0"], nested_tensor))
     assert keys in data
@@ -402,7 +402,7 @@ def test_duplicate_legacy_storages_are_refused() -> None:
     )
 
 
-def test_legacy_storages_larger_than_the_file_are_refused() -> None:
+def test_legacy_storages_larger_than_the_file_are_refused():
     kept = storage("FloatStorage", "0", 1 << 50)
     data = legacy_file(mapping(v=kept), {"0": (1 << 50, b"")})
     assert problem_of(data) == "expected {expected} more bytes, found {found} (truncated?)"
@@ -432,11 +432,11 @@ def bytes_of(stream: bytes) -> bytes:
     ],
     ids=["empty", "magic", "protocol", "dict", "zip"],
 )
-def test_bytes_that_are_not_a_storage_are_refused(stream: bytes, key: str) -> None:
+def test_bytes_that_are_not_a_storage_are_refused(stream, key):
     assert problem_of(finished(mapping(v=bytes_of(stream)))) == key
 
 
-def test_nested_streams_are_refused() -> None:
+def test_nested_streams_are_refused():
     stream = legacy_file(KEPT, {"0": (12, PLAIN_ROWS.tobytes())})
     for _ in range(3):
         stream = legacy_file(bytes_of(stream), {})
@@ -447,7 +447,7 @@ def test_nested_streams_are_refused() -> None:
 
 
 @pytest.mark.slow
-def test_repeated_loading_of_the_same_bytes_is_refused() -> None:
+def test_repeated_loading_of_the_same_bytes_is_refused():
     stream = legacy_file(KEPT, {"0": (12, PLAIN_ROWS.tobytes())})
     once = named("torch.storage", "_load_from_bytes") + b"(h\1tR0"
     body = b"}" + value(stream, nested_tensor) + b"q\1" + b"0" + once * 50_000
@@ -464,7 +464,7 @@ def test_repeated_loading_of_the_same_bytes_is_refused() -> None:
     ],
     ids=["zip", "legacy", "npy"],
 )
-def test_damaged_files_are_read_or_refused(data: bytes) -> None:
+def test_damaged_files_are_read_or_refused(data):
     dice = random.Random(len(data))
     for place in range(0, len(data), 3):
         self_contained(data[:place])

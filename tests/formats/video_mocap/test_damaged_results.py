@@ -68,7 +68,7 @@ def self_contained(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("tool", RESULTS)
-def test_damaged_bytes_are_read_or_refused_in_one_line(tool: str) -> None:
+def test_damaged_bytes_are_read_or_refused_in_one_line(tool):
     data, dice = RESULTS[tool](small(tool)), random.Random(3)
     for _ in range(60):
         place = dice.randrange(len(data))
@@ -107,7 +107,7 @@ def paths_of(given: Any, depth: int = 0) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize("tool", [tool for tool in RESULTS if tool not in ("gvhmr", "slahmr")])
-def test_foreign_values_are_read_or_refused_in_one_line(tool: str) -> None:
+def test_foreign_values_are_read_or_refused_in_one_line(tool):
     given, dice = small(tool), random.Random(3)
     known = FOREIGN if tool != "tram" else [v for v in FOREIGN if getattr(v, "dtype", "") != "<U1"]
     for path in paths_of(given):
@@ -116,7 +116,7 @@ def test_foreign_values_are_read_or_refused_in_one_line(tool: str) -> None:
 
 
 @pytest.mark.parametrize("tool", ["gvhmr", "slahmr"])
-def test_foreign_arrays_are_read_or_refused_in_one_line(tool: str) -> None:
+def test_foreign_arrays_are_read_or_refused_in_one_line(tool):
     given = small(tool)
     arrays = [
         value for value in FOREIGN if isinstance(value, np.ndarray) and value.dtype.kind in "fi"
@@ -126,7 +126,7 @@ def test_foreign_arrays_are_read_or_refused_in_one_line(tool: str) -> None:
             self_contained(RESULTS[tool](replaced(given, path, value)))
 
 
-def test_archives_of_other_data_are_not_results() -> None:
+def test_archives_of_other_data_are_not_results():
     for value in FOREIGN:
         data = joblib_file({"a": value, "b": {"c": value}})
         try:

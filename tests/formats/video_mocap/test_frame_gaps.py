@@ -1,7 +1,5 @@
 """Frames with invalid numbers in results of video motion capture: they become gaps."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,9 +83,7 @@ def in_slahmr(given: dict[str, Any]) -> None:
         (lambda given: npz(**given), slahmr, in_slahmr),
     ],
 )
-def test_one_invalid_frame_is_a_gap_of_one_person(
-    write: Callable[[Any], bytes], given: Callable[[], Any], spoil: Callable[[Any], None]
-) -> None:
+def test_one_invalid_frame_is_a_gap_of_one_person(write, given, spoil):
     whole = given()
     before = present(opened(write(whole)))
     spoil(whole)
@@ -100,7 +96,7 @@ def test_one_invalid_frame_is_a_gap_of_one_person(
     assert note.startswith(f"1 frame with invalid numbers is a gap: {name}; first error: ")
 
 
-def test_valid_frames_are_unchanged() -> None:
+def test_valid_frames_are_unchanged():
     poses, places = waves(6, 72), waves(6, 3)
     given = {"rotmat": matrices(poses.reshape(6, 24, 3)), "cam_t": places.copy()}
     (whole,) = next(iter(opened(joblib_file(given)).parts())).bodies.values()
@@ -115,14 +111,14 @@ def test_valid_frames_are_unchanged() -> None:
     assert note.startswith("3 frames with invalid numbers are gaps: frame 1, frames 4 to 5; first")
 
 
-def test_one_person_of_an_image_is_lost_without_the_others(tmp_path: Path) -> None:
+def test_one_person_of_an_image_is_lost_without_the_others(tmp_path):
     images = {f"{n:06}.jpg": image(2, n, track_ids=np.array([3, 8])) for n in range(3)}
     images["000001.jpg"]["smpl_thetas"][1, 0] = NAN
     found = present(open_results(Source.open(written(tmp_path, images))))
     assert found == {3: [0, 1, 2], 8: [0, 2]}
 
 
-def test_a_person_without_a_valid_frame_is_omitted() -> None:
+def test_a_person_without_a_valid_frame_is_omitted():
     given = wham()
     given[4]["pose_world"][:] = NAN
     capture = opened(joblib_file(given))
@@ -132,7 +128,7 @@ def test_a_person_without_a_valid_frame_is_omitted() -> None:
 
 
 @pytest.mark.parametrize("space", ["", "world"])
-def test_results_without_a_valid_frame_are_refused(space: str) -> None:
+def test_results_without_a_valid_frame_are_refused(space):
     given = gvhmr()
     given["smpl_params_global"]["transl"][:] = NAN
     with pytest.raises(FormatError, match="expected at least one valid frame, found none in 4 fr"):
@@ -140,7 +136,7 @@ def test_results_without_a_valid_frame_are_refused(space: str) -> None:
     assert present(opened(torch_zip(given), "camera")) == {0: [0, 1, 2, 3]}
 
 
-def test_an_invalid_camera_loses_places_in_the_world_only() -> None:
+def test_an_invalid_camera_loses_places_in_the_world_only():
     given = slahmr()
     count = given["trans"].shape[1]
     given["cam_t"][:, 1] = NAN
@@ -155,7 +151,7 @@ def test_an_invalid_camera_loses_places_in_the_world_only() -> None:
     assert_array_equal(view.motion.translations[1], view.motion.translations[0])
 
 
-def test_an_invalid_point_is_not_visible() -> None:
+def test_an_invalid_point_is_not_visible():
     frames = [[person(seed=float(frame))] for frame in range(3)]
     frames[1][0]["pred_keypoints_3d"][7] = NAN
     frames[2][0]["pred_cam_t"] = np.full(3, NAN)
@@ -198,7 +194,7 @@ def refused(data: bytes) -> str:
 
 
 @pytest.mark.slow
-def test_people_with_shared_frames_are_refused() -> None:
+def test_people_with_shared_frames_are_refused():
     one = {
         "pose_world": np.zeros((1000, 72), np.float32),
         "trans_world": np.zeros((1000, 3), np.float32),
@@ -211,17 +207,17 @@ def test_people_with_shared_frames_are_refused() -> None:
     assert cost(lambda: refused(data)) < BOUND
 
 
-def test_nested_dicts_without_poses_are_refused() -> None:
+def test_nested_dicts_without_poses_are_refused():
     assert refused(shared({"a": 1}, 400, outer=400)) == "F002.unknown-archive"
 
 
 @pytest.mark.slow
-def test_pictures_with_the_same_people_are_refused() -> None:
+def test_pictures_with_the_same_people_are_refused():
     nobody = {key: 1 for key in person() if key != "pred_cam_t"}
     assert refused(shared(nobody, 2000, outer=2000)) == "F002.unknown-archive"
 
 
-def test_frames_with_the_same_detections_are_refused() -> None:
+def test_frames_with_the_same_detections_are_refused():
     frame = next(iter(phalp(1).values()))
     frame = {key: value * 90 if isinstance(value, list) else value for key, value in frame.items()}
     frame["tracked_time"] = [1] * len(frame["tid"])

@@ -58,7 +58,7 @@ def seen(scene: Any, person: int, frame: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("prefix", ["world", "pred"])
-def test_tram_people_are_placed_in_world_space_by_the_camera(prefix: str, tmp_path: Path) -> None:
+def test_tram_people_are_placed_in_world_space_by_the_camera(prefix, tmp_path):
     camera = tram_camera()
     if prefix == "pred":
         del camera["world_cam_R"], camera["world_cam_T"]
@@ -73,7 +73,7 @@ def test_tram_people_are_placed_in_world_space_by_the_camera(prefix: str, tmp_pa
             assert_allclose(seen(scene, track, frame), tram_vertices(track, row), atol=2e-6)
 
 
-def test_tram_people_are_read_in_camera_space(tmp_path: Path) -> None:
+def test_tram_people_are_read_in_camera_space(tmp_path):
     scene = scene_of(tram_folder(tmp_path), "smpl", "camera")
     for track, frames in TRACKS.items():
         for row, frame in enumerate(frames):
@@ -82,14 +82,14 @@ def test_tram_people_are_read_in_camera_space(tmp_path: Path) -> None:
     assert scene.views[0].intrinsic[0, 0] == 900.0
 
 
-def test_tram_up_axis_depends_on_the_stored_world(tmp_path: Path) -> None:
+def test_tram_up_axis_depends_on_the_stored_world(tmp_path):
     assert open_results(Source.open(tram_folder(tmp_path))).up == "y"
     camera = {key: value for key, value in tram_camera().items() if "world" not in key}
     path = tram_folder(tmp_path / "old", camera)
     assert open_results(Source.open(path)).up == "-y"
 
 
-def test_single_tram_person_files_are_read(tmp_path: Path) -> None:
+def test_single_tram_person_files_are_read(tmp_path):
     path = tram_folder(tmp_path)
     alone = path / "hps" / "hps_track_3.npy"
     capture = open_results(Source.open(alone))
@@ -100,7 +100,7 @@ def test_single_tram_person_files_are_read(tmp_path: Path) -> None:
     assert [*next(iter(open_results(Source.open(path / "hps")).parts())).bodies] == [0, 3]
 
 
-def test_tram_rotations_of_six_numbers_are_read(tmp_path: Path) -> None:
+def test_tram_rotations_of_six_numbers_are_read(tmp_path):
     track = tram_track([0, 1], 0.0)
     del track["pred_rotmat"]
     path = tmp_path / "hps_track_0.npy"
@@ -110,14 +110,14 @@ def test_tram_rotations_of_six_numbers_are_read(tmp_path: Path) -> None:
     assert_allclose(matrices(vectors), wanted, atol=1e-6)
 
 
-def test_tram_cameras_with_too_few_frames_are_refused(tmp_path: Path) -> None:
+def test_tram_cameras_with_too_few_frames_are_refused(tmp_path):
     with pytest.raises(FormatError) as caught:
         open_results(Source.open(tram_folder(tmp_path, tram_camera(5))))
     assert caught.value.diagnostic is not None
     assert caught.value.diagnostic.key == "F002.video-camera"
 
 
-def test_tram_folders_whose_people_are_a_file_are_not_recognised(tmp_path: Path) -> None:
+def test_tram_folders_whose_people_are_a_file_are_not_recognised(tmp_path):
     (tmp_path / "hps").write_bytes(b"")
     (tmp_path / "camera.npy").write_bytes(object_npy(tram_camera()))
     with pytest.raises(FormatError) as caught:
@@ -145,7 +145,7 @@ def prompthmr_vertices(space: str, row: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("space", ["world", "camera"])
-def test_prompthmr_follows_the_tools_formula(space: str, tmp_path: Path) -> None:
+def test_prompthmr_follows_the_tools_formula(space, tmp_path):
     path = prompthmr_file(tmp_path)
     assert detect(Source.open(path)) == "video_mocap"
     scene = scene_of(path, "smplx", space)
@@ -154,7 +154,7 @@ def test_prompthmr_follows_the_tools_formula(space: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("names", [("Rcw", "Tcw"), ("Rwc", "Twc"), ("pred_cam_R", "pred_cam_T")])
-def test_prompthmr_cameras_are_read(names: tuple[str, str], tmp_path: Path) -> None:
+def test_prompthmr_cameras_are_read(names, tmp_path):
     given = prompthmr()
     world = given["camera_world"]
     turned, placed = world.pop("Rcw"), world.pop("Tcw")
@@ -189,7 +189,7 @@ def slahmr_vertices(person: int, frame: int) -> np.ndarray:
     return vertices("smplh", model("smplh"), betas, turned, place)[0]
 
 
-def test_slahmr_people_are_read_in_both_spaces(tmp_path: Path) -> None:
+def test_slahmr_people_are_read_in_both_spaces(tmp_path):
     path = slahmr_file(tmp_path)
     assert detect(Source.open(path)) == "video_mocap"
     world, camera = scene_of(path, "smplh"), scene_of(path, "smplh", "camera")
@@ -212,21 +212,19 @@ def test_slahmr_people_are_read_in_both_spaces(tmp_path: Path) -> None:
         ([900.0, -1, 640, 360], ["F007.video-focal"], []),
     ],
 )
-def test_cameras_that_cannot_be_drawn_are_omitted(
-    intrins: list[float], notes: list[str], sizes: list[Any], tmp_path: Path
-) -> None:
+def test_cameras_that_cannot_be_drawn_are_omitted(intrins, notes, sizes, tmp_path):
     capture = open_results(Source.open(slahmr_file(tmp_path, intrins=np.array(intrins))))
     assert [note.key for note in capture.warnings] == notes
     assert [view.size for view in capture.views] == sizes
 
 
-def test_slahmr_file_without_a_camera_is_read(tmp_path: Path) -> None:
+def test_slahmr_file_without_a_camera_is_read(tmp_path):
     path = slahmr_file(tmp_path, cam_R=None, intrins=None)
     capture = open_results(Source.open(path))
     assert (capture.in_space, capture.views, capture.up) == (None, (), "-y")
 
 
-def test_slahmr_tracks_determine_who_is_present(tmp_path: Path) -> None:
+def test_slahmr_tracks_determine_who_is_present(tmp_path):
     tracks = {
         "7": {"index": 1, "vis_mask": [1, 0, 1, 1]},
         "3": {"index": 0, "vis_mask": [-1, 1, 1, -1]},
@@ -242,14 +240,14 @@ def test_slahmr_tracks_determine_who_is_present(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"tracks": {"1": {"index": 0, "vis_mask": [1]}}}'])
-def test_inconsistent_slahmr_tracks_are_ignored_with_a_note(text: str, tmp_path: Path) -> None:
+def test_inconsistent_slahmr_tracks_are_ignored_with_a_note(text, tmp_path):
     (tmp_path / "track_info.json").write_text(text)
     capture = open_results(Source.open(slahmr_file(tmp_path)))
     assert [note.key for note in capture.warnings] == ["F007.video-tracks"]
     assert [*next(iter(capture.parts())).bodies] == [0, 1]
 
 
-def test_last_slahmr_iteration_of_a_folder_is_read(tmp_path: Path) -> None:
+def test_last_slahmr_iteration_of_a_folder_is_read(tmp_path):
     slahmr_file(tmp_path, "clip_000009_world_results.npz", trans=np.zeros((2, 4, 3)))
     slahmr_file(tmp_path, "clip_000060_world_results.npz")
     slahmr_file(tmp_path, "clip_000000_init_world_results.npz", trans=np.zeros((2, 4, 3)))
@@ -261,7 +259,7 @@ def test_last_slahmr_iteration_of_a_folder_is_read(tmp_path: Path) -> None:
     assert keys == ["F007.video-last", "F007.no-rate"]
 
 
-def test_slahmr_folder_whose_result_lacks_the_axis_of_people_is_refused(tmp_path: Path) -> None:
+def test_slahmr_folder_whose_result_lacks_the_axis_of_people_is_refused(tmp_path):
     slahmr_file(tmp_path, trans=np.zeros(3))
     with pytest.raises(FormatError) as caught:
         open_results(Source.open(tmp_path))

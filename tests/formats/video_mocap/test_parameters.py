@@ -56,7 +56,7 @@ def bodies(given: Any) -> dict[int, Any]:
          for frame in range(4)},
     ],
 )  # fmt: skip
-def test_key_names_and_rotation_forms_are_recognised(given: Any) -> None:
+def test_key_names_and_rotation_forms_are_recognised(given):
     assert detect(source(given)) == "video_mocap"
     ((person, body),) = bodies(given).items()
     assert person == 0
@@ -68,14 +68,12 @@ def test_key_names_and_rotation_forms_are_recognised(given: Any) -> None:
 @pytest.mark.parametrize(
     ("place", "up", "space"), [("cam_t", "-y", ""), ("pred_cam_t", "-y", ""), ("trans", "", "")]
 )
-def test_camera_space_has_y_down_and_world_up_axis_is_estimated(
-    place: str, up: str, space: str
-) -> None:
+def test_camera_space_has_y_down_and_world_up_axis_is_estimated(place, up, space):
     capture = open_results(source({"rotmat": TURNED, place: PLACES}))
     assert (capture.up, capture.space) == (up, space)
 
 
-def test_people_frames_and_shapes_are_read() -> None:
+def test_people_frames_and_shapes_are_read():
     one = {"rotmat": TURNED, "trans": PLACES, "betas": waves(10), "frames": np.array([5, 6, 8, 9])}
     two = {"rotmat": TURNED[:2], "trans": PLACES[:2], "shape": waves(2, 10)}
     found = bodies({7: one, 9: two})
@@ -86,7 +84,7 @@ def test_people_frames_and_shapes_are_read() -> None:
     assert [body.shape.shape for body in found.values()] == [(1, 10), (2, 10)]
 
 
-def test_single_frames_are_sorted_by_their_numbers() -> None:
+def test_single_frames_are_sorted_by_their_numbers():
     frames = [
         {"rotmat": TURNED[row], "trans": PLACES[row], "frame_ids": np.array([number])}
         for row, number in ((0, 7), (1, 5))
@@ -96,7 +94,7 @@ def test_single_frames_are_sorted_by_their_numbers() -> None:
     assert_allclose(body.translations, PLACES[[1, 0]], atol=1e-12)
 
 
-def test_distant_places_of_single_frames_are_refused() -> None:
+def test_distant_places_of_single_frames_are_refused():
     far = np.array([1e30, 0.0, 0.0])
     given = [{"pose": VECTORS[row].ravel(), "trans": far, "frame": row} for row in range(2)]
     with pytest.raises(FormatError) as caught:
@@ -106,7 +104,7 @@ def test_distant_places_of_single_frames_are_refused() -> None:
 
 
 @pytest.mark.parametrize("key", ["", "track_id", "id"])
-def test_single_frames_of_two_people_are_read(key: str) -> None:
+def test_single_frames_of_two_people_are_read(key):
     # Person 4 is in frames 5 and 6, person 9 in frames 5 and 7; records are in the order of frames.
     listed = [(5, 4), (5, 9), (6, 4), (7, 9)]
     frames = [
@@ -132,7 +130,7 @@ def test_single_frames_of_two_people_are_read(key: str) -> None:
 
 @pytest.mark.parametrize("key", ["", "track_ids"])
 @pytest.mark.parametrize("form", ["frame_ids", "detection_all"])
-def test_rows_of_the_same_frame_are_different_people(form: str, key: str) -> None:
+def test_rows_of_the_same_frame_are_different_people(form, key):
     # Person 4 is in frames 5 and 6, person 9 in frames 5 and 7.
     frames, persons = np.array([5, 5, 6, 7]), np.array([4, 9, 4, 9])
     numbers = frames if form == "frame_ids" else np.stack([frames, frames + 0.5], axis=1)
@@ -149,7 +147,7 @@ def test_rows_of_the_same_frame_are_different_people(form: str, key: str) -> Non
     assert repeated == (0 if key else 1)
 
 
-def test_rows_that_repeat_a_person_in_a_frame_are_reported() -> None:
+def test_rows_that_repeat_a_person_in_a_frame_are_reported():
     frames, persons = np.array([5, 5, 6, 5]), np.array([4, 9, 4, 4])
     opened = source({"pose": TURNED, "trans": PLACES, "frame_ids": frames, "track_ids": persons})
     found = next(iter(open_results(opened).parts())).bodies
@@ -161,7 +159,7 @@ def test_rows_that_repeat_a_person_in_a_frame_are_reported() -> None:
 @pytest.mark.parametrize(
     "changes", [{"rotmat": TURNED[:1, :22]}, {"betas": np.zeros(5)}], ids=["joints", "shape"]
 )
-def test_inconsistent_single_frames_are_separate_people(changes: dict[str, Any]) -> None:
+def test_inconsistent_single_frames_are_separate_people(changes):
     one = {"rotmat": TURNED[:1], "trans": PLACES[:1], "betas": np.zeros(10)}
     assert sorted(bodies([one, one | changes])) == [0, 1]
 
@@ -170,7 +168,7 @@ def test_inconsistent_single_frames_are_separate_people(changes: dict[str, Any])
     ("keys", "numbers"),
     [(["1", "b"], [1, 2]), ([2, "b", "1"], [1, 2, 3]), (["\u00b2", "-4"], [0, 1])],
 )
-def test_people_without_numeric_keys_are_numbered(keys: list[Any], numbers: list[int]) -> None:
+def test_people_without_numeric_keys_are_numbered(keys, numbers):
     one = {"rotmat": TURNED, "trans": PLACES}
     assert sorted(bodies(dict.fromkeys(keys, one))) == numbers
 
@@ -178,12 +176,12 @@ def test_people_without_numeric_keys_are_numbered(keys: list[Any], numbers: list
 @pytest.mark.parametrize(
     ("count", "names"), [(22, "SMPL"), (24, "SMPL"), (52, "SMPL+H"), (55, "SMPL-X")]
 )
-def test_family_members_are_recognised(count: int, names: str) -> None:
+def test_family_members_are_recognised(count, names):
     given = {"rotmat": np.tile(np.eye(3), (3, count, 1, 1)), "trans": np.zeros((3, 3))}
     assert open_results(source(given)).model == names
 
 
-def test_recognised_and_ignored_keys_are_reported() -> None:
+def test_recognised_and_ignored_keys_are_reported():
     opened = source({"rotmat": TURNED, "cam_t": PLACES, "verts": waves(4, 9, 3), "note": "x"})
     capture = open_results(opened)
     (found,) = [one for one in opened.diagnostics.warnings if one.key == "F007.video-parameters"]
@@ -199,7 +197,7 @@ def test_recognised_and_ignored_keys_are_reported() -> None:
     }
 
 
-def test_people_with_the_keys_of_wham_but_one_shape_are_not_in_camera_space() -> None:
+def test_people_with_the_keys_of_wham_but_one_shape_are_not_in_camera_space():
     one = {"pose": VECTORS.reshape(4, 72), "trans": PLACES, "betas": waves(10),
            "frame_ids": np.arange(4)}  # fmt: skip
     capture = open_results(source({3: one}))
@@ -211,12 +209,12 @@ def test_people_with_the_keys_of_wham_but_one_shape_are_not_in_camera_space() ->
     ("key", "value", "rate"),
     [("fps", 24, 24.0), ("frame_rate", np.array(60.0), 60.0), ("fps", -1.0, 30.0)],
 )
-def test_frame_rate_is_found_under_the_usual_keys(key: str, value: Any, rate: float) -> None:
+def test_frame_rate_is_found_under_the_usual_keys(key, value, rate):
     (body,) = bodies({"rotmat": TURNED, "trans": PLACES, key: value}).values()
     assert body.timing.frame_rate == rate
 
 
-def test_parameters_of_smplcodec_are_read() -> None:
+def test_parameters_of_smplcodec_are_read():
     given = {
         "codecVersion": np.array(2), "frameRate": np.array(24.0), "shapeParameters": waves(10),
         "bodyTranslation": PLACES, "bodyPose": VECTORS[:, :22],
@@ -227,7 +225,7 @@ def test_parameters_of_smplcodec_are_read() -> None:
     assert (body.timing.frame_rate, body.shape.shape) == (24.0, (1, 10))
 
 
-def test_missing_translations_are_reported_in_a_note() -> None:
+def test_missing_translations_are_reported_in_a_note():
     opened = source({"rotmat": TURNED})
     open_results(opened)
     assert "F007.motion-place" in [one.key for one in opened.diagnostics.warnings]
@@ -243,7 +241,7 @@ def test_missing_translations_are_reported_in_a_note() -> None:
         ({"poses": VECTORS.reshape(4, 72), "cam_t": PLACES}, "video_mocap"),
     ],
 )
-def test_layouts_of_amass_are_left_to_its_reader(given: Any, kind: str) -> None:
+def test_layouts_of_amass_are_left_to_its_reader(given, kind):
     assert detect(Source("a.npz", npz(**given))) == kind
     single = {key: np.asarray(value, dtype=np.float32) for key, value in given.items()}
     assert detect(Source("a.pt", torch_zip(single))) == kind
@@ -259,7 +257,7 @@ def test_layouts_of_amass_are_left_to_its_reader(given: Any, kind: str) -> None:
         {"rotmat": "x"},
     ],
 )
-def test_other_dicts_are_not_recognised(given: Any) -> None:
+def test_other_dicts_are_not_recognised(given):
     from viewer.formats._archive.checking import archive_of
     from viewer.formats.video_mocap.tools import tool_of
 

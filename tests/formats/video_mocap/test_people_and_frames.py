@@ -5,7 +5,6 @@ Every body is at x = frame, y = person, so its place tells where it belongs.
 
 import json
 import pickle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -145,7 +144,7 @@ CASES: dict[str, tuple[Any, Presence]] = {
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("container", ["pickle", "json"])
-def test_people_keep_their_frames(name: str, container: str) -> None:
+def test_people_keep_their_frames(name, container):
     given, wanted = CASES[name]
     if container == "json":
         source = Source("a.json", json.dumps(plain(given)).encode())
@@ -154,19 +153,19 @@ def test_people_keep_their_frames(name: str, container: str) -> None:
     assert found_in(source)[0] == wanted
 
 
-def test_flat_arrays_have_people() -> None:
+def test_flat_arrays_have_people():
     source = Source("a.npz", npz(**stacked(TWO, track_id=IDS)))
     assert found_in(source)[0] == {4: [0, 1, 2], 9: [0, 1, 2]}
 
 
-def test_frames_at_the_ends_of_a_list_count() -> None:
+def test_frames_at_the_ends_of_a_list_count():
     source = Source("a.pkl", joblib_file([None, body(1, 0), {}, body(3, 0), []]))
     assert found_in(source)[:3] == ({0: [1, 3]}, 0, 5)
     (note,) = [n.message for n in source.diagnostics.warnings if n.key == "F007.frames-empty"]
     assert note == "3 frames without people: frame 0, frame 2, frame 4"
 
 
-def test_a_list_of_missing_arrays_is_a_list_of_frames() -> None:
+def test_a_list_of_missing_arrays_is_a_list_of_frames():
     given = {"pose": [body(0, 0)["pose"], None, body(2, 0)["pose"]],
              "cam_t": [body(0, 0)["trans"], [], body(2, 0)["trans"]]}  # fmt: skip
     assert found_in(Source("a.pkl", joblib_file(given)))[0] == {0: [0, 2]}
@@ -175,20 +174,20 @@ def test_a_list_of_missing_arrays_is_a_list_of_frames() -> None:
 @pytest.mark.parametrize("key", ["fps", "frame_rate", "frameRate", "framerate", "mocap_framerate",
                                  "mocap_frame_rate"])  # fmt: skip
 @pytest.mark.parametrize("value", [25, np.float32(25), np.array([25.0]), "25"])
-def test_frame_rates_are_found_around_the_parameters(key: str, value: Any) -> None:
+def test_frame_rates_are_found_around_the_parameters(key, value):
     given = {"info": {"smpl": stacked(ALONE)}, key: value}
     assert found_in(Source("a.pkl", joblib_file(given)))[3] == 25.0
 
 
 @pytest.mark.parametrize(("rate", "found"), [(0.0, "0"), ("fast", "'fast'"), (float("nan"), "nan")])
-def test_other_frame_rates_are_reported(rate: Any, found: str) -> None:
+def test_other_frame_rates_are_reported(rate, found):
     source = Source("a.pkl", joblib_file({"smpl": stacked(ALONE), "fps": rate}))
     assert found_in(source)[3] == 30.0
     (note,) = [n.message for n in source.diagnostics.warnings if n.key == "F007.rate-ignored"]
     assert note == f"fps: expected 1e-06 to 1,000,000 frames per second, found {found}: ignored"
 
 
-def test_people_without_numbers_or_names_are_refused() -> None:
+def test_people_without_numbers_or_names_are_refused():
     given = {**SMPL, "track_id": [0.5] * 6, "frame_id": NUMBERS}
     with pytest.raises(FormatError, match=r"track_id: expected a number or a name .* found 0.5"):
         open_results(Source("a.pkl", joblib_file(given)))
@@ -210,7 +209,7 @@ OF_PEOPLE = {4: [0, 1], 7: [0, 1, 3]}
 
 
 @pytest.mark.parametrize("key", ["track_ids", "person_ids"])
-def test_lists_of_frames_have_as_many_rows_as_people(tmp_path: Path, key: str) -> None:
+def test_lists_of_frames_have_as_many_rows_as_people(tmp_path, key):
     content = per_frame(TWO_THEN_ONE, **{key: OF_FRAMES, "fps": 25})
     for data in (pickle.dumps(content), json.dumps(plain(content)).encode()):
         suffix = ".json" if data.startswith(b"{") else ".pkl"
@@ -218,14 +217,14 @@ def test_lists_of_frames_have_as_many_rows_as_people(tmp_path: Path, key: str) -
         assert found_in(source) == (OF_PEOPLE, 0, 4, 25.0)
 
 
-def test_lists_of_frames_have_numbers_beside_them(tmp_path: Path) -> None:
+def test_lists_of_frames_have_numbers_beside_them(tmp_path):
     content = per_frame(TWO_THEN_ONE, track_ids=OF_FRAMES, frame_ids=np.array([0, 1, 2, 3]) + 20)
     people, first, n_frames, _ = found_in(Source(tmp_path / "people.pkl", pickle.dumps(content)))
     assert people == {4: [20, 21], 7: [20, 21, 23]}
     assert (first, n_frames) == (20, 4)
 
 
-def test_arrays_of_frames_and_people_are_rows_of_each_frame(tmp_path: Path) -> None:
+def test_arrays_of_frames_and_people_are_rows_of_each_frame(tmp_path):
     content = per_frame(TWO_THEN_ONE[:2])
     stack = {key: np.stack(items) for key, items in content.items()}  # (2, 2, 72) and (2, 2, 3)
     ids = {"track_ids": np.array(OF_FRAMES[:2])}
@@ -233,7 +232,7 @@ def test_arrays_of_frames_and_people_are_rows_of_each_frame(tmp_path: Path) -> N
     assert found_in(source)[0] == {4: [0, 1], 7: [0, 1]}
 
 
-def test_arrays_of_objects_are_lists_of_frames(tmp_path: Path) -> None:
+def test_arrays_of_objects_are_lists_of_frames(tmp_path):
     content = per_frame([TWO_THEN_ONE[0], TWO_THEN_ONE[3]], track_ids=[OF_FRAMES[0], OF_FRAMES[3]])
     arrays = {}
     for key, items in content.items():
@@ -279,7 +278,7 @@ FACTS = {"gender": "F", "model_type": "smplx", "fps": 25.0}
         {**FACTS, "smpl": {**stacked(ALONE), "x": {"gender": "male"}}},
     ],
 )
-def test_gender_model_and_rate_are_found_beside_the_parameters(given: Any) -> None:
+def test_gender_model_and_rate_are_found_beside_the_parameters(given):
     genders, titles, rates, _ = facts_of(given)
     assert (genders, titles, rates) == ({0: "female"}, {"SMPL-X"}, {25.0})
 
@@ -295,32 +294,32 @@ def test_gender_model_and_rate_are_found_beside_the_parameters(given: Any) -> No
         [stacked(TWO[row : row + 2], person_id=[0, 1], gender=["m", "f"]) for row in (0, 2, 4)],
     ],
 )
-def test_each_person_has_its_gender(given: Any) -> None:
+def test_each_person_has_its_gender(given):
     assert facts_of(given)[0] == {0: "male", 1: "female"}
 
 
-def test_several_genders_of_one_person_are_reported() -> None:
+def test_several_genders_of_one_person_are_reported():
     given = stacked(ALONE, person_id=[0, 0, 0], gender=["m", "f", "m"])
     genders, _, _, notes = facts_of(given)
     assert genders == {0: ""}
     assert notes.count("F007.motion-gender") == 1
 
 
-def test_number_of_frames_is_not_a_frame_number() -> None:
+def test_number_of_frames_is_not_a_frame_number():
     # As in InterHuman.
     given = {"frames": 3, "person1": stacked(ALONE), "person2": stacked([(f, 1) for f in range(3)])}
     found = found_in(Source("a.pkl", joblib_file(given)))
     assert found[:3] == ({1: [0, 1, 2], 2: [0, 1, 2]}, 0, 3)
 
 
-def test_places_are_divided_by_the_scale_beside_them() -> None:
+def test_places_are_divided_by_the_scale_beside_them():
     given = {"smpl_scaling": np.array([2.0]), "smpl": stacked(ALONE)}
     source = Source("a.pkl", joblib_file(given))
     (motion,) = next(iter(open_results(source).parts())).bodies.values()
     np.testing.assert_allclose(motion.translations, [[0, 0, 1.5], [0.5, 0, 1.5], [1, 0, 1.5]])
 
 
-def test_poses_under_the_keys_of_emdb_are_read() -> None:
+def test_poses_under_the_keys_of_emdb_are_read():
     given = stacked(ALONE)
     poses = given.pop("pose")
     given |= {"poses_root": poses[:, :3], "poses_body": poses[:, 3:]}
@@ -332,7 +331,7 @@ def test_poses_under_the_keys_of_emdb_are_read() -> None:
 @pytest.mark.parametrize(
     ("face", "title"), [({}, "SMPL"), ({"jaw_pose": np.zeros((3, 3))}, "SMPL-X")]
 )
-def test_parameters_of_a_face_are_those_of_smplx(face: dict[str, Any], title: str) -> None:
+def test_parameters_of_a_face_are_those_of_smplx(face, title):
     # As SMPLify-X stores them, with a camera.
     parts = {"global_orient": np.zeros((3, 3)), "body_pose": np.zeros((3, 63)), **face}
     given = {**parts, "betas": np.ones(10), "camera_translation": np.zeros((3, 3))}
@@ -363,7 +362,7 @@ def table_of(n_outer: int, n_inner: int, is_outer_frame: bool, **columns: Any) -
         {"betas": lambda frame, person: np.full(10, 0.5 * person + 0.01 * (frame + person))},
     ],
 )
-def test_axis_of_people_is_told_by_what_stays(columns, n_outer: int, is_outer_frame: bool) -> None:
+def test_axis_of_people_is_told_by_what_stays(columns, n_outer, is_outer_frame):
     given = table_of(n_outer, 5 - n_outer, is_outer_frame, **columns)
     source = Source("a.pkl", joblib_file(given))
     n_frames, n_people = (n_outer, 5 - n_outer) if is_outer_frame else (5 - n_outer, n_outer)
@@ -373,7 +372,7 @@ def test_axis_of_people_is_told_by_what_stays(columns, n_outer: int, is_outer_fr
     assert "F007.video-lists" not in [note.key for note in source.diagnostics]
 
 
-def test_axis_of_people_is_told_by_ids_of_people_who_come_and_go() -> None:
+def test_axis_of_people_is_told_by_ids_of_people_who_come_and_go():
     table = [[body(0, 0, id=4), body(0, 1, id=9), body(0, 2, id=7)],
              [body(1, 1, id=9), body(1, 2, id=7), body(1, 0, id=4)]]  # fmt: skip
     assert found_in(Source("a.pkl", joblib_file(table)))[0] == {4: [0, 1], 7: [0, 1], 9: [0, 1]}
@@ -382,7 +381,7 @@ def test_axis_of_people_is_told_by_ids_of_people_who_come_and_go() -> None:
 @pytest.mark.parametrize(
     ("step", "people", "frames"), [(0.02, 3, 2), (1.0, 2, 3)], ids=["places", "the longer list"]
 )
-def test_axis_of_people_that_nothing_states_is_said(step: float, people: int, frames: int) -> None:
+def test_axis_of_people_that_nothing_states_is_said(step, people, frames):
     # Two frames of three people who are a metre apart; steps as large tell nothing.
     given = table_of(2, 3, True)
     for row in given:
@@ -403,7 +402,7 @@ def test_axis_of_people_that_nothing_states_is_said(step: float, people: int, fr
         ({"smpl_scaling": 0.0}, 6, "people.0.smpl_scaling"),
     ],
 )
-def test_errors_in_json_name_the_line(changes: dict[str, Any], line: int, item: str) -> None:
+def test_errors_in_json_name_the_line(changes, line, item):
     members = {**plain(stacked(ALONE)), **changes}
     rows = ",\n".join(f"{json.dumps(key)}: {json.dumps(value)}" for key, value in members.items())
     text = '{"fps": 30,\n"people": [\n{\n' + rows + "\n}]}"
@@ -422,9 +421,7 @@ def arrays_of(n_people: int, n_frames: int, axis: int, **more: Any) -> dict[str,
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize(("n_people", "n_frames"), [(2, 3), (3, 2)])
 @pytest.mark.parametrize("told", ["person_id", "genders", "betas", "frame_ids"])
-def test_axis_of_people_in_arrays_is_told_by_other_values(
-    told: str, n_people: int, n_frames: int, axis: int
-) -> None:
+def test_axis_of_people_in_arrays_is_told_by_other_values(told, n_people, n_frames, axis):
     values = {"person_id": np.arange(n_people), "genders": ["m", "f", "m"][:n_people],
               "betas": np.ones((n_people, 10)), "frame_ids": np.arange(n_frames)}  # fmt: skip
     given = arrays_of(n_people, n_frames, axis, **{told: values[told]})
@@ -435,14 +432,14 @@ def test_axis_of_people_in_arrays_is_told_by_other_values(
         assert facts_of(given)[0] == dict(enumerate(["male", "female", "male"][:n_people]))
 
 
-def test_axis_of_people_in_arrays_that_nothing_states_is_said() -> None:
+def test_axis_of_people_in_arrays_that_nothing_states_is_said():
     source = Source("a.pkl", joblib_file(arrays_of(2, 3, 1)))
     assert found_in(source)[0] == {0: [0, 1, 2], 1: [0, 1, 2]}
     (note,) = [note for note in source.diagnostics if note.key == "F007.video-axes"]
     assert note.values == {"people": 2, "frames": 3}
 
 
-def test_ids_of_each_person_and_frame_tell_the_axis_of_people() -> None:
+def test_ids_of_each_person_and_frame_tell_the_axis_of_people():
     for axis in (0, 1):
         given = arrays_of(2, 3, axis)
         ids = np.stack([np.full(3, 4), np.full(3, 7)], axis)
@@ -451,12 +448,12 @@ def test_ids_of_each_person_and_frame_tell_the_axis_of_people() -> None:
         assert "F007.video-axes" not in [note.key for note in source.diagnostics]
 
 
-def test_one_shape_as_long_as_the_frames_is_that_of_all_people() -> None:
+def test_one_shape_as_long_as_the_frames_is_that_of_all_people():
     source = Source("a.pkl", joblib_file(arrays_of(2, 10, 1, betas=np.ones(10))))
     assert found_in(source)[0] == {0: [*range(10)], 1: [*range(10)]}
 
 
-def test_people_in_lists_of_arrays_are_read() -> None:
+def test_people_in_lists_of_arrays_are_read():
     # As in 3DPW, also if people have different numbers of frames.
     parts = [stacked(ALONE), stacked([(0, 1), (1, 1)])]
     given = {key: [part[key] for part in parts] for key in parts[0]} | {"genders": ["m", "f"]}

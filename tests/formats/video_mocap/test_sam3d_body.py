@@ -60,7 +60,7 @@ def points_of(path: Path) -> dict[int, Any]:
     return {number: clip for number, (_, clip) in part.points.items()}
 
 
-def test_points_are_upright_in_front_of_the_camera(tmp_path: Path) -> None:
+def test_points_are_upright_in_front_of_the_camera(tmp_path):
     path = npz(tmp_path)
     assert detect(Source.open(path)) == "video_mocap"
     scene = load(path)
@@ -78,7 +78,7 @@ def test_points_are_upright_in_front_of_the_camera(tmp_path: Path) -> None:
     assert layout.names[-1] == "vertex19"
 
 
-def test_camera_is_computed_from_the_keypoints(tmp_path: Path) -> None:
+def test_camera_is_computed_from_the_keypoints(tmp_path):
     scene = load(npz(tmp_path))
     (view,) = scene.views
     assert_allclose(view.intrinsic, K, atol=1e-8)
@@ -89,7 +89,7 @@ def test_camera_is_computed_from_the_keypoints(tmp_path: Path) -> None:
     assert_allclose(pixels[:, :2] / pixels[:, 2:], given["pred_keypoints_2d"], atol=1e-8)
 
 
-def test_joints_of_the_rig_are_preceded_by_their_parents() -> None:
+def test_joints_of_the_rig_are_preceded_by_their_parents():
     assert (len(JOINTS), len(set(JOINTS)), len(KEYPOINTS)) == (127, 127, 70)
     assert all(parent < joint for joint, parent in enumerate(PARENTS))
     ends = {JOINTS[joint]: JOINTS[PARENTS[joint]] for joint in range(1, 127)}
@@ -116,7 +116,7 @@ def test_joints_of_the_rig_are_preceded_by_their_parents() -> None:
     ],
     ids=["person", "picture", "frames", "frames of people", "list of frames"],
 )
-def test_pickles_of_people_and_frames_are_read(given: Any, wanted: Any, tmp_path: Path) -> None:
+def test_pickles_of_people_and_frames_are_read(given, wanted, tmp_path):
     path = tmp_path / "out.pkl"
     path.write_bytes(joblib_file(given))
     assert detect(Source.open(path)) == "video_mocap"
@@ -127,7 +127,7 @@ def test_pickles_of_people_and_frames_are_read(given: Any, wanted: Any, tmp_path
     assert {number: frames.tolist() for number, frames in found.items()} == wanted
 
 
-def test_arrays_with_an_axis_of_frames_are_read(tmp_path: Path) -> None:
+def test_arrays_with_an_axis_of_frames_are_read(tmp_path):
     arrays = {key: value for key, value in person().items() if np.ndim(value)}
     stacked = {key: np.stack([value, value + 1.0, value]) for key, value in arrays.items()}
     np.savez(tmp_path / "a.npz", **stacked)
@@ -145,9 +145,7 @@ def test_arrays_with_an_axis_of_frames_are_read(tmp_path: Path) -> None:
         (["²1.npz", "²2.npz"], {0: 2}),
     ],
 )
-def test_folders_of_results_are_read(
-    names: list[str], wanted: dict[int, int], tmp_path: Path
-) -> None:
+def test_folders_of_results_are_read(names, wanted, tmp_path):
     for name in names:
         npz(tmp_path, name)
     assert detect(Source.open(tmp_path)) == "video_mocap"
@@ -155,7 +153,7 @@ def test_folders_of_results_are_read(
     assert counts == wanted
 
 
-def test_files_of_several_frames_in_a_folder_follow_one_another(tmp_path: Path) -> None:
+def test_files_of_several_frames_in_a_folder_follow_one_another(tmp_path):
     given = {f"{frame:04}.jpg": person() for frame in range(3)}
     for name in ("a.pkl", "b.pkl"):
         (tmp_path / name).write_bytes(joblib_file(given))
@@ -165,13 +163,13 @@ def test_files_of_several_frames_in_a_folder_follow_one_another(tmp_path: Path) 
     assert (len(clip.points), clip.timing.rows.tolist()) == (8, [*range(8)])
 
 
-def test_files_of_several_people_in_a_folder_are_different_people(tmp_path: Path) -> None:
+def test_files_of_several_people_in_a_folder_are_different_people(tmp_path):
     for name in ("a_person0.pkl", "a_person1.pkl"):
         (tmp_path / name).write_bytes(joblib_file([person(), person()]))
     assert [*points_of(tmp_path)] == [0, 1, 2, 3]
 
 
-def test_folders_of_other_files_are_not_results(tmp_path: Path) -> None:
+def test_folders_of_other_files_are_not_results(tmp_path):
     (tmp_path / "a.npz").write_bytes(b"PK\x03\x04 broken")
     with pytest.raises(FormatError) as caught:
         detect(Source.open(tmp_path))
@@ -189,14 +187,14 @@ def test_folders_of_other_files_are_not_results(tmp_path: Path) -> None:
         ({"pred_global_rots": np.zeros((5, 3, 3))}, "F002.value"),
     ],
 )
-def test_inconsistent_arrays_are_refused(changes: dict[str, Any], key: str, tmp_path: Path) -> None:
+def test_inconsistent_arrays_are_refused(changes, key, tmp_path):
     with pytest.raises(FormatError) as caught:
         open_results(Source.open(npz(tmp_path, **changes)))
     assert caught.value.diagnostic is not None
     assert caught.value.diagnostic.key == key
 
 
-def test_people_with_different_numbers_of_points_are_refused(tmp_path: Path) -> None:
+def test_people_with_different_numbers_of_points_are_refused(tmp_path):
     path = tmp_path / "out.pkl"
     path.write_bytes(joblib_file([person(), person(pred_vertices=waves(7, 3))]))
     with pytest.raises(FormatError) as caught:
@@ -206,7 +204,7 @@ def test_people_with_different_numbers_of_points_are_refused(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(not REAL.is_file(), reason="no real file next to the checkout")
-def test_real_file_is_read() -> None:
+def test_real_file_is_read():
     archive = archive_of(Source.open(REAL))
     found = read_person(archive)
     assert (found.joints.shape, found.vertices.shape) == ((1, 127, 3), (1, 18439, 3))

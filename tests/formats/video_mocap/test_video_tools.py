@@ -44,14 +44,14 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("tool", TOOLS)
-def test_modules_have_the_functions_of_their_rows(tool: str) -> None:
+def test_modules_have_the_functions_of_their_rows(tool):
     module = module_of(tool)
     wanted = ["recognises", "read"] + ["claims_folder", "read_folder"] * TOOLS[tool].has_folders
     assert all(callable(getattr(module, name, None)) for name in wanted)
 
 
 @pytest.mark.parametrize("page", ["README.md", "viewer/manual/video.md"])
-def test_manual_pages_name_every_tool(page: str) -> None:
+def test_manual_pages_name_every_tool(page):
     text = (ROOT / page).read_text("utf-8")
     for row in TOOLS.values():
         for title in row.title.removesuffix(" of other tools").split(", "):
@@ -69,7 +69,7 @@ def wham_vertices(space: str, person: int, row: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("space", KEYS)
-def test_vertices_follow_the_formula_of_wham(space: str, tmp_path: Path) -> None:
+def test_vertices_follow_the_formula_of_wham(space, tmp_path):
     scene = scene_of(wham_file(tmp_path), "smpl", space)
     assert [actor.person for actor in scene.actors] == [0, 4]
     for person, found in wham().items():
@@ -77,14 +77,14 @@ def test_vertices_follow_the_formula_of_wham(space: str, tmp_path: Path) -> None
             assert_drawn(scene, person, int(frame), wham_vertices(space, person, row))
 
 
-def test_people_are_absent_outside_their_frames(tmp_path: Path) -> None:
+def test_people_are_absent_outside_their_frames(tmp_path):
     scene = scene_of(wham_file(tmp_path), "smpl")
     seen = {p: [drawn(scene, p, f) is not None for f in range(8)] for p in (0, 4)}
     assert seen[0] == [True] * 4 + [False] * 4
     assert seen[4] == [False] * 3 + [True, True, False, True, True]
 
 
-def test_shape_varies_unless_it_is_averaged(tmp_path: Path) -> None:
+def test_shape_varies_unless_it_is_averaged(tmp_path):
     path = wham_file(tmp_path)
     weights = scene_of(path, "smpl").actors[0].clip.shape_weights
     assert_allclose(weights, wham()[0]["betas"], atol=1e-12)
@@ -93,7 +93,7 @@ def test_shape_varies_unless_it_is_averaged(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("given", "rate"), [(None, 30.0), (25.0, 25.0)])
-def test_frame_rate_is_given_or_assumed(given: float | None, rate: float, tmp_path: Path) -> None:
+def test_frame_rate_is_given_or_assumed(given, rate, tmp_path):
     source = Source.open(wham_file(tmp_path))
     assert detect(source) == "video_mocap"
     body = next(iter(open_results(source, Options(given)).parts())).bodies[4]
@@ -123,11 +123,11 @@ def refusal(changes: dict[str, Any]) -> str:
         ({"betas": np.array("x")}, "F002.value"),
     ],
 )
-def test_inconsistent_arrays_of_wham_are_refused(changes: dict[str, Any], key: str) -> None:
+def test_inconsistent_arrays_of_wham_are_refused(changes, key):
     assert refusal(changes) == key
 
 
-def test_keys_are_numbers_of_people() -> None:
+def test_keys_are_numbers_of_people():
     people: dict[Any, Any] = {**wham(), "x": wham()[0]}
     with pytest.raises(FormatError) as caught:
         open_results(Source("a.pkl", joblib_file(people)))
@@ -135,7 +135,7 @@ def test_keys_are_numbers_of_people() -> None:
     assert caught.value.diagnostic.values["item"] == "x"
 
 
-def test_results_without_people_are_refused() -> None:
+def test_results_without_people_are_refused():
     empty = {0: {key: value[:0] for key, value in wham()[0].items()}}
     with pytest.raises(FormatError) as caught:
         open_results(Source("a.pkl", joblib_file(empty)))
@@ -155,14 +155,14 @@ def gvhmr_vertices(space: str, frame: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("space", SPACES)
-def test_vertices_follow_the_formula_of_gvhmr(space: str, tmp_path: Path) -> None:
+def test_vertices_follow_the_formula_of_gvhmr(space, tmp_path):
     scene = scene_of(gvhmr_file(tmp_path), "smplx", space)
     assert scene.up == "y"
     for frame in range(4):
         assert_drawn(scene, 0, frame, gvhmr_vertices(space, frame))
 
 
-def test_camera_in_world_space_sees_the_people_as_in_camera_space(tmp_path: Path) -> None:
+def test_camera_in_world_space_sees_the_people_as_in_camera_space(tmp_path):
     path = gvhmr_file(tmp_path)
     world, camera = scene_of(path, "smplx", "world"), scene_of(path, "smplx", "camera")
     assert [len(scene.views) for scene in (world, camera)] == [1, 1]
@@ -175,7 +175,7 @@ def test_camera_in_world_space_sees_the_people_as_in_camera_space(tmp_path: Path
 
 
 @pytest.mark.parametrize("has_video", [True, False])
-def test_genmo_has_the_same_parameters_under_other_names(has_video: bool, tmp_path: Path) -> None:
+def test_genmo_has_the_same_parameters_under_other_names(has_video, tmp_path):
     given = {key.replace("smpl_params", "body_params"): part for key, part in gvhmr().items()}
     if not has_video:
         given |= {"body_params_incam": None, "K_fullimg": None}
@@ -188,7 +188,7 @@ def test_genmo_has_the_same_parameters_under_other_names(has_video: bool, tmp_pa
     assert scene.facts[0] == ("capture", f"GENMO: 1 person, in {spaces} space")
 
 
-def test_people_in_camera_space_are_upright_and_the_camera_is_fixed(tmp_path: Path) -> None:
+def test_people_in_camera_space_are_upright_and_the_camera_is_fixed(tmp_path):
     scene = scene_of(gvhmr_file(tmp_path), "smplx", "camera")
     actor, view = scene.actors[0], scene.views[0]
     assert_allclose(actor.placement[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-12)
@@ -196,7 +196,7 @@ def test_people_in_camera_space_are_upright_and_the_camera_is_fixed(tmp_path: Pa
     assert view.motion is None
 
 
-def test_capture_has_the_properties_of_the_file(tmp_path: Path) -> None:
+def test_capture_has_the_properties_of_the_file(tmp_path):
     source = Source.open(gvhmr_file(tmp_path))
     assert detect(source) == "video_mocap"
     capture = open_results(source)
@@ -209,7 +209,7 @@ def test_capture_has_the_properties_of_the_file(tmp_path: Path) -> None:
     assert (other.space, other.up) == ("camera", "-y")
 
 
-def test_info_states_the_recognised_tool(tmp_path: Path) -> None:
+def test_info_states_the_recognised_tool(tmp_path):
     scene = scene_of(gvhmr_file(tmp_path), "smplx")
     assert describe(scene)["captures"] == [
         ["capture", "GVHMR: 1 person, in world and camera space"],
@@ -217,7 +217,7 @@ def test_info_states_the_recognised_tool(tmp_path: Path) -> None:
     ]
 
 
-def test_single_space_is_sufficient(tmp_path: Path) -> None:
+def test_single_space_is_sufficient(tmp_path):
     given = gvhmr()
     del given["smpl_params_global"], given["K_fullimg"]
     source = Source(tmp_path / "a.pt", torch_zip(given))
@@ -228,7 +228,7 @@ def test_single_space_is_sufficient(tmp_path: Path) -> None:
     assert caught.value.diagnostic.key == "F002.video-space"
 
 
-def test_results_without_frames_are_refused(tmp_path: Path) -> None:
+def test_results_without_frames_are_refused(tmp_path):
     with pytest.raises(FormatError) as caught:
         open_results(Source("a.pt", torch_zip(gvhmr(0))))
     assert caught.value.diagnostic.key == "F002.video-people"
@@ -246,7 +246,7 @@ def test_results_without_frames_are_refused(tmp_path: Path) -> None:
         ({"body_pose": 5}, "F002.value"),
     ],
 )
-def test_inconsistent_arrays_of_gvhmr_are_refused(change: dict[str, object], key: str) -> None:
+def test_inconsistent_arrays_of_gvhmr_are_refused(change, key):
     given = gvhmr()
     given["smpl_params_global"] = given["smpl_params_global"] | change
     with pytest.raises(FormatError) as caught:
@@ -278,7 +278,7 @@ def bodies(path: Path) -> dict[int, Any]:
     return next(iter(open_results(Source.open(path)).parts())).bodies
 
 
-def test_vertices_follow_the_formula_of_romp(tmp_path: Path) -> None:
+def test_vertices_follow_the_formula_of_romp(tmp_path):
     shown = image(2, 1.0)
     scene = scene_of(written(tmp_path, shown), "smpl")
     assert [actor.person for actor in scene.actors] == [0, 1]
@@ -299,7 +299,7 @@ def aligned(shown: dict[str, Any]) -> Any:
     return np.array(found)
 
 
-def test_people_of_bev_are_placed_by_their_hips_and_seen_by_its_camera(tmp_path: Path) -> None:
+def test_people_of_bev_are_placed_by_their_hips_and_seen_by_its_camera(tmp_path):
     width, height = 1280.0, 720.0
     shown = image(2, 1.0)
     joints = aligned(shown)
@@ -319,7 +319,7 @@ def test_people_of_bev_are_placed_by_their_hips_and_seen_by_its_camera(tmp_path:
     assert view.size == (1280, 720)
 
 
-def test_weak_perspective_of_romp_is_not_a_camera(tmp_path: Path) -> None:
+def test_weak_perspective_of_romp_is_not_a_camera(tmp_path):
     shown = image(2, 1.0)
     joints = aligned(shown)
     cam = np.array([[0.5, 0.1, 0.2], [0.3, -0.2, 0.1]])
@@ -329,7 +329,7 @@ def test_weak_perspective_of_romp_is_not_a_camera(tmp_path: Path) -> None:
     assert not open_results(Source.open(path)).views
 
 
-def test_rows_of_the_same_person_and_image_are_reported(tmp_path: Path) -> None:
+def test_rows_of_the_same_person_and_image_are_reported(tmp_path):
     path = written(tmp_path, {"1.jpg": image(3, 0.0, track_ids=np.array([4, 4, 5]))})
     source = Source.open(path)
     found = next(iter(open_results(source).parts())).bodies
@@ -338,7 +338,7 @@ def test_rows_of_the_same_person_and_image_are_reported(tmp_path: Path) -> None:
     assert [note.values for note in notes] == [{"n": 1}]
 
 
-def test_tracked_people_keep_their_ids_and_gaps(tmp_path: Path) -> None:
+def test_tracked_people_keep_their_ids_and_gaps(tmp_path):
     tracks = {"00000002.jpg": [7], "00000003.jpg": [4, 7], "00000005.jpg": [7]}
     results = {
         name: image(len(ids), row, track_ids=np.array(ids, dtype=np.int32))
@@ -356,7 +356,7 @@ def test_tracked_people_keep_their_ids_and_gaps(tmp_path: Path) -> None:
     assert_allclose(found[7].translations[1], wanted, rtol=0, atol=0)
 
 
-def test_people_without_tracks_are_counted_in_each_image(tmp_path: Path) -> None:
+def test_people_without_tracks_are_counted_in_each_image(tmp_path):
     path = written(tmp_path, {"a.jpg": image(1, 0.0), "b.jpg": image(2, 1.0)})
     source = Source.open(path)
     found = next(iter(open_results(source).parts())).bodies
@@ -367,7 +367,7 @@ def test_people_without_tracks_are_counted_in_each_image(tmp_path: Path) -> None
     assert "F007.video-repeated" in [note.key for note in source.diagnostics.warnings]
 
 
-def test_infant_coefficient_of_bev_is_reported(tmp_path: Path) -> None:
+def test_infant_coefficient_of_bev_is_reported(tmp_path):
     path = written(tmp_path, image(1, 0.0, smpl_betas=np.full((1, 11), 0.5)))
     capture = open_results(Source.open(path))
     assert next(iter(capture.parts())).bodies[0].shape.shape == (1, 10)
@@ -379,13 +379,13 @@ class _Hostile:
         return os.system, ("true",)
 
 
-def test_objects_that_run_code_are_refused_by_name(tmp_path: Path) -> None:
+def test_objects_that_run_code_are_refused_by_name(tmp_path):
     path = written(tmp_path, {"a.jpg": _Hostile()})
     with pytest.raises(FormatError, match=r"system"):
         open_results(Source.open(path))
 
 
-def test_objects_that_are_not_needed_are_not_read(tmp_path: Path) -> None:
+def test_objects_that_are_not_needed_are_not_read(tmp_path):
     path = written(tmp_path, image(1, 0.0), other=np.array([_Hostile()], dtype=object))
     assert sorted(bodies(path)) == [0]
 
@@ -396,7 +396,7 @@ def phalp_file(folder: Path) -> Path:
     return path
 
 
-def test_vertices_follow_the_formula_of_phalp(tmp_path: Path) -> None:
+def test_vertices_follow_the_formula_of_phalp(tmp_path):
     scene = scene_of(phalp_file(tmp_path), "smpl")
     for person, frame in ((2, 0), (2, 1), (2, 2), (5, 0)):
         body, place = phalp_body(person, frame)
@@ -405,14 +405,14 @@ def test_vertices_follow_the_formula_of_phalp(tmp_path: Path) -> None:
         assert_drawn(scene, person, frame, wanted)
 
 
-def test_people_out_of_sight_are_omitted_and_counted(tmp_path: Path) -> None:
+def test_people_out_of_sight_are_omitted_and_counted(tmp_path):
     scene = scene_of(phalp_file(tmp_path), "smpl")
     assert [drawn(scene, 5, frame) is not None for frame in range(3)] == [True, False, False]
     found = {one.key: one.values for one in scene.diagnostics}
     assert found["F007.video-ghosts"] == {"n": 2}
 
 
-def test_camera_is_that_of_the_network(tmp_path: Path) -> None:
+def test_camera_is_that_of_the_network(tmp_path):
     capture = open_results(Source.open(phalp_file(tmp_path)))
     (view,) = capture.views
     assert view.size == (1280, 720)
@@ -420,7 +420,7 @@ def test_camera_is_that_of_the_network(tmp_path: Path) -> None:
     assert (capture.space, capture.in_space, capture.up) == ("", None, "-y")
 
 
-def test_files_are_recognised_by_their_frames(tmp_path: Path) -> None:
+def test_files_are_recognised_by_their_frames(tmp_path):
     assert detect(Source.open(phalp_file(tmp_path))) == "video_mocap"
 
 
@@ -439,7 +439,7 @@ def test_files_are_recognised_by_their_frames(tmp_path: Path) -> None:
         ({"camera": [np.zeros(2)] * 2}, "F002.video-count"),
     ],
 )  # fmt: skip
-def test_inconsistent_frames_are_refused(changes: dict[str, Any], key: str) -> None:
+def test_inconsistent_frames_are_refused(changes, key):
     frames = phalp()
     frames["out/img/000001.jpg"] |= changes
     with pytest.raises(FormatError) as caught:
@@ -463,7 +463,7 @@ def notes_of(path: Path) -> list[str]:
     return [one.key for one in load(path, motion=SETTINGS).diagnostics if "rate" not in one.key]
 
 
-def test_model_of_the_same_family_member_is_used(models: Path, tmp_path: Path) -> None:
+def test_model_of_the_same_family_member_is_used(models, tmp_path):
     body_model("smpl", models)
     body_model("smplx", models)
     scene = load(wham_file(tmp_path), motion=SETTINGS)
@@ -472,18 +472,18 @@ def test_model_of_the_same_family_member_is_used(models: Path, tmp_path: Path) -
     assert notes_of(wham_file(tmp_path)) == ["F007.own-model"]
 
 
-def test_models_of_other_family_members_are_not_used(models: Path, tmp_path: Path) -> None:
+def test_models_of_other_family_members_are_not_used(models, tmp_path):
     body_model("smpl", models)
     assert notes_of(gvhmr_file(tmp_path)) == ["F007.bundled-body-without-shapes"]
 
 
-def test_model_that_cannot_be_read_is_reported_in_a_note(models: Path, tmp_path: Path) -> None:
+def test_model_that_cannot_be_read_is_reported_in_a_note(models, tmp_path):
     (models / "SMPL_NEUTRAL.npz").write_bytes(b"PK\x03\x04")
     wanted = ["F007.own-model-unreadable", "F007.bundled-body-without-shapes"]
     assert notes_of(wham_file(tmp_path)) == wanted
 
 
-def test_models_among_the_files_take_precedence(models: Path, tmp_path: Path) -> None:
+def test_models_among_the_files_take_precedence(models, tmp_path):
     body_model("smpl", models)
     scene = load(wham_file(tmp_path), body_model("smpl", tmp_path), motion=SETTINGS)
     assert "F007.own-model" not in [one.key for one in scene.diagnostics]

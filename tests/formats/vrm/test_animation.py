@@ -48,7 +48,7 @@ def written(folder: Path, name: str, file: File) -> Path:
     return path
 
 
-def test_motion_opened_alone_is_shown_as_a_skeleton(tmp_path: Path) -> None:
+def test_motion_opened_alone_is_shown_as_a_skeleton(tmp_path):
     scene = viewer.load(written(tmp_path, "wave.vrma", motion()))
     (actor,) = scene.actors
     skeleton = actor.figure.require_skeleton()
@@ -61,7 +61,7 @@ def test_motion_opened_alone_is_shown_as_a_skeleton(tmp_path: Path) -> None:
     assert_allclose(arm, [0.4, 1.5 + 0.3, -0.2], atol=1e-6)
 
 
-def test_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> None:
+def test_character_plays_a_motion_with_facial_expressions(tmp_path):
     paths = (written(tmp_path, "a.vrm", character()), written(tmp_path, "wave.vrma", motion()))
     scene = viewer.load(*paths)
     (actor,) = scene.actors
@@ -85,7 +85,7 @@ def test_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> Non
     assert_allclose(worlds[names.index("c0"), :3, 3], [0.2, 0.5, 0.0], atol=1e-6)
 
 
-def test_captured_body_drives_a_character(tmp_path: Path) -> None:
+def test_captured_body_drives_a_character(tmp_path):
     poses = np.random.default_rng(2).uniform(-0.3, 0.3, (3, 156))
     path = tmp_path / "walk.npz"
     still = {"trans": np.zeros((3, 3)), "betas": np.zeros(10), "gender": "neutral"}
@@ -109,9 +109,7 @@ def test_captured_body_drives_a_character(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("prefix", "is_family"), [("{side}_{bone}", True), ("{bone}_{side}", False)]
 )
-def test_characters_with_the_root_of_a_body_model_are_driven(
-    tmp_path: Path, prefix: str, is_family: bool
-) -> None:
+def test_characters_with_the_root_of_a_body_model_are_driven(tmp_path, prefix, is_family):
     """Unreal's characters have the root pelvis, as bodies of the SMPL family have."""
     sides, legs = ("left", "right") if is_family else ("l", "r"), ("hip", "knee", "ankle")
     bones = legs if is_family else ("thigh", "calf", "foot")
@@ -130,13 +128,13 @@ def test_characters_with_the_root_of_a_body_model_are_driven(
     assert is_body(actor.figure) == is_family
 
 
-def test_model_option_accepts_a_character_file(tmp_path: Path) -> None:
+def test_model_option_accepts_a_character_file(tmp_path):
     settings = MotionSettings(model=written(tmp_path, "a.vrm", character()))
     (actor,) = viewer.load(written(tmp_path, "wave.vrma", motion()), motion=settings).actors
     assert actor.figure.mesh is not None and actor.clip is not None
 
 
-def test_motions_without_bones_or_keys_are_refused(tmp_path: Path) -> None:
+def test_motions_without_bones_or_keys_are_refused(tmp_path):
     empty = motion()
     del empty.root["animations"]
     bare = motion(humanoid={})
@@ -166,7 +164,7 @@ def file_of(*constraints: dict[str, Any] | None) -> File:
     return file
 
 
-def test_constraints_are_read_in_the_order_of_evaluation() -> None:
+def test_constraints_are_read_in_the_order_of_evaluation():
     source = source_of(
         file_of(
             None,
@@ -195,7 +193,7 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
         (None, {"aim": {"source": 2, "aimAxis": "PositiveX"}}, None),
     ],
 )
-def test_cycles_are_refused(constraints: tuple[dict[str, Any] | None, ...]) -> None:
+def test_cycles_are_refused(constraints):
     with pytest.raises(FormatError) as caught:
         read(source_of(file_of(*constraints)))
     assert caught.value.diagnostic.key == "F002.constraint-cycle"
@@ -213,7 +211,7 @@ def test_cycles_are_refused(constraints: tuple[dict[str, Any] | None, ...]) -> N
         ({"rotation": {"source": 0, "weight": 10**400}}, "a weight from 0 to 1"),
     ],
 )
-def test_invalid_constraints_are_ignored(constraint: dict[str, Any], expected: str) -> None:
+def test_invalid_constraints_are_ignored(constraint, expected):
     source = source_of(file_of(None, constraint))
     assert read(source).figures[0].require_skeleton().constraints == ()
     found = next(iter(source.diagnostics))
@@ -221,7 +219,7 @@ def test_invalid_constraints_are_ignored(constraint: dict[str, Any], expected: s
     assert found.values["expected"] == expected
 
 
-def test_exported_poses_include_the_effect_of_constraints(tmp_path: Path) -> None:
+def test_exported_poses_include_the_effect_of_constraints(tmp_path):
     file = file_of(None, {"rotation": {"source": 0}}, None)
     file.root["nodes"][2]["mesh"] = file.mesh()
     half = math.sqrt(0.5)

@@ -1,7 +1,6 @@
 """Spring chains of VRM files, and their simulation while a motion plays."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -48,7 +47,7 @@ def hair(actor: Actor, time: float) -> np.ndarray:
     return matrices[[names.index(name) for name in HAIR], :3, 3]
 
 
-def test_joints_point_at_the_next_joint_of_their_chain(folder: Path) -> None:
+def test_joints_point_at_the_next_joint_of_their_chain(folder):
     actor = load(folder / "ada1.vrm").actors[0]
     skeleton, springs = actor.figure.require_skeleton(), springs_in(actor)
     assert [skeleton.names[joint] for joint in springs.joints] == [*HAIR[:3]]
@@ -61,7 +60,7 @@ def test_joints_point_at_the_next_joint_of_their_chain(folder: Path) -> None:
     assert dict(actor.figure.facts)["springs"] == "1 chain, 3 joints, 2 colliders"
 
 
-def test_colliders_of_two_groups_push_twice(tmp_path: Path) -> None:
+def test_colliders_of_two_groups_push_twice(tmp_path):
     file = swinging()
     extension = file.root["extensions"]["VRMC_springBone"]
     extension["colliderGroups"].append({"colliders": [1, 0]})
@@ -70,7 +69,7 @@ def test_colliders_of_two_groups_push_twice(tmp_path: Path) -> None:
     assert springs.obstacles == ((0, 1, 1, 0),) * 3
 
 
-def test_version_0_swings_all_joints_below_a_bone(folder: Path) -> None:
+def test_version_0_swings_all_joints_below_a_bone(folder):
     actor = load(folder / "ada0.vrm").actors[0]
     skeleton, springs = actor.figure.require_skeleton(), springs_in(actor)
     assert [skeleton.names[joint] for joint in springs.joints] == [*HAIR]
@@ -93,9 +92,7 @@ def test_version_0_swings_all_joints_below_a_bone(folder: Path) -> None:
         ({"colliders": [{"node": 0, "shape": {}}]}, "colliders/0", "G006.collider"),
     ],
 )
-def test_invalid_chains_and_colliders_are_ignored_and_reported(
-    tmp_path: Path, extension: dict[str, Any], pointer: str, key: str
-) -> None:
+def test_invalid_chains_and_colliders_are_ignored_and_reported(tmp_path, extension, pointer, key):
     file = swinging()
     file.root["extensions"]["VRMC_springBone"] = extension
     scene = opened(file, tmp_path)
@@ -105,7 +102,7 @@ def test_invalid_chains_and_colliders_are_ignored_and_reported(
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_hair_lags_behind_the_head_and_keeps_its_length(folder: Path, version: int) -> None:
+def test_hair_lags_behind_the_head_and_keeps_its_length(folder, version):
     still = load(folder / f"ada{version}.vrm").actors[0]
     actor = load(folder / f"ada{version}.vrm", motion=ON).actors[0]
     assert still.springs is None and actor.springs is not None
@@ -115,7 +112,7 @@ def test_hair_lags_behind_the_head_and_keeps_its_length(folder: Path, version: i
     assert_allclose(lengths[1], lengths[0], rtol=0, atol=1e-12)
 
 
-def test_result_depends_only_on_the_time(folder: Path) -> None:
+def test_result_depends_only_on_the_time(folder):
     played = load(folder / "ada1.vrm", motion=ON).actors[0]
     for step in range(60):
         hair(played, step / 60 * 1.2)
@@ -126,7 +123,7 @@ def test_result_depends_only_on_the_time(folder: Path) -> None:
     assert np.array_equal(hair(scrubbed, 1.4), last)
 
 
-def test_actors_posed_together_swing_as_if_posed_alone(folder: Path) -> None:
+def test_actors_posed_together_swing_as_if_posed_alone(folder):
     actors = [load(folder / "ada1.vrm", motion=ON).actors[0]]
     actors.append(actors[0].copy())
     actors[1].offset = 0.25
@@ -138,7 +135,7 @@ def test_actors_posed_together_swing_as_if_posed_alone(folder: Path) -> None:
         assert_allclose(matrix, again, rtol=0, atol=1e-12)
 
 
-def test_released_springs_are_at_rest(folder: Path) -> None:
+def test_released_springs_are_at_rest(folder):
     actor = load(folder / "ada1.vrm", motion=ON).actors[0]
     hair(actor, 0.5)
     actor.springs = None
@@ -147,7 +144,7 @@ def test_released_springs_are_at_rest(folder: Path) -> None:
     assert_allclose(hair(actor, 0.5), hair(still, 0.5), rtol=0, atol=1e-12)
 
 
-def test_baked_frames_contain_the_simulation(folder: Path) -> None:
+def test_baked_frames_contain_the_simulation(folder):
     actor = load(folder / "ada1.vrm", motion=ON).actors[0]
     wanted = [hair(actor, frame / 30) for frame in (0, 7, 20)]
     actor.clip, actor.springs = with_baked_springs(actor, 30.0), None
@@ -164,9 +161,7 @@ def test_baked_frames_contain_the_simulation(folder: Path) -> None:
         ({"plane": {"offset": [1, 2, 3]}}, 2, [1, 2, 4], 0.0),
     ],
 )
-def test_extended_colliders_replace_the_shape(
-    tmp_path: Path, shape: dict[str, Any], kind: int, tail: list[float], radius: float
-) -> None:
+def test_extended_colliders_replace_the_shape(tmp_path, shape, kind, tail, radius):
     file, name = swinging(1), "VRMC_springBone_extended_collider"
     (first, *_) = file.root["extensions"]["VRMC_springBone"]["colliders"]
     first["extensions"] = {name: {"specVersion": "1.0", "shape": shape}}

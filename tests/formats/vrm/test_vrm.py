@@ -54,7 +54,7 @@ def _modern(expressions: dict[str, Any]) -> dict[str, Any]:
     return {**told, "meta": meta, "expressions": {"preset": expressions}}
 
 
-def test_joints_with_any_names_are_identified_by_bones(tmp_path: Path) -> None:
+def test_joints_with_any_names_are_identified_by_bones(tmp_path):
     scene, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     skeleton = figure.require_skeleton()
     meanings = dict(zip(skeleton.names, joint_meanings(skeleton), strict=True))
@@ -63,7 +63,7 @@ def test_joints_with_any_names_are_identified_by_bones(tmp_path: Path) -> None:
     assert guess_front(scene) == "-z"
 
 
-def test_bones_of_version_0_are_a_list_with_different_thumb_names(tmp_path: Path) -> None:
+def test_bones_of_version_0_are_a_list_with_different_thumb_names(tmp_path):
     bones = [{"bone": bone, "node": node} for bone, node in BONES.items()]
     bones += [{"bone": "leftThumbProximal", "node": 6}]
     _, figure = _loaded(_file(VRM={"humanoid": {"humanBones": bones}}), tmp_path)
@@ -74,7 +74,7 @@ def test_bones_of_version_0_are_a_list_with_different_thumb_names(tmp_path: Path
     assert joint_meanings(skeleton)[thumb] == "left_thumb1"
 
 
-def test_expressions_are_sums_of_morph_targets(tmp_path: Path) -> None:
+def test_expressions_are_sums_of_morph_targets(tmp_path):
     binds = [{"node": 6, "index": 0, "weight": 0.5}, {"node": 6, "index": 1, "weight": 1.0}]
     expressions = {
         "happy": {"morphTargetBinds": binds, "overrideBlink": "block"},
@@ -94,7 +94,7 @@ def test_expressions_are_sums_of_morph_targets(tmp_path: Path) -> None:
     assert_allclose(moved(0, 0, 0.5, 1.0), np.tile([0.25, 1.0, 0.0], (3, 1)))
 
 
-def test_binds_of_version_0_expressions_are_in_percent(tmp_path: Path) -> None:
+def test_binds_of_version_0_expressions_are_in_percent(tmp_path):
     group = {"name": "Joy", "binds": [{"mesh": 0, "index": 1, "weight": 50}], "isBinary": True}
     told = {"blendShapeMaster": {"blendShapeGroups": [group]}}
     _, figure = _loaded(_file(VRM=told), tmp_path)
@@ -105,7 +105,7 @@ def test_binds_of_version_0_expressions_are_in_percent(tmp_path: Path) -> None:
         assert_allclose(found, np.tile([0.0, expected, 0.0], (3, 1)))
 
 
-def test_expressions_of_version_0_are_found_by_their_preset(tmp_path: Path) -> None:
+def test_expressions_of_version_0_are_found_by_their_preset(tmp_path):
     """Programs name expressions freely, or not at all; motions have the names of VRM 1.0."""
     binds = [{"mesh": 0, "index": 1, "weight": 100}]
     groups = [
@@ -127,7 +127,7 @@ def test_expressions_of_version_0_are_found_by_their_preset(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_first_person_parts_start_hidden(tmp_path: Path, version: int) -> None:
+def test_first_person_parts_start_hidden(tmp_path, version):
     told = {} if version == 0 else _modern({})
     note = {"mesh": 0, "firstPersonFlag": "FirstPersonOnly"}
     if version == 1:
@@ -143,7 +143,7 @@ def test_first_person_parts_start_hidden(tmp_path: Path, version: int) -> None:
     assert (found.key, found.pointer) == ("G006.first-person", place)
 
 
-def test_permissions_are_listed_in_the_facts(tmp_path: Path) -> None:
+def test_permissions_are_listed_in_the_facts(tmp_path):
     _, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     facts = dict(figure.facts)
     assert facts["VRM"] == "1.0" and facts["title"] == "Ada" and facts["authors"] == "A, B"
@@ -190,9 +190,7 @@ _OLD_META = {
 @pytest.mark.parametrize(
     ("key", "meta"), [("VRMC_vrm", _MODERN_META), ("VRM", _OLD_META)], ids=["1.0", "0.x"]
 )
-def test_every_property_of_author_licence_and_permissions_is_a_fact(
-    key: str, meta: dict[str, Any], tmp_path: Path
-) -> None:
+def test_every_property_of_author_licence_and_permissions_is_a_fact(key, meta, tmp_path):
     told = {"meta": {name: value for name, (value, _) in meta.items()}}
     _, figure = _loaded(_file(**{key: told}), tmp_path)
     facts, shown = dict(figure.facts), {True: "allowed", False: "not allowed"}
@@ -201,7 +199,7 @@ def test_every_property_of_author_licence_and_permissions_is_a_fact(
         assert facts[heading] == (shown[value] if isinstance(value, bool) else text)
 
 
-def test_invalid_bones_and_binds_are_ignored_and_reported(tmp_path: Path) -> None:
+def test_invalid_bones_and_binds_are_ignored_and_reported(tmp_path):
     told = _modern({"happy": {"morphTargetBinds": [{"node": 6, "index": 9, "weight": 1.0}]}})
     told["humanoid"]["humanBones"] |= {"head": {"node": 99}, "tail": {"node": 1}}
     scene, figure = _loaded(_file(VRMC_vrm=told), tmp_path)
@@ -212,7 +210,7 @@ def test_invalid_bones_and_binds_are_ignored_and_reported(tmp_path: Path) -> Non
     assert humanoid is not None and set(humanoid.joints) == set(BONES) - {"head"}
 
 
-def test_character_of_another_program_is_read(shared_data: Path) -> None:
+def test_character_of_another_program_is_read(shared_data):
     scene = viewer.load(shared_data / "gltf" / "vrm0_sphere.vrm")
     skeleton = scene.actors[0].figure.require_skeleton()
     assert skeleton.humanoid is not None and len(skeleton.humanoid.joints) == 22
@@ -245,7 +243,7 @@ def rows(shapes: BlendShapes) -> list[tuple[str, int, str, list[float]]]:
     ]
 
 
-def test_binds_of_version_1_are_read(tmp_path: Path) -> None:
+def test_binds_of_version_1_are_read(tmp_path):
     shapes, found = opened(swinging(), tmp_path)
     assert rows(shapes) == [
         ("angry", 1, "color", [1.0, 0.0, 0.0, 1.0]),
@@ -265,7 +263,7 @@ def old_values(*values: tuple[str, Any, list[float]]) -> File:
     return file
 
 
-def test_values_of_version_0_are_converted(tmp_path: Path) -> None:
+def test_values_of_version_0_are_converted(tmp_path):
     file = old_values(
         ("cloth", "_Color", [0.5, 1.0, 0.0, 0.25]),
         ("skin", "_EmissionColor", [0.5, 2.0, 0.0, 1.0]),
@@ -288,7 +286,7 @@ def test_values_of_version_0_are_converted(tmp_path: Path) -> None:
     assert not found
 
 
-def test_values_for_one_axis_keep_the_other(tmp_path: Path) -> None:
+def test_values_for_one_axis_keep_the_other(tmp_path):
     file = old_values(("skin", "_MainTex_ST_S", [0.5, 9.0, 0.25, 9.0]))
     properties = file.root["extensions"]["VRM"]["materialProperties"][0]
     properties["vectorProperties"]["_MainTex"] = [0.1, 0.2, 2.0, 0.5]
@@ -296,7 +294,7 @@ def test_values_for_one_axis_keep_the_other(tmp_path: Path) -> None:
     assert_allclose(rows(shapes)[0][3], [0.5, 0.5, 0.25, 1.0 - 0.2 - 0.5], atol=1e-12)
 
 
-def test_changes_without_effect_are_reported(tmp_path: Path) -> None:
+def test_changes_without_effect_are_reported(tmp_path):
     file = old_values(
         ("cloth", "_Cutoff", [0.5, 0, 0, 0]),
         ("hood", "_Color", [1, 0, 0, 1]),
@@ -307,7 +305,7 @@ def test_changes_without_effect_are_reported(tmp_path: Path) -> None:
     assert len(rows(shapes)) == 1
 
 
-def test_invalid_values_of_version_0_are_ignored(tmp_path: Path) -> None:
+def test_invalid_values_of_version_0_are_ignored(tmp_path):
     file = old_values(("cloth", ["_Color"], [1, 0, 0, 1]), ("cloth", "_Color", [10**400, 0, 0, 1]))
     groups = file.root["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"]
     groups[0]["binds"][0]["weight"] = 10**400
@@ -327,7 +325,7 @@ def test_invalid_values_of_version_0_are_ignored(tmp_path: Path) -> None:
         7,
     ],
 )
-def test_invalid_binds_are_ignored(tmp_path: Path, bind: Any) -> None:
+def test_invalid_binds_are_ignored(tmp_path, bind):
     file = swinging()
     preset = file.root["extensions"]["VRMC_vrm"]["expressions"]["preset"]
     preset["angry"] = {"materialColorBinds": [bind]}
@@ -336,7 +334,7 @@ def test_invalid_binds_are_ignored(tmp_path: Path, bind: Any) -> None:
     assert len(found) == 1
 
 
-def test_figures_without_morph_targets_have_sliders_for_materials(tmp_path: Path) -> None:
+def test_figures_without_morph_targets_have_sliders_for_materials(tmp_path):
     file = swinging()
     del file.root["meshes"][0]["primitives"][0]["targets"]
     del file.root["meshes"][0]["weights"]

@@ -349,11 +349,11 @@ ONE_VISIBLE = [EglDevice(0, None), EglDevice(1, 0), SOFTWARE]
     ],
     ids=["in-turn", "by-cuda", "first", "relative", "uuid", "no-cuda", "software"],
 )
-def test_workers_draw_on_the_visible_card_or_take_cards_in_turn(devices, visible, chosen) -> None:
+def test_workers_draw_on_the_visible_card_or_take_cards_in_turn(devices, visible, chosen):
     assert [device_of_worker(rank, devices, visible) for rank in range(3)] == chosen
 
 
-def test_listed_devices_are_those_used_by_contexts() -> None:
+def test_listed_devices_are_those_used_by_contexts():
     devices = egl_devices()
     assert [one.index for one in devices] == [*range(device_count())]
 

@@ -180,7 +180,7 @@ def scene(count: int) -> Scene:
     return Scene([*(Actor(figure) for _ in range(count)), Actor(Figure("ball", sphere(6)))])
 
 
-def test_closed_figures_leave_no_objects_behind(offscreen) -> None:
+def test_closed_figures_leave_no_objects_behind(offscreen):
     found = []
     for _ in range(4):
         # Draw one at a time, and nine as instances; every pose is new, and every option creates
@@ -199,9 +199,7 @@ def test_closed_figures_leave_no_objects_behind(offscreen) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 9])
-def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(
-    offscreen, monkeypatch, count
-) -> None:
+def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(offscreen, monkeypatch, count):
     old = Scene([Actor(arm(2))])
     picture = draw(offscreen, old, camera=front())
     check = upload.check_errors
@@ -232,7 +230,7 @@ def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(
     np.testing.assert_array_equal(draw(offscreen, old, camera=front()), picture)
 
 
-def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch) -> None:
+def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch):
     """Allocation of the second of two buffers fails, so the first is freed."""
     figure = arm(2)
     mesh = figure.require_mesh()

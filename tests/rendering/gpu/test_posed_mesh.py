@@ -385,7 +385,7 @@ def test_removed_actors_are_freed(ctx, monkeypatch):
     drawing.release()
 
 
-def test_methods_blended_per_vertex_match_the_reference(ctx) -> None:
+def test_methods_blended_per_vertex_match_the_reference(ctx):
     rng = np.random.default_rng(5)
     figure = random_figure(rng, 12)
     fractions = rng.uniform(size=figure.skin.n_vertices)

@@ -25,7 +25,7 @@ EMPTY = Scene([])
 
 
 @pytest.mark.parametrize("samples", [1, 4])
-def test_every_frame_has_the_same_gradient(offscreen, samples) -> None:
+def test_every_frame_has_the_same_gradient(offscreen, samples):
     options = plain(background="gradient", samples=samples)
     sizes = [(60, 40), (60, 40), (60, 40), (40, 30), (60, 40)]
     found = [draw(offscreen, EMPTY, options, size=size) for size in sizes]
@@ -44,20 +44,20 @@ def test_every_frame_has_the_same_gradient(offscreen, samples) -> None:
     "background, color",
     [("white", (255, 255, 255, 255)), ("#336699", (51, 102, 153, 255)), ("transparent", (0,) * 4)],
 )
-def test_color_fills_the_image_exactly(offscreen, background, color) -> None:
+def test_color_fills_the_image_exactly(offscreen, background, color):
     for samples in (1, 4):
         picture = draw(offscreen, EMPTY, plain(background=background, samples=samples))
         assert (picture == color).all()
 
 
-def test_frame_shows_no_pixels_of_the_previous_frame(offscreen) -> None:
+def test_frame_shows_no_pixels_of_the_previous_frame(offscreen):
     options = plain(background="gradient")
     empty = draw(offscreen, EMPTY, options)
     draw(offscreen, scene_of(sphere(8)), options, front())
     np.testing.assert_array_equal(draw(offscreen, EMPTY, options), empty)
 
 
-def test_flat_mesh_on_the_ground_hides_the_grid(offscreen) -> None:
+def test_flat_mesh_on_the_ground_hides_the_grid(offscreen):
     """Its triangles and those of the grid have the same depth, up to rounding."""
     corners = np.array([[-1.7, 0, -1.3], [1.6, 0, -1.4], [1.9, 0, 1.2], [-1.8, 0, 1.5]])
     mesh = Mesh(

@@ -207,7 +207,7 @@ def test_actor_flattened_along_the_view_direction_looks_the_same(offscreen):
     np.testing.assert_array_equal(front_view(offscreen, scene), before)
 
 
-def test_normals_of_almost_flat_meshes_fit_into_single_precision() -> None:
+def test_normals_of_almost_flat_meshes_fit_into_single_precision():
     """Their inverse has entries of 1e60; only the direction of a normal matters."""
     found = normal_matrix(np.diag([1.0, 1.0, 1e-60])).astype(np.float32)
     assert_allclose(found @ [1.0, 1.0, 1.0], [0.0, 0.0, 1.0], atol=1e-30)

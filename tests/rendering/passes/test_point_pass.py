@@ -207,7 +207,7 @@ def test_radii_are_medians_over_the_frames_with_a_point():
     assert point_radii(np.zeros((0, 2, 4))).tolist() == [0.0, 0.0]
 
 
-def test_radii_of_many_points_follow_their_density() -> None:
+def test_radii_of_many_points_follow_their_density():
     side = np.arange(40) / 39
     plane = np.stack([*np.meshgrid(side, side), np.zeros((40, 40))], axis=-1).reshape(-1, 3)
     points = np.concatenate([plane, np.ones((1600, 1))], axis=1)

@@ -308,26 +308,26 @@ def drawn_both_ways(offscreen, monkeypatch, scene: Scene, camera: Camera):
     return picture, where, whole
 
 
-def test_closed_surface_looks_the_same_without_back_faces(offscreen, monkeypatch) -> None:
+def test_closed_surface_looks_the_same_without_back_faces(offscreen, monkeypatch):
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), front())
     assert where == ()
     np.testing.assert_array_equal(picture, whole)
 
 
-def test_opening_shows_the_inside(offscreen, monkeypatch) -> None:
+def test_opening_shows_the_inside(offscreen, monkeypatch):
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(opened()), front())
     np.testing.assert_array_equal(picture, whole)
     # The border is 25 sin(7.5 degrees) = 3.3 pixels from the middle at 50, with a margin of two.
     assert where == ((44, 44, 12, 12),)
 
 
-def test_opening_outside_the_image_draws_no_back_faces(offscreen) -> None:
+def test_opening_outside_the_image_draws_no_back_faces(offscreen):
     scene, camera = scene_of(opened((1.0, 0.0, 0.0))), front(target=np.array([-3.0, 0.0, 0.0]))
     draw(offscreen, scene, LIT, camera)
     assert regions(offscreen, scene, camera) == ()
 
 
-def test_camera_inside_sees_the_back_faces(offscreen, monkeypatch) -> None:
+def test_camera_inside_sees_the_back_faces(offscreen, monkeypatch):
     camera = front(orthographic=False, distance=0.1)
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), camera)
     assert where is None
@@ -336,7 +336,7 @@ def test_camera_inside_sees_the_back_faces(offscreen, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("scale, is_hidden", [(0.5, True), (-0.5, True), (0.0, False)])
-def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is_hidden) -> None:
+def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is_hidden):
     mesh = closed(8)
     skin = skin_from_lists([[(0, 1.0)] for _ in mesh.positions], np.eye(4)[None])
     scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), skin))])
@@ -346,7 +346,7 @@ def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is
     assert (regions(offscreen, scene, front()) == ()) is is_hidden
 
 
-def test_negative_weights_have_no_bound_so_all_back_faces_are_drawn(offscreen) -> None:
+def test_negative_weights_have_no_bound_so_all_back_faces_are_drawn(offscreen):
     mesh = closed(8)
     binding = skin_from_lists([[(0, 1.5), (0, -0.5)] for _ in mesh.positions], np.eye(4)[None])
     scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), binding))])

@@ -135,7 +135,7 @@ def sparse(values: np.ndarray, loads: list[str], count: int = 7) -> SparseOffset
 
 
 @pytest.mark.parametrize(("density", "ways"), [(0.05, ["blocks"]), (0.8, ["blocks", "whole"])])
-def test_sums_are_those_of_the_whole_array(density: float, ways: list[str]) -> None:
+def test_sums_are_those_of_the_whole_array(density, ways):
     values, loads = array(density), []
     correctives = Correctives(sparse(values, loads), AnyWeights())
     generator = np.random.default_rng(2)
@@ -149,25 +149,25 @@ def test_sums_are_those_of_the_whole_array(density: float, ways: list[str]) -> N
     assert_array_equal(correctives.values(), values)
 
 
-def test_offsets_of_some_vertices_are_the_stored_ones() -> None:
+def test_offsets_of_some_vertices_are_the_stored_ones():
     values = array(0.05)
     few = np.array([7, 49, 0], dtype=np.int32)
     assert_array_equal(sparse(values, []).of_vertices(few), values[:, few].astype(np.float64))
 
 
-def test_rest_pose_reads_no_data() -> None:
+def test_rest_pose_reads_no_data():
     loads: list[str] = []
     correctives = Correctives(sparse(array(0.05), loads), AnyWeights())
     assert not correctives.displacement(np.zeros(ROWS)).any() and loads == []
 
 
-def test_arrays_of_zeros_have_no_offsets() -> None:
+def test_arrays_of_zeros_have_no_offsets():
     offsets = sparse(np.zeros((ROWS, VERTICES, 3), np.float32), [])
     assert_array_equal(offsets.total(np.ones(ROWS)), np.zeros((VERTICES, 3)))
     assert not offsets.of_vertices(np.arange(3)).any()
 
 
-def test_check_reads_the_file_once() -> None:
+def test_check_reads_the_file_once():
     loads: list[str] = []
     correctives = Correctives(sparse(array(0.05), loads), AnyWeights())
     correctives.check_values()

@@ -37,29 +37,27 @@ def moving(rows: list[int]) -> CameraView:
     return CameraView("video", np.eye(3), ROTATIONS[0], translations[0], motion=motion)
 
 
-def test_fixed_camera_is_the_same_at_all_times() -> None:
+def test_fixed_camera_is_the_same_at_all_times():
     view = CameraView("1", np.eye(3), np.eye(3), np.zeros(3))
     assert view_at(view, 5.0) is view
 
 
 @pytest.mark.parametrize(("seconds", "row"), [(0.0, 0), (0.1, 1), (-3.0, 0), (9.0, 1)])
-def test_moving_camera_has_the_placement_of_its_frame(seconds: float, row: int) -> None:
+def test_moving_camera_has_the_placement_of_its_frame(seconds, row):
     view = view_at(moving([0, 1]), seconds)
     assert_allclose(view.rotation, ROTATIONS[row], atol=1e-12)
     assert_allclose(-view.rotation.T @ view.translation, CENTERS[row], atol=1e-12)
 
 
 @pytest.mark.parametrize(("rows", "seconds"), [([0, 1], 0.05), ([0, -1, 1], 0.1)])
-def test_halfway_between_frames_rotation_and_centre_are_interpolated(
-    rows: list[int], seconds: float
-) -> None:
+def test_halfway_between_frames_rotation_and_centre_are_interpolated(rows, seconds):
     view = view_at(moving(rows), seconds)
     assert_allclose(view.rotation, axis_rotations(1, np.array(np.pi / 4)), atol=1e-12)
     assert_allclose(-view.rotation.T @ view.translation, [1.0, 1.0, 0.0], atol=1e-12)
     assert view.motion is None
 
 
-def test_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
+def test_camera_placed_with_its_scene_shows_the_same_pixels():
     placement = np.eye(4)
     placement[:3, :3] = axis_rotations(0, np.array(np.pi)) @ axis_rotations(2, np.array(0.3))
     placement[:3, 3] = 4.0, -1.0, 2.5
@@ -74,7 +72,7 @@ def test_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
     assert_allclose(after.rotation, view_at(after, 0.0).rotation)
 
 
-def test_camera_scaled_with_its_scene_shows_the_same_pixels() -> None:
+def test_camera_scaled_with_its_scene_shows_the_same_pixels():
     placement = np.diag([0.01, 0.01, 0.01, 1.0])
     placement[:3, :3] = placement[:3, :3] @ axis_rotations(1, np.array(0.4))
     placement[:3, 3] = 4.0, -1.0, 2.5
@@ -88,7 +86,7 @@ def test_camera_scaled_with_its_scene_shows_the_same_pixels() -> None:
         assert_allclose(new.rotation @ new.rotation.T, np.eye(3), atol=1e-12)
 
 
-def test_clipping_planes_are_scaled_with_the_scene() -> None:
+def test_clipping_planes_are_scaled_with_the_scene():
     view = CameraView("1", np.eye(3), np.eye(3), np.zeros(3), near=5.0, far=2000.0)
     after = placed_view(view, np.diag([0.01, 0.01, 0.01, 1.0]))
     assert (after.near, after.far) == pytest.approx((0.05, 20.0))
@@ -96,7 +94,7 @@ def test_clipping_planes_are_scaled_with_the_scene() -> None:
     assert (endless.near, endless.far) == (None, None)
 
 
-def test_motion_times_skip_gaps_and_include_both_ends() -> None:
+def test_motion_times_skip_gaps_and_include_both_ends():
     assert_allclose(motion_times(moving([-1, 0, -1, 1]), 5), [0.1, 0.3])
     rotations = np.tile(np.eye(3), (11, 1, 1))
     motion = CameraMotion(Timing(10.0, np.arange(11)), rotations, np.zeros((11, 3)))

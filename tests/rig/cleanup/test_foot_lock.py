@@ -20,7 +20,7 @@ def places(clip) -> np.ndarray:
 
 
 @pytest.mark.parametrize("up_down", [1.0, -1.0])
-def test_sliding_body_keeps_its_feet_and_follows_them_on_straight_legs(up_down) -> None:
+def test_sliding_body_keeps_its_feet_and_follows_them_on_straight_legs(up_down):
     moved = np.zeros((FRAMES, 7, 3))
     moved[:, 0, 2] = 0.2 * np.linspace(-0.5, 0.5, FRAMES)  # 0.1 m/s
     clip = standing(FIGURE, translations=moved)
@@ -38,7 +38,7 @@ def test_sliding_body_keeps_its_feet_and_follows_them_on_straight_legs(up_down) 
     assert np.ptp(after[:, 0, 2]) < 0.02 and lock.lowered < 1e-3
 
 
-def test_feet_keep_their_orientation_and_root_its_rotation() -> None:
+def test_feet_keep_their_orientation_and_root_its_rotation():
     moved = np.zeros((FRAMES, 7, 3))
     moved[:, 0, 2] = 0.002 * np.arange(FRAMES)
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 7, 1))
@@ -54,7 +54,7 @@ def test_feet_keep_their_orientation_and_root_its_rotation() -> None:
     assert lock.lowered == 0.0 and lock.after < 1e-9 < lock.before
 
 
-def test_feet_in_the_air_are_unchanged() -> None:
+def test_feet_in_the_air_are_unchanged():
     moved = np.zeros((FRAMES, 7, 3))
     moved[:, 0, 2] = 3.0 * np.arange(FRAMES) / RATE
     clip = standing(FIGURE, translations=moved)
@@ -63,7 +63,7 @@ def test_feet_in_the_air_are_unchanged() -> None:
     assert_allclose(places(found), places(clip), atol=1e-12)
 
 
-def test_corrections_fade_after_the_contact() -> None:
+def test_corrections_fade_after_the_contact():
     moved = np.zeros((FRAMES, 7, 3))
     lift = np.clip(np.arange(FRAMES) - 30, 0, None) * 0.01
     moved[:, 0, 1] = lift
@@ -79,7 +79,7 @@ def test_corrections_fade_after_the_contact() -> None:
 
 
 @pytest.mark.parametrize("glides", [False, True])
-def test_feet_are_not_held_where_they_glide_too_far(glides) -> None:
+def test_feet_are_not_held_where_they_glide_too_far(glides):
     # The legs are 0.8 long, so a foot may be corrected by 0.15 * 1.6 = 0.24. After the feet were
     # lifted, the body glides by 0.44 or 0.54, at 0.28 or 0.34 m/s; contacts begin below
     # 0.08 * 3 * 1.6 = 0.384 m/s.
@@ -98,7 +98,7 @@ def test_feet_are_not_held_where_they_glide_too_far(glides) -> None:
         assert_allclose(kept, np.broadcast_to(kept[:1], kept.shape), atol=1e-9)
 
 
-def test_motion_of_a_body_that_stands_still_is_unchanged() -> None:
+def test_motion_of_a_body_that_stands_still_is_unchanged():
     clip = standing(FIGURE)
     found, lock = lock_feet(FIGURE, clip, 1)
     assert_allclose(found.rotations, clip.rotations, atol=0.0)

@@ -45,7 +45,7 @@ def measures(difference):
     return {measure.name: measure for measure in difference.measures}
 
 
-def test_figure_has_no_differences_from_itself() -> None:
+def test_figure_has_no_differences_from_itself():
     found = compare(Actor(figure()), Actor(figure()))
     assert found.mismatches == () and found.notes == ()
     assert [(m.name, m.maximum) for m in found.measures] == [
@@ -58,7 +58,7 @@ def test_figure_has_no_differences_from_itself() -> None:
     assert_allclose(found.size, np.sqrt(2.0))
 
 
-def test_lengths_are_compared_in_the_unit_of_the_first() -> None:
+def test_lengths_are_compared_in_the_unit_of_the_first():
     joints, moved = arm((100.0, 0.0, 0.0)), 100.0 * CORNERS + [0.0, 0.0, 2.0]
     first = replace(figure(), unit="m")
     second = replace(figure(positions=moved, joints=joints), unit="cm")
@@ -70,7 +70,7 @@ def test_lengths_are_compared_in_the_unit_of_the_first() -> None:
     assert compare(Actor(figure()), Actor(second), n_poses=0).notes == ()
 
 
-def test_moved_joint_is_reported_with_its_distance() -> None:
+def test_moved_joint_is_reported_with_its_distance():
     found = compare(Actor(figure()), Actor(figure(joints=arm((1.0, 0.03, 0.04)))), n_poses=0)
     places = measures(found)["joint positions"]
     assert_allclose(places.maximum, 0.05)
@@ -80,7 +80,7 @@ def test_moved_joint_is_reported_with_its_distance() -> None:
     assert found.exceeds(0.03) and not found.exceeds(0.05 / np.sqrt(2) + 1e-9)
 
 
-def test_moved_vertex_is_reported_by_index() -> None:
+def test_moved_vertex_is_reported_by_index():
     moved = CORNERS.copy()
     moved[3] += [0.0, 0.0, 0.2]
     vertices = measures(compare(Actor(figure()), Actor(figure(moved)), n_poses=0))["vertices"]
@@ -89,7 +89,7 @@ def test_moved_vertex_is_reported_by_index() -> None:
     assert vertices.item == "vertex 3"
 
 
-def test_weights_differ_by_the_l1_distance_of_rows_in_any_order() -> None:
+def test_weights_differ_by_the_l1_distance_of_rows_in_any_order():
     # Vertex 0: the same weight split into two entries. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
     other = [[(0, 0.4), (0, 0.6)], [(1, 0.8), (0, 0.2)], [(1, 1.0)], [(1, 1.0)]]
     found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
@@ -99,7 +99,7 @@ def test_weights_differ_by_the_l1_distance_of_rows_in_any_order() -> None:
     assert measures(found)["vertices"].maximum == 0.0  # no difference at rest
 
 
-def test_weights_without_effect_at_rest_differ_in_test_poses() -> None:
+def test_weights_without_effect_at_rest_differ_in_test_poses():
     other = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)]]
     vertices = measures(compare(Actor(figure()), Actor(figure(influences=other))))["vertices"]
     # Vertex 1 is at the joint and does not move; another vertex with different weights does.
@@ -132,7 +132,7 @@ def told(found):
     return [(one.key, one.values) for one in found]
 
 
-def test_data_in_only_one_figure_is_a_mismatch_at_any_tolerance() -> None:
+def test_data_in_only_one_figure_is_a_mismatch_at_any_tolerance():
     names = skeleton([-1, 0, 1], names=("base", "tip", "claw"))
     found = compare(Actor(Figure("a", skeleton=names)), Actor(figure()), n_poses=0)
     assert told(found.mismatches) == [
@@ -142,7 +142,7 @@ def test_data_in_only_one_figure_is_a_mismatch_at_any_tolerance() -> None:
     assert found.exceeds(1e9)
 
 
-def test_unnamed_joints_are_reported_by_index() -> None:
+def test_unnamed_joints_are_reported_by_index():
     one = Figure("a", skeleton=skeleton([-1, 0], names=("base", "")))
     other = Figure("b", skeleton=skeleton([-1], names=("base",)))
     found = compare(Actor(one), Actor(other))
@@ -152,7 +152,7 @@ def test_unnamed_joints_are_reported_by_index() -> None:
     assert measures(found)["joint positions"].items == ("base", "joint 1 (no name)")
 
 
-def test_joints_in_a_different_order_are_reported() -> None:
+def test_joints_in_a_different_order_are_reported():
     one = Figure("a", skeleton=skeleton([-1, 0, 0, 0], names=("a", "b", "c", "d")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
     found = compare(Actor(one), Actor(other))
@@ -161,20 +161,20 @@ def test_joints_in_a_different_order_are_reported() -> None:
     assert compare(Actor(one), Actor(less)).notes == ()
 
 
-def test_joint_with_a_different_parent_is_a_mismatch() -> None:
+def test_joint_with_a_different_parent_is_a_mismatch():
     one = Figure("a", skeleton=skeleton([-1, 0, 1], names=("a", "b", "c")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "b", "c")))
     found = compare(Actor(one), Actor(other))
     assert told(found.mismatches) == [("D001.parents", {"names": ["c"]})]
 
 
-def test_joints_without_common_names_are_compared_by_index() -> None:
+def test_joints_without_common_names_are_compared_by_index():
     one = Figure("a", skeleton=skeleton([-1, 0], names=("a", "b")))
     other = Figure("b", skeleton=skeleton([-1, 0], names=("x", "y")))
     assert told(compare(Actor(one), Actor(other)).notes) == [("D002.joints-by-index", {})]
 
 
-def test_differing_limits_are_reported_with_both_values() -> None:
+def test_differing_limits_are_reported_with_both_values():
     found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
     limits = {"low": -1.0, "high": 1.0, "other_low": -0.5, "other_high": 1.0}
     assert told(found.mismatches) == [("D001.limits", {"n": 1, "dof": "tip.z", **limits})]
@@ -195,7 +195,7 @@ def bare() -> Figure:
     )
 
 
-def test_motions_are_compared_frame_by_frame_and_the_worst_frame_is_reported() -> None:
+def test_motions_are_compared_frame_by_frame_and_the_worst_frame_is_reported():
     first = Actor(bare(), clip=walk([0.0, 0.1, 0.2, 0.3]))
     second = Actor(bare(), clip=walk([0.0, 0.1, 0.25, 0.3]))
     found = compare(first, second)
@@ -206,32 +206,32 @@ def test_motions_are_compared_frame_by_frame_and_the_worst_frame_is_reported() -
     assert measures(only)["joint positions"].maximum < 1e-12
 
 
-def test_motions_of_different_length_are_a_mismatch_and_compared_in_the_common_range() -> None:
+def test_motions_of_different_length_are_a_mismatch_and_compared_in_the_common_range():
     found = compare(Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 6)))
     assert [one.key for one in found.mismatches] == ["D001.durations"]
     assert_allclose([*found.mismatches[0].values.values()], [0.3, 0.5])
     assert measures(found)["joint positions"].n_compared == 2 * 4
 
 
-def test_range_without_frames_is_refused() -> None:
+def test_range_without_frames_is_refused():
     actors = Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 4))
     with pytest.raises(RigError, match=r"^no frame in 9:12; both have frames 0 to 3$"):
         compare(*actors, frames=(9, 12))
 
 
-def test_rotation_distance_is_exact_for_small_angles_and_180_degrees() -> None:
+def test_rotation_distance_is_exact_for_small_angles_and_180_degrees():
     angles = np.array([1e-9, 1e-4, 1.0, np.pi])
     found = rotation_distance(axis_rotations(1, angles), np.eye(3))
     assert_allclose(found, angles, rtol=1e-6)
 
 
-def test_nan_is_never_within_a_tolerance() -> None:
+def test_nan_is_never_within_a_tolerance():
     found = compare(Actor(figure()), Actor(figure()), n_poses=0)
     broken = replace(found.measures[0], maximum=float("nan"))
     assert replace(found, measures=(broken,)).exceeds(1e9)
 
 
-def test_actors_report_the_worst_pose_even_if_it_is_their_own() -> None:
+def test_actors_report_the_worst_pose_even_if_it_is_their_own():
     # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]
@@ -259,7 +259,7 @@ def made_of(*materials: Material, parts=("coat", "hat"), **more) -> Figure:
     return Figure("a", mesh, **more)
 
 
-def test_changed_materials_and_unmatched_names_are_noted() -> None:
+def test_changed_materials_and_unmatched_names_are_noted():
     first = made_of(Material("skin"), Material("cloth"))
     skin = Material("skin", base_color=(1.0, 0.0, 0.0, 1.0), roughness=0.2)
     second = made_of(skin, Material("metal"), parts=("coat", "belt"))
@@ -276,7 +276,7 @@ def test_changed_materials_and_unmatched_names_are_noted() -> None:
     assert content_notes(first, made_of(parts=())) == []
 
 
-def test_rim_lights_and_outlines_are_compared_by_value() -> None:
+def test_rim_lights_and_outlines_are_compared_by_value():
     one, same, other = (
         Material("a", rim=Rim((0.5, 0.0, 0.0)), outline=Outline(width), is_physical=True)
         for width in (0.01, 0.01, 0.02)
@@ -286,7 +286,7 @@ def test_rim_lights_and_outlines_are_compared_by_value() -> None:
     assert note.message == 'material "a" differs: outline'
 
 
-def test_offsets_of_blend_shapes_are_compared() -> None:
+def test_offsets_of_blend_shapes_are_compared():
     offsets = np.zeros((1, 3, 3))
     first = made_of(blend_shapes=BlendShapes(("smile",), offsets))
     offsets[0, 2] = 0.0, 3.0, 4.0

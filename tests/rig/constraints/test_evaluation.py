@@ -44,7 +44,7 @@ def assert_same_rotation(found: np.ndarray, expected: np.ndarray) -> None:
     assert_allclose(found * np.sign(found @ expected), expected, atol=1e-12)
 
 
-def test_rotation_constraint_copies_the_rotation_relative_to_rest() -> None:
+def test_rotation_constraint_copies_the_rotation_relative_to_rest():
     rig = skeleton(Constraint(3, 2, "rotation", weight=0.5))
     assert_same_rotation(evaluated(rig, arm=about(Z, 90)), about(Z, 45))
     rests = rig.rest_rotations.copy()
@@ -55,7 +55,7 @@ def test_rotation_constraint_copies_the_rotation_relative_to_rest() -> None:
     assert_same_rotation(found, multiply(about(Y, 30), about(Z, 40)))
 
 
-def test_roll_constraint_copies_the_rotation_about_an_axis() -> None:
+def test_roll_constraint_copies_the_rotation_about_an_axis():
     rig = skeleton(Constraint(3, 2, "roll", X))
     swung = multiply(about(Z, 40), about(X, 60))
     assert_same_rotation(evaluated(rig, arm=swung), about(X, 60))
@@ -67,7 +67,7 @@ def test_roll_constraint_copies_the_rotation_about_an_axis() -> None:
     assert_same_rotation(found, multiply(about(Y, -90), about(X, 50)))
 
 
-def test_aim_constraint_points_an_axis_at_the_source() -> None:
+def test_aim_constraint_points_an_axis_at_the_source():
     # The twist joint is at (0, 2, 2), the arm at (1, 2, 0).
     rig = skeleton(Constraint(3, 2, "aim", (0.0, 0.0, -1.0)))
     angle = np.degrees(np.arctan2(1.0, 2.0))
@@ -82,7 +82,7 @@ def test_aim_constraint_points_an_axis_at_the_source() -> None:
     assert_allclose([found[2], found[3]], 0.0, atol=1e-12)
 
 
-def test_poses_frames_and_instances_agree_and_ignore_own_rotation_of_the_joint() -> None:
+def test_poses_frames_and_instances_agree_and_ignore_own_rotation_of_the_joint():
     rig = skeleton(Constraint(2, 0, "rotation"), Constraint(3, 2, "aim", Y, 0.7))
     figure, rng = Figure("rig", skeleton=rig), np.random.default_rng(1)
     poses = [rest_pose(rig) for _ in range(3)]

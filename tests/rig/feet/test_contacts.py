@@ -33,7 +33,7 @@ def moving(speed: float, axis=Z) -> np.ndarray:
     return np.tile(speed * axis, (COUNT, 1))
 
 
-def test_contacts_begin_and_end_with_hysteresis_of_the_speed() -> None:
+def test_contacts_begin_and_end_with_hysteresis_of_the_speed():
     assert contacts(moving(0.07)) == [(0, COUNT)]
     assert contacts(moving(0.1)) == []  # too fast to begin
     faster = np.where((np.arange(COUNT) >= 20)[:, None], moving(0.15), 0.0)
@@ -44,13 +44,13 @@ def test_contacts_begin_and_end_with_hysteresis_of_the_speed() -> None:
 
 
 @pytest.mark.parametrize("slips", [1.0, limits.SLIPS])
-def test_feet_of_captures_may_slide_but_not_rise(slips: float) -> None:
+def test_feet_of_captures_may_slide_but_not_rise(slips):
     assert contacts(moving(0.15), slips=slips) == ([(0, COUNT)] if slips > 1.0 else [])
     assert contacts(moving(0.3), slips=slips) == []
     assert contacts(moving(0.1, Y), slips=slips) == []
 
 
-def test_contacts_end_at_gaps_and_last_at_least_a_tenth_of_a_second() -> None:
+def test_contacts_end_at_gaps_and_last_at_least_a_tenth_of_a_second():
     assert contacts(moving(0.0), [(0, 10), (11, 13), (14, COUNT)]) == [(0, 10), (14, COUNT)]
 
 
@@ -58,7 +58,7 @@ HEIGHT = np.array([0.0, 1.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("turn", [-1.0, -0.5, -0.2, 0.0, 0.3, 0.7])
-def test_lowest_point_of_rotated_feet_is_that_of_the_mesh(turn: float) -> None:
+def test_lowest_point_of_rotated_feet_is_that_of_the_mesh(turn):
     figure = viewer.load(bundled_body()).actors[0].figure
     pose = rest_pose(figure.skeleton)
     ankles = np.array([figure.skeleton.names.index(f"{s}_ankle") for s in ("left", "right")])
@@ -71,7 +71,7 @@ def test_lowest_point_of_rotated_feet_is_that_of_the_mesh(turn: float) -> None:
         assert height == pytest.approx(positions[side * positions[:, 0] > 0.0, 1].min(), abs=2e-3)
 
 
-def test_ankles_replace_soles_without_a_mesh() -> None:
+def test_ankles_replace_soles_without_a_mesh():
     figure = legs()
     scene = scene_of(figure, standing(figure))
     soles = soles_of(figure, True)
@@ -82,7 +82,7 @@ def test_ankles_replace_soles_without_a_mesh() -> None:
     assert extent(figure) == pytest.approx((0.1, 0.9))
 
 
-def test_figures_without_ankles_have_no_soles() -> None:
+def test_figures_without_ankles_have_no_soles():
     assert soles_of(viewer.load().actors[0].figure, True) is None
 
 
@@ -90,7 +90,7 @@ SPAN = 4.0
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 31, 32, 33, 34, 65, 100])
-def test_curves_solve_the_normal_equations(count: int) -> None:
+def test_curves_solve_the_normal_equations(count):
     rng = np.random.default_rng(count)
     targets, weights = rng.normal(size=(3, count, 2)), 10.0 ** rng.uniform(-1.0, 6.0, (3, count))
     second = np.diff(np.eye(count), 2, axis=0) if count > 2 else np.zeros((0, count))
@@ -100,13 +100,13 @@ def test_curves_solve_the_normal_equations(count: int) -> None:
         assert_allclose(curve, np.linalg.solve(matrix, weight[:, None] * target), atol=1e-9)
 
 
-def test_straight_lines_are_unchanged() -> None:
+def test_straight_lines_are_unchanged():
     line = np.stack([np.arange(50.0), 3.0 - 0.5 * np.arange(50.0)], axis=1)[None]
     weights = np.random.default_rng(0).uniform(0.1, 10.0, (1, 50))
     assert_allclose(smooth_curves(line, weights, 10.0), line, atol=1e-9)
 
 
-def test_effect_of_a_fixed_row_decays_smoothly_over_the_span() -> None:
+def test_effect_of_a_fixed_row_decays_smoothly_over_the_span():
     targets, weights = np.zeros((1, 401, 1)), np.ones((1, 401))
     targets[0, 200], weights[0, 200] = 1.0, 1e9
     curve = smooth_curves(targets, weights, 20.0)[0, :, 0]

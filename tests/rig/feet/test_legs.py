@@ -30,7 +30,7 @@ def bent(target) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(
     "target", [(0, 0, 0), (0.1, 0.05, 0.2), (-0.2, 0.3, -0.1), (0, 0.01, 0), (0, 1.6, 0)]
 )
-def test_ankle_reaches_its_target_and_bones_keep_their_lengths(target) -> None:
+def test_ankle_reaches_its_target_and_bones_keep_their_lengths(target):
     knee, ankle = bent(target)
     assert_allclose(ankle, target, atol=1e-12)
     assert np.linalg.norm(knee - HIP) == pytest.approx(np.linalg.norm(KNEE - HIP), abs=1e-12)
@@ -40,14 +40,14 @@ def test_ankle_reaches_its_target_and_bones_keep_their_lengths(target) -> None:
         assert abs(knee[0]) < 1e-12  # the knee stays in the plane of the leg
 
 
-def test_leg_points_at_a_target_out_of_reach() -> None:
+def test_leg_points_at_a_target_out_of_reach():
     _, ankle = bent((0.0, -1.0, 0.0))
     away = ankle - HIP[0]
     assert_allclose(away / np.linalg.norm(away), [0.0, -1.0, 0.0], atol=1e-9)
     assert np.linalg.norm(away) == pytest.approx(reach(HIP, KNEE, ANKLE)[0], abs=1e-9)
 
 
-def test_straight_leg_bends_its_knee_forwards() -> None:
+def test_straight_leg_bends_its_knee_forwards():
     hip, knee, ankle = (np.array([[0.0, y, 0.0]]) for y in (0.9, 0.5, 0.1))
     # The axis from right to left is +x, forwards is +z.
     thigh, _ = bend(hip, knee, ankle, np.array([[0.0, 0.3, 0.0]]), SIDE)
@@ -57,7 +57,7 @@ def test_straight_leg_bends_its_knee_forwards() -> None:
 
 
 @pytest.mark.parametrize("angle", [-0.05, -0.01, 0.0, 0.01, 0.05])
-def test_knee_of_a_nearly_straight_leg_points_forwards(angle) -> None:
+def test_knee_of_a_nearly_straight_leg_points_forwards(angle):
     # The knee is bent sideways by up to 3 degrees, as in noisy recordings, once to each side.
     hip, knee = np.array([[0.0, 0.8, 0.0]]), np.array([[0.0, 0.4, 0.0]])
     ankle = knee + 0.4 * np.array([[np.sin(angle), -np.cos(angle), 0.0]])
@@ -72,7 +72,7 @@ def test_knee_of_a_nearly_straight_leg_points_forwards(angle) -> None:
     assert_allclose(moved[0], expected, atol=1e-9)
 
 
-def test_axis_of_a_knee_is_found_from_strong_bends() -> None:
+def test_axis_of_a_knee_is_found_from_strong_bends():
     # The knee bends by 1 rad about +x in half of the frames and by 0.06 rad about -z in the others;
     # the direction across is z. The weights are the fourth powers of sines: 0.5014 and 1.3e-5 in
     # 4 frames each, and 0.004487, that of 15 degrees, in all 8.
@@ -86,12 +86,12 @@ def test_axis_of_a_knee_is_found_from_strong_bends() -> None:
     assert_allclose(found, np.tile(wanted, (8, 1)), atol=1e-5)
 
 
-def test_legs_are_found_by_name() -> None:
+def test_legs_are_found_by_name():
     assert legs_of(FIGURE.skeleton) == [Leg(1, 2, 3, 3), Leg(4, 5, 6, 6)]
 
 
 @pytest.mark.parametrize("up_down", [1.0, -1.0])
-def test_body_is_lowered_if_its_legs_are_too_short(up_down) -> None:
+def test_body_is_lowered_if_its_legs_are_too_short(up_down):
     shift = np.zeros((FRAMES, 3))
     shift[:, 2] = 0.2 * np.linspace(-0.5, 0.5, FRAMES)
     times = np.arange(FRAMES) / RATE

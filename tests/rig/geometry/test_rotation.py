@@ -414,7 +414,7 @@ def test_slerp_agrees_with_the_power_of_the_relative_rotation():
 
 
 @pytest.mark.parametrize("shape", [(), (2, 3)])
-def test_products_equal_those_multiplied_one_by_one(shape) -> None:
+def test_products_equal_those_multiplied_one_by_one(shape):
     rng = np.random.default_rng(0)
     # Joints 0 and 3 have three rotations, 1 has none, 2 has five; the DOFs alternate.
     joints = np.array([2, 0, 3, 2, 2, 0, 3, 2, 0, 2, 3], dtype=np.int32)
@@ -430,7 +430,7 @@ def test_products_equal_those_multiplied_one_by_one(shape) -> None:
     assert_allclose(found, expected, atol=1e-15)
 
 
-def test_joints_without_rotations_have_the_identity() -> None:
+def test_joints_without_rotations_have_the_identity():
     none = np.zeros(0, dtype=np.int32)
     products = axis_products(2, none, none, np.zeros(0, dtype=np.intp))
     assert_array_equal(products.at(np.ones(3)), [np.eye(3)] * 2)

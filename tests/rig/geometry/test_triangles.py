@@ -275,7 +275,7 @@ def fine_cube(n=8) -> Mesh:
     return cube(np.concatenate(triangles), np.concatenate(points))
 
 
-def test_a_cube_is_closed() -> None:
+def test_a_cube_is_closed():
     shell = shell_of(cube(), None)
     assert shell is not None
     assert len(shell.borders) == len(shell.copies) == 0
@@ -292,18 +292,18 @@ def test_a_cube_is_closed() -> None:
     ],
     ids=["inwards", "inconsistent", "three at an edge", "open", "empty"],
 )
-def test_meshes_with_other_errors_are_not_closed(triangles) -> None:
+def test_meshes_with_other_errors_are_not_closed(triangles):
     assert shell_of(cube(triangles), None) is None
 
 
-def test_mesh_with_an_inward_facing_part_is_not_closed() -> None:
+def test_mesh_with_an_inward_facing_part_is_not_closed():
     both = np.concatenate([CUBE, CUBE[:, ::-1] + 8])
     assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is None
     both[12:] = CUBE + 8
     assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is not None
 
 
-def test_border_of_a_small_opening_consists_of_its_corners() -> None:
+def test_border_of_a_small_opening_consists_of_its_corners():
     mesh = fine_cube()
     opened = cube(mesh.triangles[1:], mesh.positions)
     shell = shell_of(opened, None)
@@ -312,7 +312,7 @@ def test_border_of_a_small_opening_consists_of_its_corners() -> None:
     assert {tuple(point) for point in mesh.positions[shell.borders].tolist()} == missing
 
 
-def test_seams_are_closed_if_their_vertices_move_together() -> None:
+def test_seams_are_closed_if_their_vertices_move_together():
     mesh = fine_cube(2)
     # 8 corners with 3 vertices each and 12 midpoints with 2 have 28 copies.
     shell = shell_of(mesh, None)
@@ -323,7 +323,7 @@ def test_seams_are_closed_if_their_vertices_move_together() -> None:
     assert not shell.is_closed(moved)
 
 
-def test_seams_with_different_weights_are_open() -> None:
+def test_seams_with_different_weights_are_open():
     mesh = fine_cube(2)
     pairs = [[(0, 0.5), (1, 0.5)] for _ in mesh.positions]
     inverse_bind = np.tile(np.eye(4), (2, 1, 1))
@@ -341,7 +341,7 @@ def grid(n: int) -> Mesh:
     return cube(np.concatenate(triangles), np.stack([x, y, 0.0 * x], axis=1))
 
 
-def test_long_borders_are_found_without_comparing_edges() -> None:
+def test_long_borders_are_found_without_comparing_edges():
     # At most 256 vertices may lie on openings: grids of 64 and 65 cells have 256 and 260.
     assert not _has_long_borders(grid(64).triangles.astype(np.int64), 65**2)
     assert _has_long_borders(grid(65).triangles.astype(np.int64), 66**2)
@@ -369,30 +369,30 @@ def walked(count: int, pairs: np.ndarray) -> list[int]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_components_match_a_graph_traversal(seed: int) -> None:
+def test_components_match_a_graph_traversal(seed):
     rng = np.random.default_rng(seed)
     pairs = rng.integers(0, 200, (rng.integers(1, 250), 2))
     assert components(200, pairs).tolist() == walked(200, pairs)
 
 
-def test_long_chain_is_one_component() -> None:
+def test_long_chain_is_one_component():
     order = np.random.default_rng(0).permutation(50_000)
     pairs = np.stack([order[:-1], order[1:]], axis=1)
     assert (components(50_000, pairs) == 0).all()
 
 
-def test_nodes_without_pairs_are_separate_components() -> None:
+def test_nodes_without_pairs_are_separate_components():
     assert components(3, np.zeros((0, 2), np.int64)).tolist() == [0, 1, 2]
 
 
-def test_welding_maps_equal_positions_to_the_first_one() -> None:
+def test_welding_maps_equal_positions_to_the_first_one():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 1e-12], [1, 0, 0]])
     corners = welded(positions, np.array([[2, 4, 3], [0, 1, 2]], dtype=np.int32))
     assert corners.tolist() == [[0, 1, 3], [0, 1, 0]]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_flipped_triangles_of_a_grid_are_found(seed: int) -> None:
+def test_flipped_triangles_of_a_grid_are_found(seed):
     grid = np.arange(20 * 20).reshape(20, 20)
     a, b, c, d = (
         part.ravel() for part in (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:])
@@ -405,12 +405,12 @@ def test_flipped_triangles_of_a_grid_are_found(seed: int) -> None:
     assert np.array_equal(found, flipped)
 
 
-def test_ties_are_resolved_in_favour_of_the_first_triangle() -> None:
+def test_ties_are_resolved_in_favour_of_the_first_triangle():
     triangles = np.array([[0, 1, 2], [0, 1, 3]])  # both run from 0 to 1
     assert orientations(2, edges_of(triangles))[1].tolist() == [False, True]
 
 
-def test_triangles_of_each_edge_are_counted() -> None:
+def test_triangles_of_each_edge_are_counted():
     two = edges_of(np.array([[0, 1, 2], [1, 0, 3]]))
     assert two.counts.tolist() == [2, 1, 1, 2, 1, 1] and two.pairs.tolist() == [[0, 1]]
     three = edges_of(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]]))

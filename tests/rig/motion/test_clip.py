@@ -53,17 +53,17 @@ KEYS = [(1.0, 0.0), (2.0, 2.0), (4.0, 0.0)]
         ("smooth", [[2, 2], [0, 0], [-1, -1]]),
     ],
 )
-def test_slopes_follow_the_tangent_rule(rule: str, expected: list[list[float]]) -> None:
+def test_slopes_follow_the_tangent_rule(rule, expected):
     curve = channel([(t, v, rule, rule) for t, v in KEYS])
     np.testing.assert_allclose(slopes(curve), expected, atol=1e-15)
 
 
-def test_slopes_accept_a_value_on_each_side() -> None:
+def test_slopes_accept_a_value_on_each_side():
     curve = channel([(0, 0, 13.7, -0.22), (1, 5, "flat", "linear")])
     np.testing.assert_allclose(slopes(curve), [[13.7, -0.22], [0, 5]])
 
 
-def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
+def test_evaluate_equals_the_hermite_basis_inside_the_keys():
     """The expected values use the textbook basis h00, h10, h01, h11, unlike the code."""
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.1, 2.0, 6))
@@ -103,18 +103,18 @@ def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
         ("bounce", -1.5, 13.0),
     ],
 )
-def test_extrapolation_matches_hand_calculation(mode: str, time: float, expected: float) -> None:
+def test_extrapolation_matches_hand_calculation(mode, time, expected):
     curve = channel([(1, 10, "linear", "linear"), (3, 14, "linear", "linear")], mode, mode)
     assert evaluate(curve, np.array(time)) == pytest.approx(expected, abs=1e-12)
 
 
-def test_linear_extrapolation_uses_the_outer_slopes() -> None:
+def test_linear_extrapolation_uses_the_outer_slopes():
     curve = channel([(0, 0, 3.0, 7.0), (1, 0, 7.0, -2.0)], "linear", "linear")
     np.testing.assert_allclose(evaluate(curve, np.array([-1.0, 3.0])), [-3.0, -4.0])
 
 
 @pytest.mark.parametrize(("before", "after"), [*itertools.product(EXTRAPOLATIONS, repeat=2)])
-def test_extrapolation_before_and_after_is_independent(before: str, after: str) -> None:
+def test_extrapolation_before_and_after_is_independent(before, after):
     keys = [(0, 1, "smooth", "smooth"), (1, 3, "smooth", "smooth"), (3, 2, "smooth", "smooth")]
     times = np.linspace(-7, 9, 161)
     both = evaluate(channel(keys, before, after), times)
@@ -126,24 +126,24 @@ def test_extrapolation_before_and_after_is_independent(before: str, after: str) 
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("keys", [[(2.0, 5.0)], [(2.0, 4.0), (2.0, 5.0)]])
-def test_keys_at_a_single_time_are_constant(mode: str, keys: list[tuple[float, float]]) -> None:
+def test_keys_at_a_single_time_are_constant(mode, keys):
     curve = channel([(t, v, "smooth", "linear") for t, v in keys], mode, mode)
     np.testing.assert_array_equal(evaluate(curve, np.array([-9.0, 2.0, 9.0])), 5.0)
 
 
-def test_channel_without_keys_is_zero() -> None:
+def test_channel_without_keys_is_zero():
     empty = Channel(0, np.zeros(0), np.zeros(0), ())
     np.testing.assert_array_equal(evaluate(empty, np.array([-1.0, 0.0, 5.0])), 0.0)
 
 
-def test_keys_at_equal_times_are_a_jump_without_dividing_by_zero() -> None:
+def test_keys_at_equal_times_are_a_jump_without_dividing_by_zero():
     keys = [(0, 0), (1, 1), (1, 5), (2, 6)]
     for rule in TANGENT_RULES:
         values = evaluate(channel([(t, v, rule, rule) for t, v in keys]), np.array([1.0, 1.5]))
         assert values[0] == 5.0 and np.isfinite(values).all()
 
 
-def test_decreasing_times_are_refused() -> None:
+def test_decreasing_times_are_refused():
     with pytest.raises(RigError, match="non-decreasing"):
         channel([(1, 0, "flat", "flat"), (0, 0, "flat", "flat")])
 
@@ -169,7 +169,7 @@ def test_decreasing_times_are_refused() -> None:
         ),
     ],
 )
-def test_misfit_names_incompatible_joints(rows, reason) -> None:
+def test_misfit_names_incompatible_joints(rows, reason):
     skeleton = hand_made.skeleton([-1, 0], [(*row, 0.0) for row in rows])
     found = misfit(Clip("walk", (), 0.0, 1.0), skeleton)
     assert found == Phrase(
@@ -179,7 +179,7 @@ def test_misfit_names_incompatible_joints(rows, reason) -> None:
     )
 
 
-def test_misfit_is_empty_if_a_clip_fits() -> None:
+def test_misfit_is_empty_if_a_clip_fits():
     skeleton = hand_made.skeleton([-1], [(0, kind, 0.0) for kind in DOF_KINDS])
     still = [Channel(dof, [0.0], [0.0], (("flat", "flat"),)) for dof in range(6)]
     assert misfit(Clip("still", tuple(still), 0.0, 1.0), skeleton) is None
@@ -187,7 +187,7 @@ def test_misfit_is_empty_if_a_clip_fits() -> None:
     assert misfit(short, skeleton) == "needs 6 (3 + 3 x 1 joints)"
 
 
-def test_skel_rigs_list_translation_then_rotations_joint_by_joint() -> None:
+def test_skel_rigs_list_translation_then_rotations_joint_by_joint():
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, kind, 0.0) for kind in "xyz"]
     assert is_course_rig(hand_made.skeleton([-1, 0], rows))
@@ -204,19 +204,19 @@ def test_skel_rigs_list_translation_then_rotations_joint_by_joint() -> None:
         ((("flat", "flat"),), ("cycle",), "expected two of constant"),
     ],
 )
-def test_channel_refuses_unknown_rules(tangents, modes, message) -> None:
+def test_channel_refuses_unknown_rules(tangents, modes, message):
     with pytest.raises(RigError, match=message):
         Channel(0, np.zeros(1), np.zeros(1), tangents, modes)
 
 
 @pytest.mark.parametrize(("start", "end"), [(2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
-def test_clip_refuses_an_invalid_range(start, end) -> None:
+def test_clip_refuses_an_invalid_range(start, end):
     with pytest.raises(RigError, match="clip odd: expected a range, found"):
         Clip("odd", (), start, end)
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
-def test_real_walk_has_the_published_values() -> None:
+def test_real_walk_has_the_published_values():
     """The values are in section 10 of the format's specification."""
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     clip = scene.actors[0].clip
@@ -338,7 +338,7 @@ def assert_is_the_plain_curve(channels, times):
 
 
 @pytest.mark.parametrize("modes", MODE_PAIRS, ids="-".join)
-def test_every_pair_of_tangents_and_extrapolations_agrees(modes) -> None:
+def test_every_pair_of_tangents_and_extrapolations_agrees(modes):
     rng = np.random.default_rng(11)
     channels = [
         random_channel(rng, 3 * number, 4, [pair, TANGENT_PAIRS[-number], pair, pair], modes)
@@ -348,7 +348,7 @@ def test_every_pair_of_tangents_and_extrapolations_agrees(modes) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_random_clips_with_few_and_many_keys_agree(seed) -> None:
+def test_random_clips_with_few_and_many_keys_agree(seed):
     rng = np.random.default_rng(seed)
     counts = [0, 1, 2, 3, 30, *rng.integers(0, 9, 12).tolist()]
     channels = [random_channel(rng, row, count) for row, count in enumerate(counts)]
@@ -357,7 +357,7 @@ def test_random_clips_with_few_and_many_keys_agree(seed) -> None:
     assert_is_the_plain_curve(channels, rng.uniform(-3700, 3700, 60))
 
 
-def test_batch_of_times_has_the_same_values_as_single_times() -> None:
+def test_batch_of_times_has_the_same_values_as_single_times():
     """Long lists of times are searched channel by channel, short lists for all channels at once."""
     rng = np.random.default_rng(5)
     clip = Clip("two ways", tuple(random_channel(rng, row, 7) for row in range(5)), 0.0, 1.0)
@@ -371,14 +371,14 @@ def test_batch_of_times_has_the_same_values_as_single_times() -> None:
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("rule", ["flat", "linear", "smooth", -3.5], ids=str)
-def test_keys_are_reproduced_exactly(mode, rule) -> None:
+def test_keys_are_reproduced_exactly(mode, rule):
     times = np.array([-0.7, 0.1, 0.3, 1.9, 2.2])
     values = np.array([0.1, -0.3, 7.7, 1e-9, 0.7])
     curve = Channel(0, times, values, ((rule, rule),) * 5, (mode, mode))
     np.testing.assert_array_equal(evaluate(curve, times), values)
 
 
-def test_ends_repeat_after_whole_periods() -> None:
+def test_ends_repeat_after_whole_periods():
     """The times are first + k T; the period T is a power of two, so that they are exact."""
     turns = np.arange(-5, 6)
     times, values = np.array([0.5, 1.0, 2.5]), np.array([3.0, -1.0, 4.0])
@@ -395,7 +395,7 @@ def test_ends_repeat_after_whole_periods() -> None:
 
 
 @pytest.mark.parametrize("start", [3600.0, -36000.0, 1e6])
-def test_hours_of_playback_do_not_drift(start) -> None:
+def test_hours_of_playback_do_not_drift(start):
     """A period of 0.1 s, which is not exact in floating point, is repeated many thousand times."""
     times = np.array([0.0, 0.04, 0.1])
     curve = Channel(0, times, np.array([0.0, 1.0, 0.0]), (("smooth", 0.0),) * 3, ("cycle", "cycle"))
@@ -406,7 +406,7 @@ def test_hours_of_playback_do_not_drift(start) -> None:
         assert far == pytest.approx(float(evaluate(curve, np.array(phase))), abs=40 * 2e-10)
 
 
-def test_times_an_hour_away_exceed_float32_precision() -> None:
+def test_times_an_hour_away_exceed_float32_precision():
     """After an hour, a frame of 1/1000 s changes the value, which it would not in float32."""
     curve = Channel(
         0, np.array([0.0, 1.0]), np.array([0.0, 1.0]), (("linear",) * 2,) * 2, ("cycle",) * 2
@@ -415,7 +415,7 @@ def test_times_an_hour_away_exceed_float32_precision() -> None:
     np.testing.assert_allclose(values, [0.25, 0.251, 0.252], atol=1e-12)
 
 
-def test_outermost_of_coincident_keys_are_the_ends() -> None:
+def test_outermost_of_coincident_keys_are_the_ends():
     times, values = np.array([1.0, 1.0, 2.0, 2.0]), np.array([5.0, 6.0, 7.0, 8.0])
     curve = Channel(0, times, values, ((2.0, 3.0),) * 4, ("constant", "linear"))
     np.testing.assert_array_equal(
@@ -425,14 +425,14 @@ def test_outermost_of_coincident_keys_are_the_ends() -> None:
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("gap", [1e-300, 5e-324, 1e-12])
-def test_keys_closer_than_a_nanosecond_are_at_one_time(mode, gap) -> None:
+def test_keys_closer_than_a_nanosecond_are_at_one_time(mode, gap):
     curve = Channel(
         0, np.array([0.0, gap]), np.array([1.0, 3e38]), (("linear", "smooth"),) * 2, (mode, mode)
     )
     np.testing.assert_array_equal(evaluate(curve, np.array([-1e30, 0.0, 1e38])), 3e38)
 
 
-def test_largest_numbers_in_files_have_finite_results() -> None:
+def test_largest_numbers_in_files_have_finite_results():
     big = 3.4e38
     for mode in EXTRAPOLATIONS:
         curve = Channel(
@@ -445,7 +445,7 @@ def test_largest_numbers_in_files_have_finite_results() -> None:
         assert np.isfinite(evaluate(curve, np.array([-big, -1.0, 0.5e-8, 1.0, big]))).all()
 
 
-def test_empty_clips_and_non_finite_times_are_supported() -> None:
+def test_empty_clips_and_non_finite_times_are_supported():
     targets, values = evaluate_all(Clip("none", (), 0.0, 1.0), np.array([0.0, 1.0]))
     assert targets.shape == (0,) and values.shape == (2, 0)
     one = Channel(4, np.array([0.0, 1.0]), np.array([1.0, 2.0]), (("flat", "flat"),) * 2)

@@ -51,7 +51,7 @@ def same_but(new, old, **changed):
 @pytest.mark.parametrize("rule", ["flat", "linear", "smooth", 0.5])
 @pytest.mark.parametrize("time", [0.25, 1.75, 2.999])
 @pytest.mark.parametrize("modes", [("linear", "linear"), ("cycle_offset", "bounce")])
-def test_key_added_on_the_curve_does_not_change_it(rule, time, modes) -> None:
+def test_key_added_on_the_curve_does_not_change_it(rule, time, modes):
     curve = channel((0.0, 1.0, 3.0, 3.5), (0.0, 2.0, -2.0, 1.0), rule, modes)
     longer, index = add_key(curve, time)
     assert len(longer.times) == 5 and longer.times[index] == time
@@ -60,7 +60,7 @@ def test_key_added_on_the_curve_does_not_change_it(rule, time, modes) -> None:
     assert len(curve.times) == 4
 
 
-def test_key_added_on_the_curve_has_its_slope() -> None:
+def test_key_added_on_the_curve_has_its_slope():
     # 3 u^2 - 2 u^3 over 2 s from 0 to 4: the middle is 2, and its slope is 4 * 1.5 / 2 per second.
     curve = channel((0.0, 2.0), (0.0, 4.0), "flat")
     longer, index = add_key(curve, 1.0)
@@ -68,7 +68,7 @@ def test_key_added_on_the_curve_has_its_slope() -> None:
     assert longer.tangents == (("flat", "flat"), (3.0, 3.0), ("flat", "flat"))
 
 
-def test_key_added_with_a_value_is_smooth_and_keeps_other_tangent_rules() -> None:
+def test_key_added_with_a_value_is_smooth_and_keeps_other_tangent_rules():
     longer, index = add_key(channel(), 2.0, 7.0)
     assert index == 2
     same_but(
@@ -83,7 +83,7 @@ def test_key_added_with_a_value_is_smooth_and_keeps_other_tangent_rules() -> Non
 
 
 @pytest.mark.parametrize(("time", "index", "value"), [(-1.0, 0, -2.0), (3.5, 3, -4.0)])
-def test_key_added_outside_is_on_the_extrapolation(time, index, value) -> None:
+def test_key_added_outside_is_on_the_extrapolation(time, index, value):
     # Linear extrapolation with the slopes at the ends: -2 and -4 per second.
     longer, found = add_key(channel((0, 1, 2), (0, 2, -2), "linear", ("linear",) * 2), time)
     assert found == index
@@ -93,7 +93,7 @@ def test_key_added_outside_is_on_the_extrapolation(time, index, value) -> None:
         assert longer.values[3] == -2.0 - 4.0 * 1.5
 
 
-def test_key_added_at_an_existing_time_replaces_the_value() -> None:
+def test_key_added_at_an_existing_time_replaces_the_value():
     changed, index = add_key(channel(), 1.0, 9.0)
     assert index == 1
     same_but(changed, channel(), values=[0, 9, -2])
@@ -104,13 +104,13 @@ def test_key_added_at_an_existing_time_replaces_the_value() -> None:
     assert changed.tangents[1] == ("flat", 3.0) and changed.values[1] == 2.0
 
 
-def test_first_key_of_an_empty_channel_is_added() -> None:
+def test_first_key_of_an_empty_channel_is_added():
     empty = Channel(2, np.zeros(0), np.zeros(0), ())
     first, index = add_key(empty, 1.5)
     assert (index, first.times.tolist(), first.values.tolist()) == (0, [1.5], [0.0])
 
 
-def test_slope_is_evaluated_between_and_outside_of_the_keys() -> None:
+def test_slope_is_evaluated_between_and_outside_of_the_keys():
     curve = channel((0.0, 2.0), (0.0, 4.0), "flat")
     # d/dt of 4 (3 u^2 - 2 u^3), u = t / 2, is 12 (u - u^2).
     for time in (0.0, 0.5, 1.0, 2.0):
@@ -122,7 +122,7 @@ def test_slope_is_evaluated_between_and_outside_of_the_keys() -> None:
 # Moving
 
 
-def test_moved_keys_keep_order_and_index() -> None:
+def test_moved_keys_keep_order_and_index():
     same_but(move_keys(channel(), [1], 0.5, 1.0), channel(), times=[0, 1.5, 3], values=[0, 3, -2])
     same_but(
         move_keys(channel(), [0, 1], -2.0, 0.5),
@@ -145,17 +145,17 @@ def test_moved_keys_keep_order_and_index() -> None:
         ([2], 5.0, [0, 1, 8]),
     ],
 )
-def test_moved_keys_stop_at_unselected_keys(keys, dt, times) -> None:
+def test_moved_keys_stop_at_unselected_keys(keys, dt, times):
     assert move_keys(channel(), keys, dt, 0.0).times.tolist() == times
 
 
-def test_moved_keys_keep_a_minimum_gap_if_possible() -> None:
+def test_moved_keys_keep_a_minimum_gap_if_possible():
     assert move_keys(channel(), [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 2.75, 3]
     close = channel((0.0, 1.0, 1.1))
     assert move_keys(close, [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 1, 1.1]
 
 
-def test_rounding_does_not_reorder_or_move_neighbours() -> None:
+def test_rounding_does_not_reorder_or_move_neighbours():
     rng = np.random.default_rng(2)
     for _ in range(200):
         times = np.sort(rng.uniform(-1e3, 1e3, 3))
@@ -164,13 +164,13 @@ def test_rounding_does_not_reorder_or_move_neighbours() -> None:
             assert (moved[[0, 2]] == times[[0, 2]]).all() and (np.diff(moved) >= 0).all()
 
 
-def test_set_key_stores_time_and_value_exactly() -> None:
+def test_set_key_stores_time_and_value_exactly():
     same_but(set_key(channel(), 1, 0.1, 0.7), channel(), times=[0, 0.1, 3], values=[0, 0.7, -2])
     same_but(set_key(channel(), 2, value=4.5), channel(), values=[0, 2, 4.5])
     assert set_key(channel(), 1, 9.0).times.tolist() == [0, 3, 3]
 
 
-def test_deleted_keys_lose_their_tangents() -> None:
+def test_deleted_keys_lose_their_tangents():
     curve = set_tangent(channel(), 1, 0, 5.0)
     same_but(delete_keys(curve, [0, 2]), curve, times=[1], values=[2], tangents=((5.0, "smooth"),))
     assert len(delete_keys(curve, range(3)).times) == 0
@@ -180,7 +180,7 @@ def test_deleted_keys_lose_their_tangents() -> None:
 # Tangents, extrapolation and range
 
 
-def test_tangents_change_on_one_side() -> None:
+def test_tangents_change_on_one_side():
     changed = set_tangent(set_tangent(channel(), 1, 0, "flat"), 1, 1, -3.0)
     assert changed.tangents == (("smooth", "smooth"), ("flat", -3.0), ("smooth", "smooth"))
     assert slopes(changed)[1].tolist() == [0.0, -3.0]
@@ -189,7 +189,7 @@ def test_tangents_change_on_one_side() -> None:
             set_tangent(channel(), 1, 0, wrong)
 
 
-def test_extrapolation_changes_at_one_end() -> None:
+def test_extrapolation_changes_at_one_end():
     same_but(
         set_extrapolation(channel(), 0, "bounce"), channel(), extrapolation=("bounce", "cycle")
     )
@@ -198,13 +198,13 @@ def test_extrapolation_changes_at_one_end() -> None:
     )
 
 
-def test_range_is_ordered_and_channels_are_unchanged() -> None:
+def test_range_is_ordered_and_channels_are_unchanged():
     clip = Clip("c", (channel(),), 0.0, 1.0)
     changed = set_range(clip, 5.0, 2.0)
     assert (changed.start, changed.end) == (2.0, 5.0) and changed.channels is clip.channels
 
 
-def test_replacing_one_channel_keeps_other_channel_objects() -> None:
+def test_replacing_one_channel_keeps_other_channel_objects():
     other = Channel(1, np.zeros(1), np.ones(1), (("flat", "flat"),))
     clip = Clip("c", (other, channel()), 0.0, 1.0)
     changed = with_channel(clip, 4, lambda old: delete_keys(old, [0]))
@@ -218,7 +218,7 @@ def test_replacing_one_channel_keeps_other_channel_objects() -> None:
 # Keys of whole poses
 
 
-def test_clip_of_a_pose_is_constant() -> None:
+def test_clip_of_a_pose_is_constant():
     pose = rest_pose(rig())
     pose.dofs[:] = [1, 2, 3, 0.1, 0.2, 0.3]
     clip = clip_from_pose(rig(), pose, "new", 2.0, 5.0)
@@ -229,12 +229,12 @@ def test_clip_of_a_pose_is_constant() -> None:
     assert [one.times.tolist() for one in clip.channels] == [[2.0]] * 6
 
 
-def test_empty_clip_has_a_channel_for_every_dof_and_no_key() -> None:
+def test_empty_clip_has_a_channel_for_every_dof_and_no_key():
     clip = empty_clip(rig(), "none")
     assert [(one.target, len(one.times)) for one in clip.channels] == [(dof, 0) for dof in range(6)]
 
 
-def test_keyed_pose_is_reproduced_exactly_and_extends_the_range() -> None:
+def test_keyed_pose_is_reproduced_exactly_and_extends_the_range():
     pose = rest_pose(rig())
     clip = clip_from_pose(rig(), pose, "new", 0.0, 1.0)
     pose.dofs[:] = [1, 0, 0, 0.25, 0, -0.5]
@@ -245,7 +245,7 @@ def test_keyed_pose_is_reproduced_exactly_and_extends_the_range() -> None:
     assert [len(one.times) for one in longer.channels] == [2] * 6
 
 
-def test_only_changed_dofs_get_keys_if_requested() -> None:
+def test_only_changed_dofs_get_keys_if_requested():
     pose = rest_pose(rig())
     clip = clip_from_pose(rig(), pose, "new")
     pose.dofs[3] = 0.25
@@ -253,7 +253,7 @@ def test_only_changed_dofs_get_keys_if_requested() -> None:
     assert [len(one.times) for one in changed.channels] == [1, 1, 1, 2, 1, 1]
 
 
-def test_clamping_is_not_a_change() -> None:
+def test_clamping_is_not_a_change():
     """A curve beyond the limits is clamped, so the pose at the limit is unchanged."""
     beyond = Channel(5, np.zeros(1), np.full(1, 4.0), (("flat", "flat"),))
     clip = Clip("beyond", (beyond,), 0.0, 1.0)
@@ -263,7 +263,7 @@ def test_clamping_is_not_a_change() -> None:
     assert [one.target for one in changed.channels] == [5] and len(changed.channels[0].times) == 1
 
 
-def test_keying_again_at_the_same_time_replaces_keys() -> None:
+def test_keying_again_at_the_same_time_replaces_keys():
     pose = rest_pose(rig())
     clip = clip_from_pose(rig(), pose, "new")
     pose.dofs[:] = 0.5
@@ -274,7 +274,7 @@ def test_keying_again_at_the_same_time_replaces_keys() -> None:
 # Frames
 
 
-def test_frames_are_converted_to_keys_and_constant_dofs_to_one_key() -> None:
+def test_frames_are_converted_to_keys_and_constant_dofs_to_one_key():
     times = np.array([0.5, 0.75, 1.0])
     dofs = np.array([[1.0, 7.0], [2.0, 7.0], [4.0, 7.0]])
     clip = clip_from_frames("walk", dofs, times)
@@ -290,7 +290,7 @@ def test_frames_are_converted_to_keys_and_constant_dofs_to_one_key() -> None:
     assert evaluate(smooth.channels[0], middle) == pytest.approx(1.5 + 0.25 * (4 - 6) / 8)
 
 
-def test_missing_frames_get_no_keys_and_the_range_is_unchanged() -> None:
+def test_missing_frames_get_no_keys_and_the_range_is_unchanged():
     times, dofs = np.arange(4.0), np.array([[0.0], [1.0], [9.0], [3.0]])
     clip = clip_from_frames("gap", dofs, times, present=np.array([False, True, False, True]))
     assert clip.channels[0].times.tolist() == [1.0, 3.0]
@@ -298,7 +298,7 @@ def test_missing_frames_get_no_keys_and_the_range_is_unchanged() -> None:
     assert evaluate(clip.channels[0], np.array(2.0)) == 2.0
 
 
-def test_motion_without_frames_is_refused() -> None:
+def test_motion_without_frames_is_refused():
     with pytest.raises(RigError) as caught:
         clip_from_frames("gap", np.zeros((1, 1)), np.zeros(1), present=np.array([False]))
     assert str(caught.value) == "clip gap: expected at least one frame, found none"

@@ -119,7 +119,7 @@ def joints(row: int, pose: str, trans: str) -> Any:
     return vertices("smpl", model("smpl"), found["betas"][row], turned, found[trans][row])[1]
 
 
-def test_arrays_have_all_frames_and_their_presence(scenes: dict[str, Scene]) -> None:
+def test_arrays_have_all_frames_and_their_presence(scenes):
     motion = viewer.motion(scenes["world"].actors[1])
     assert (motion.name, motion.frame_rate) == ("wham_output 4", 30.0)
     assert motion.frames.tolist() == [*range(8)]
@@ -128,7 +128,7 @@ def test_arrays_have_all_frames_and_their_presence(scenes: dict[str, Scene]) -> 
     assert_array_equal(motion.parents, joint_parents("smpl"))
 
 
-def test_rotations_and_translations_are_those_of_the_file(scenes: dict[str, Scene]) -> None:
+def test_rotations_and_translations_are_those_of_the_file(scenes):
     motion = viewer.motion(scenes["world"].actors[1])
     found = wham()[4]
     for row, frame in enumerate((3, 4, 6, 7)):
@@ -138,7 +138,7 @@ def test_rotations_and_translations_are_those_of_the_file(scenes: dict[str, Scen
         assert_allclose(motion.shape_weights[frame], found["betas"][row], atol=1e-9)
 
 
-def test_joints_are_returned_in_the_space_of_the_file_and_upright(scenes: dict[str, Scene]) -> None:
+def test_joints_are_returned_in_the_space_of_the_file_and_upright(scenes):
     motion = viewer.motion(scenes["camera"].actors[1])
     wanted = joints(1, "pose", "trans")
     assert_allclose(motion.joints("figure")[4], wanted, atol=1e-6)
@@ -146,13 +146,13 @@ def test_joints_are_returned_in_the_space_of_the_file_and_upright(scenes: dict[s
     assert np.isnan(motion.joints()[5]).all()
 
 
-def test_gaps_may_be_interpolated(scenes: dict[str, Scene]) -> None:
+def test_gaps_may_be_interpolated(scenes):
     motion = viewer.motion(scenes["world"].actors[1], interpolate=True)
     assert motion.present[5]
     assert_allclose(motion.translations[5], motion.translations[[4, 6]].mean(axis=0), atol=1e-9)
 
 
-def test_unknown_spaces_are_refused(scenes: dict[str, Scene]) -> None:
+def test_unknown_spaces_are_refused(scenes):
     with pytest.raises(RigError, match='no space "camera"'):
         viewer.motion(scenes["world"].actors[0]).joints("camera")
 

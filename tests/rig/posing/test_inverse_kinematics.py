@@ -39,7 +39,7 @@ def hand_at(skeleton: Skeleton, dofs: np.ndarray) -> np.ndarray:
     )
 
 
-def test_arm_reaches_a_target_by_the_law_of_cosines() -> None:
+def test_arm_reaches_a_target_by_the_law_of_cosines():
     skeleton = arm()
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.3, 0.4
@@ -51,7 +51,7 @@ def test_arm_reaches_a_target_by_the_law_of_cosines() -> None:
     assert_allclose(pose.dofs, [0.3, 0.4])  # the start pose is unchanged
 
 
-def test_unreachable_target_is_pointed_at_with_a_straight_arm() -> None:
+def test_unreachable_target_is_pointed_at_with_a_straight_arm():
     skeleton = arm()
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.5, 1.0
@@ -60,21 +60,21 @@ def test_unreachable_target_is_pointed_at_with_a_straight_arm() -> None:
     assert_allclose(hand_at(skeleton, found.dofs), [0, 2, 0], atol=0.05)
 
 
-def test_straight_arm_bends_for_a_target_towards_its_shoulder() -> None:
+def test_straight_arm_bends_for_a_target_towards_its_shoulder():
     skeleton = arm()
     found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]), rounds=200)
     assert found.distance < 1e-5
     assert_allclose(abs(found.dofs[1]), 2 * np.pi / 3, atol=1e-4)  # an equilateral triangle
 
 
-def test_elbow_bends_only_to_the_side_that_its_limits_allow() -> None:
+def test_elbow_bends_only_to_the_side_that_its_limits_allow():
     skeleton = arm({1: (0.0, 2.5)})
     found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]), rounds=200)
     assert found.distance < 1e-5
     assert_allclose(found.dofs[1], 2 * np.pi / 3, atol=1e-4)
 
 
-def test_reached_limit_is_reported_and_another_joint_compensates() -> None:
+def test_reached_limit_is_reported_and_another_joint_compensates():
     skeleton = arm({1: (0.0, 1.0)})
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.1, 0.5
@@ -87,14 +87,14 @@ def test_reached_limit_is_reported_and_another_joint_compensates() -> None:
     assert_allclose(found.dofs[0], np.pi / 2 - 0.5, atol=1e-2)
 
 
-def test_start_outside_its_limits_is_clamped() -> None:
+def test_start_outside_its_limits_is_clamped():
     skeleton = arm({1: (0.0, 1.0)})
     pose = rest_pose(skeleton)
     pose.dofs[1] = 2.0
     assert 0 <= reach(skeleton, pose, 2, np.array([2.0, 0, 0])).dofs[1] <= 1
 
 
-def test_jacobian_matches_finite_differences() -> None:
+def test_jacobian_matches_finite_differences():
     rng = np.random.default_rng(3)
     skeleton = ball_skeleton(("a", "b", "c", "d"), np.array([-1, 0, 1, 2]), rng.normal(size=(4, 3)))
     turned = rng.normal(size=(4, 4))
@@ -116,7 +116,7 @@ def test_jacobian_matches_finite_differences() -> None:
         assert_allclose(found[:, row], (ends[0] - ends[1]) / 2e-5, atol=1e-8)
 
 
-def test_chain_has_the_nearest_rotatable_joints() -> None:
+def test_chain_has_the_nearest_rotatable_joints():
     skeleton = ball_skeleton(tuple("abcd"), np.array([-1, 0, 1, 2]), np.zeros((4, 3)))
     assert chain_above(skeleton, 3, 2).tolist() == [2, 1]
     assert chain_above(skeleton, 3, 9).tolist() == [2, 1, 0]
@@ -125,12 +125,12 @@ def test_chain_has_the_nearest_rotatable_joints() -> None:
     assert chain_above(replace(skeleton, dof_limits=limits), 3, 2).tolist() == [1, 0]
 
 
-def test_chain_of_one_does_not_move_the_joints_above_it() -> None:
+def test_chain_of_one_does_not_move_the_joints_above_it():
     skeleton = arm()
     found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 1.0, 0.0]), length=1)
     assert_allclose(found.dofs, [0.0, np.pi / 2], atol=1e-5)
 
 
-def test_root_has_no_chain() -> None:
+def test_root_has_no_chain():
     with pytest.raises(RigError, match=r"^no joint above shoulder can rotate$"):
         reach(arm(), rest_pose(arm()), 0, np.zeros(3))

@@ -256,7 +256,7 @@ def single(axes: str, *limits: tuple[float, float], quaternion=(0, 0, 0, 1)) -> 
 
 
 @pytest.mark.parametrize("order", ["".join(order) for order in itertools.permutations("xyz")])
-def test_rotation_about_three_axes_in_any_order_is_exact(order) -> None:
+def test_rotation_about_three_axes_in_any_order_is_exact(order):
     skeleton = single(order, quaternion=(0.1, -0.3, 0.2, 0.9))
     pose = rest_pose(skeleton)
     for seed in range(20):
@@ -277,7 +277,7 @@ def test_rotation_about_three_axes_in_any_order_is_exact(order) -> None:
         assert found.error < 1e-7 and len(found.limited) == 0
 
 
-def test_axes_are_applied_in_the_order_of_the_rows() -> None:
+def test_axes_are_applied_in_the_order_of_the_rows():
     # Rows z, x, y: z is applied first, so R = Ry Rx Rz.
     angles = np.array([0.3, -0.4, 1.1])
     wanted = about_axis(1, 1.1) @ about_axis(0, -0.4) @ about_axis(2, 0.3)
@@ -286,7 +286,7 @@ def test_axes_are_applied_in_the_order_of_the_rows() -> None:
     assert_allclose(found.dofs, angles, atol=1e-12)
 
 
-def test_solution_nearer_the_current_values_is_chosen() -> None:
+def test_solution_nearer_the_current_values_is_chosen():
     skeleton = single("xyz")
     pose = rest_pose(skeleton)
     # With y beyond a right angle, the rotation equals that of (x + pi, pi - y, z + pi).
@@ -299,7 +299,7 @@ def test_solution_nearer_the_current_values_is_chosen() -> None:
     assert_allclose(found, [0.05 + 4 * np.pi, 2.1, 0.25], atol=1e-9)
 
 
-def test_limits_select_the_allowed_solution() -> None:
+def test_limits_select_the_allowed_solution():
     # Only y between 1.6 and 2.5 is allowed; the principal solution has y below pi / 2.
     skeleton = single("xyz", FREE, (1.6, 2.5), FREE)
     wanted = about_axis(2, 0.4) @ about_axis(1, 2.2) @ about_axis(0, -0.3)
@@ -307,13 +307,13 @@ def test_limits_select_the_allowed_solution() -> None:
     assert_allclose(found.dofs, [-0.3, 2.2, 0.4], atol=1e-9)
 
 
-def test_solution_360_degrees_away_within_the_limits_is_found() -> None:
+def test_solution_360_degrees_away_within_the_limits_is_found():
     skeleton = single("x", (2 * np.pi + 0.1, 2 * np.pi + 1.0))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(0, 0.5))
     assert_allclose(found.dofs, [2 * np.pi + 0.5], atol=1e-12)
 
 
-def test_rotation_beyond_a_limit_is_replaced_by_the_nearest_and_its_dof_named() -> None:
+def test_rotation_beyond_a_limit_is_replaced_by_the_nearest_and_its_dof_named():
     skeleton = single("xyz", (-0.5, 0.5), (-0.5, 0.5), (-0.5, 0.5))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(1, 0.8))
     assert_allclose(found.dofs, [0, 0.5, 0], atol=1e-9)
@@ -321,7 +321,7 @@ def test_rotation_beyond_a_limit_is_replaced_by_the_nearest_and_its_dof_named() 
     assert found.error == pytest.approx(0.3)
 
 
-def test_no_rotation_within_the_limits_is_nearer() -> None:
+def test_no_rotation_within_the_limits_is_nearer():
     limits = ((-0.6, 0.4), (-0.3, 0.7), (-0.5, 0.2))
     skeleton = single("xyz", *limits)
     grids = [np.linspace(low, high, 15) for low, high in limits]
@@ -340,7 +340,7 @@ def test_no_rotation_within_the_limits_is_nearer() -> None:
         assert (found.dofs <= skeleton.dof_limits[:, 1]).all()
 
 
-def test_single_axis_takes_the_twist_about_it() -> None:
+def test_single_axis_takes_the_twist_about_it():
     skeleton = single("y")
     # For Ry(0.7) Rx(0.2), a single axis y is rotated by 0.7, because the trace is symmetric in x.
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(1, 0.7) @ about_axis(0, 0.2))
@@ -355,20 +355,20 @@ def test_single_axis_takes_the_twist_about_it() -> None:
     assert found.error > 0.1 and len(found.limited) == 0
 
 
-def test_joint_without_rotations_is_unchanged() -> None:
+def test_joint_without_rotations_is_unchanged():
     skeleton = single("")
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about_axis(2, 0.5))
     assert found.dofs.shape == (0,) and found.error == pytest.approx(0.5)
 
 
-def test_start_is_not_modified() -> None:
+def test_start_is_not_modified():
     skeleton = single("xyz")
     pose = rest_pose(skeleton)
     nearest_dofs(skeleton, pose, 0, about_axis(2, 0.5))
     assert not pose.dofs.any()
 
 
-def test_locked_dofs_are_ignored() -> None:
+def test_locked_dofs_are_ignored():
     assert rotates_freely(single("zyx"), 0)
     assert not rotates_freely(single("xyz", (0.2, 0.2)), 0)
     assert not rotates_freely(single("xyx"), 0)
@@ -381,20 +381,20 @@ def head(low: float, high: float) -> Skeleton:
     return make_skeleton(("head",), [-1], [[0, 0, 0]], (low, high))
 
 
-def test_angles_are_in_degrees_and_lengths_in_file_units() -> None:
+def test_angles_are_in_degrees_and_lengths_in_file_units():
     skeleton = head(-1.0, 1.0)
     assert dof_value_text(skeleton, 4, math.pi / 6) == "30.0°"
     assert dof_value_text(skeleton, 4, -0.0) == "0.0°"
     assert dof_value_text(skeleton, 1, 0.25) == "0.25"
 
 
-def test_value_and_limits_are_shown_together() -> None:
+def test_value_and_limits_are_shown_together():
     # 0.3 and 0.5 radians are 17.188734 and 28.647890 degrees.
     text = str(beyond_text(head(0.3, 0.5), 4, 0.0, " in frame 7"))
     assert text == "head.y is 0.0° in frame 7; its limits are 17.2° and 28.6°"
 
 
-def test_value_just_beyond_a_limit_is_distinguishable() -> None:
+def test_value_just_beyond_a_limit_is_distinguishable():
     # 1e-5 radians are 0.00057 degrees.
     text = str(beyond_text(head(0.3, 0.5), 4, 0.50001))
     assert text == "head.y is 28.6485°; its limits are 17.1887° and 28.6479°"
@@ -407,7 +407,7 @@ def test_value_just_beyond_a_limit_is_distinguishable() -> None:
         (0.0, np.inf, -math.pi, "head.y is -180.0°; its minimum is 0.0°"),
     ],
 )
-def test_single_limit_is_named(low: float, high: float, value: float, text: str) -> None:
+def test_single_limit_is_named(low, high, value, text):
     assert str(beyond_text(head(low, high), 4, value)) == text
 
 

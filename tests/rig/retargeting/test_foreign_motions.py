@@ -206,20 +206,20 @@ def assert_limbs_follow(found: SkeletonMotion, target: Figure) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_limbs_move_as_in_the_source_under_any_names(scheme: str) -> None:
+def test_limbs_move_as_in_the_source_under_any_names(scheme):
     assert_limbs_follow(motion(scheme), figure())
 
 
 @pytest.mark.parametrize("up", "yz")
 @pytest.mark.parametrize("world", "yz")
 @pytest.mark.parametrize("rest", "yzx")
-def test_figures_stand_whatever_the_up_axes_of_rest_pose_and_motion(rest, world, up) -> None:
+def test_figures_stand_whatever_the_up_axes_of_rest_pose_and_motion(rest, world, up):
     found = motion("mixamo", rest, world)
     assert found.figure.up == world
     assert_limbs_follow(found, figure(up))
 
 
-def test_feet_reach_the_ground_if_only_the_motion_has_z_up() -> None:
+def test_feet_reach_the_ground_if_only_the_motion_has_z_up():
     heights = []
     for found in (motion(rest="y", world="y"), motion(rest="y", world="z")):
         clip, _ = retarget(found, figure(), source_rest="auto")
@@ -228,7 +228,7 @@ def test_feet_reach_the_ground_if_only_the_motion_has_z_up() -> None:
     assert_allclose(heights[1], heights[0], atol=1e-4)
 
 
-def test_a_person_lying_on_the_ground_is_no_evidence_for_another_up_axis() -> None:
+def test_a_person_lying_on_the_ground_is_no_evidence_for_another_up_axis():
     # On the belly, with the head towards +z; the arms reach the ground, 40 cm below.
     lying = motion(tilt=90.0, place=(0.0, 40.0, -200.0))
     assert lying.figure.up == "y"

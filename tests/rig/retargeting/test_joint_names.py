@@ -35,14 +35,14 @@ def tree(text: str) -> tuple[list[str], list[str], np.ndarray]:
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_program_names_map_to_family_joints(table: str) -> None:
+def test_program_names_map_to_family_joints(table):
     names, meanings, parents = tree(TABLES[table])
     found = canonical_names(names, parents)
     assert dict(zip(names, found, strict=True)) == dict(zip(names, meanings, strict=True))
 
 
 @pytest.mark.parametrize("count", [24, 52, 55, 16])
-def test_family_names_map_to_themselves(count: int) -> None:
+def test_family_names_map_to_themselves(count):
     member = FAMILY[count]
     assert canonical_names(member.names, np.array(member.parents)) == member.names
 
@@ -52,29 +52,29 @@ def test_family_names_map_to_themselves(count: int) -> None:
     ["left_hip", "LeftHip", "L_Hip", "l_hip", "hip.L", "Hip_L", "hip_left", "LEFT_HIP", "lHip",
      "hip-l", "LeftThigh", "thigh.left", "L Thigh", "lthigh", "leftupleg", "ns:sub:LHip"],
 )  # fmt: skip
-def test_sides_are_recognised_at_either_end_of_a_name(name: str) -> None:
+def test_sides_are_recognised_at_either_end_of_a_name(name):
     assert canonical_names(["pelvis", name], np.array([-1, 0]))[1] == "left_hip"
 
 
-def test_no_canonical_name_occurs_twice() -> None:
+def test_no_canonical_name_occurs_twice():
     names = ["Hips", "LeftShin", "LeftKnee", "Head", "Head"]
     found = canonical_names(names, np.array([-1, 0, 1, 0, 3]))
     assert found == ("pelvis", "left_knee", "", "head", "")
 
 
 @pytest.mark.parametrize("word", ["leg", "index", "foot", "shoulder"])
-def test_numbers_of_thousands_of_digits_are_no_error(word: str) -> None:
+def test_numbers_of_thousands_of_digits_are_no_error(word):
     names = ["hips", f"{word}_l", f"{word}{'1' * 5000}_l"]
     meanings = canonical_names(names, np.array([-1, 0, 1], dtype=np.int32))
     assert meanings[2] == ""
 
 
-def test_unknown_names_have_no_canonical_name() -> None:
+def test_unknown_names_have_no_canonical_name():
     names = ["", "bone1", "bone2", "left", "tail_01", "wing_02_r", "123", "é"]
     assert canonical_names(names, np.arange(8) - 1) == ("",) * 8
 
 
-def test_huge_skeletons_are_not_bodies() -> None:
+def test_huge_skeletons_are_not_bodies():
     start = time.process_time()
     assert set(canonical_names(["LeftArm"] * 50000, np.arange(50000) - 1)) == {""}
     deep = canonical_names(["spine", "LeftArm", "RightArm"] * 600, np.arange(1800) - 1)

@@ -286,7 +286,7 @@ def test_mirrored_hip_rotation_is_its_mirror_image():
     assert_allclose(found, flip @ turn @ flip, atol=1e-15)
 
 
-def test_humanoid_bones_pair_the_joints_of_a_figure_with_a_sword() -> None:
+def test_humanoid_bones_pair_the_joints_of_a_figure_with_a_sword():
     table = BODY | {
         "sword": ("left_wrist", (0.6, 0.9, 0.3)),
         "Ear_L": ("head", (0.1, 1.6, 0.0)),

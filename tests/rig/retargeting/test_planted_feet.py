@@ -75,7 +75,7 @@ def slid(figure: Figure, clip: SampledClip, names: tuple[str, str]) -> list[Floa
 TOES = ("LeftToeBase_", "RightToeBase_")
 
 
-def test_standing_feet_are_fixed_on_the_ground() -> None:
+def test_standing_feet_are_fixed_on_the_ground():
     found, clip, changes = planted()
     before, after = slid(OTHER, found.clip, TOES), slid(OTHER, clip, TOES)
     assert len(after) == 3 and np.max(before) > 1.0
@@ -90,7 +90,7 @@ def test_standing_feet_are_fixed_on_the_ground() -> None:
     assert changes.gap_after < EXACT < changes.gap_before
 
 
-def test_legs_keep_their_length_and_feet_and_trunk_keep_their_orientation() -> None:
+def test_legs_keep_their_length_and_feet_and_trunk_keep_their_orientation():
     found, clip, _ = planted()
     assert_allclose(np.linalg.norm(clip.rotations, axis=-1), 1.0, atol=1e-9)
     old, new = places(OTHER, found.clip), places(OTHER, clip)
@@ -101,7 +101,7 @@ def test_legs_keep_their_length_and_feet_and_trunk_keep_their_orientation() -> N
         assert_allclose(new[end] - new[start], old[end] - old[start], atol=1e-9)
 
 
-def test_knees_accelerate_little_more_than_in_the_source() -> None:
+def test_knees_accelerate_little_more_than_in_the_source():
     found, clip, _ = planted()
     where = places(OTHER, clip), places(found.source.figure, found.source.clip)
     peaks = []
@@ -114,7 +114,7 @@ def test_knees_accelerate_little_more_than_in_the_source() -> None:
     assert peaks[0] < 1.2 * peaks[1]
 
 
-def test_feet_are_planted_at_the_height_of_each_stair() -> None:
+def test_feet_are_planted_at_the_height_of_each_stair():
     found, clip, changes = planted(rise=8.0)
     assert changes.is_better
     where = places(OTHER, clip)
@@ -126,7 +126,7 @@ def test_feet_are_planted_at_the_height_of_each_stair() -> None:
     assert_allclose(slid(OTHER, clip, TOES), 0.0, atol=EXACT)
 
 
-def test_planting_does_not_depend_on_the_rest_pose_of_the_file() -> None:
+def test_planting_does_not_depend_on_the_rest_pose_of_the_file():
     clips = [planted(axes=axes)[1] for axes in (t_pose(), along_x())]
     first, second = (places(OTHER, clip) for clip in clips)
     for name in ("LeftLeg_", "RightFoot_", "LeftToeBase_"):
@@ -134,7 +134,7 @@ def test_planting_does_not_depend_on_the_rest_pose_of_the_file() -> None:
         assert_allclose(first[name], second[name], atol=0.5)
 
 
-def test_feet_of_a_figure_with_z_up_are_planted_on_its_ground() -> None:
+def test_feet_of_a_figure_with_z_up_are_planted_on_its_ground():
     over = axis_rotations(0, np.asarray(np.pi / 2))
     joints = zip(parents(OTHER), rest_joints(OTHER), strict=True)
     table = dict(zip(OTHER.skeleton.names, joints, strict=True))
@@ -144,7 +144,7 @@ def test_feet_of_a_figure_with_z_up_are_planted_on_its_ground() -> None:
         assert_allclose(found[name], upright[name] @ over.T, atol=1e-9)
 
 
-def test_root_with_a_scale_is_supported() -> None:
+def test_root_with_a_scale_is_supported():
     table = dict(
         zip(OTHER.skeleton.names, zip(parents(OTHER), rest_joints(OTHER), strict=True), strict=True)
     )
@@ -162,13 +162,13 @@ def test_root_with_a_scale_is_supported() -> None:
         assert_allclose(100.0 * second[name], first[name], atol=1e-9)
 
 
-def test_figure_with_the_proportions_of_the_source_is_unchanged() -> None:
+def test_figure_with_the_proportions_of_the_source_is_unchanged():
     twin = figure_of({f"{n}_": (p and f"{p}_", q) for n, (p, q) in PERSON.items()}, "same")
     found, clip, changes = planted(twin)
     assert changes is None and clip is found.clip
 
 
-def test_feet_are_unchanged_if_the_source_never_stands() -> None:
+def test_feet_are_unchanged_if_the_source_never_stands():
     rotations, path = walk()
     path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s, as on a bicycle
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
@@ -176,7 +176,7 @@ def test_feet_are_unchanged_if_the_source_never_stands() -> None:
     assert clip is found.clip and changes.n_contacts == 0
 
 
-def test_foot_held_still_in_the_air_is_not_planted() -> None:
+def test_foot_held_still_in_the_air_is_not_planted():
     rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
     swing = 0.2 * np.sin(np.linspace(0.0, 6.0, 60))
     # The body rotates about its left foot, which is planted.
@@ -196,7 +196,7 @@ def test_foot_held_still_in_the_air_is_not_planted() -> None:
     assert away[:, 1].min() > -1e-9 and away[:, 1].max() < changes.lowered + 1e-9
 
 
-def test_motions_of_two_frames_or_with_gaps_are_supported() -> None:
+def test_motions_of_two_frames_or_with_gaps_are_supported():
     motion = written(t_pose(), *walk(), rate=RATE)
     rows = np.arange(N_WALK)
     rows[100:110] = -1
@@ -209,7 +209,7 @@ def test_motions_of_two_frames_or_with_gaps_are_supported() -> None:
         assert (clip.timing.present == timing.present).all()
 
 
-def test_upside_down_world_results_in_the_same_feet() -> None:
+def test_upside_down_world_results_in_the_same_feet():
     rotations, path = walk()
     over = axis_rotations(0, np.asarray(np.pi))
     # At rest the hips are at a height of 100, which is the origin of their path.
@@ -221,7 +221,7 @@ def test_upside_down_world_results_in_the_same_feet() -> None:
     assert_allclose(second["LeftToeBase_"] @ over, first["LeftToeBase_"], atol=1e-6)
 
 
-def test_planting_can_be_switched_off_and_is_reported() -> None:
+def test_planting_can_be_switched_off_and_is_reported():
     motion = written(t_pose(), *walk(), rate=RATE)
     clip, notes = driven_clip(Drive(motion, plants_feet=False), OTHER)
     assert not any(note.key.startswith("F007.feet") for note in notes)
@@ -231,13 +231,13 @@ def test_planting_can_be_switched_off_and_is_reported() -> None:
     assert "planted during 6 contacts" in text and "--feet off" in text
 
 
-def test_rotations_of_the_arms_are_unchanged() -> None:
+def test_rotations_of_the_arms_are_unchanged():
     found, clip, _ = planted()
     arms = [OTHER.skeleton.names.index(f"{side}Arm_") for side in SIDES]
     assert (clip.rotations[:, arms] == found.clip.rotations[:, arms]).all()
 
 
-def test_legs_that_cannot_be_solved_are_unchanged() -> None:
+def test_legs_that_cannot_be_solved_are_unchanged():
     skeleton = OTHER.skeleton
     mirrored, points = skeleton.rest_scales.copy(), skeleton.rest_translations.copy()
     mirrored[skeleton.names.index("LeftLeg_")] = -1.0, 1.0, 1.0
@@ -251,7 +251,7 @@ def test_legs_that_cannot_be_solved_are_unchanged() -> None:
         assert changes is None and clip is found.clip
 
 
-def test_legs_folded_at_rest_have_finite_rotations() -> None:
+def test_legs_folded_at_rest_have_finite_rotations():
     skeleton, points = OTHER.skeleton, OTHER.skeleton.rest_translations.copy()
     thighs, shins = (
         [skeleton.names.index(f"{side}{part}_") for side in SIDES] for part in ("Leg", "Foot")
@@ -263,7 +263,7 @@ def test_legs_folded_at_rest_have_finite_rotations() -> None:
     assert changes is not None and np.isfinite(clip.rotations).all()
 
 
-def test_feet_of_a_lying_person_are_not_planted() -> None:
+def test_feet_of_a_lying_person_are_not_planted():
     rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
     rotations[:] = axis_rotations(0, np.asarray(-np.pi / 2))
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
@@ -271,7 +271,7 @@ def test_feet_of_a_lying_person_are_not_planted() -> None:
     assert clip is found.clip and changes.n_contacts == 0
 
 
-def test_contacts_can_begin_and_end_gradually() -> None:
+def test_contacts_can_begin_and_end_gradually():
     # The foot moves quickly, rests at 20 for 40 frames, and moves on.
     place = np.concatenate([np.arange(20.0), np.full(40, 20.0), np.arange(21.0, 41.0)])
     path = place[:, None] * [0.0, 0.0, 10.0]
@@ -288,7 +288,7 @@ def test_contacts_can_begin_and_end_gradually() -> None:
     assert (always.hold == 1.0).all()  # it neither begins nor ends within the motion
 
 
-def test_swinging_feet_do_not_sink_into_the_ground() -> None:
+def test_swinging_feet_do_not_sink_into_the_ground():
     rotations, path = walk(lift=8.0)
     frames = np.arange(N_WALK)
     for side, start in (("Left", 0), ("Right", 50)):

@@ -71,7 +71,7 @@ def posed(fig, *dofs):
     return pose
 
 
-def test_different_order_of_dofs_gets_the_same_rotation() -> None:
+def test_different_order_of_dofs_gets_the_same_rotation():
     one, other = figure("ab", ["xyz", "xyz"]), figure("ab", ["zxy", "yzx"], "other")
     angles = 0.3, -0.5, 0.8, 1.0, 0.2, -0.7
     pose, notes = transfer_pose(one, posed(one, *angles), other, rest_pose(other.skeleton))
@@ -84,7 +84,7 @@ def test_different_order_of_dofs_gets_the_same_rotation() -> None:
     assert told(notes) == [("F007.joints-taken-over", {"n": 2, "all": 2, "figure": "one"})]
 
 
-def test_rotations_and_not_equally_named_dofs_are_transferred() -> None:
+def test_rotations_and_not_equally_named_dofs_are_transferred():
     # The rotation is transferred, so the values of DOFs with equal names differ.
     one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
     pose, _ = transfer_pose(one, posed(one, 0.5, 0.6, 0.7), other, rest_pose(other.skeleton))
@@ -92,7 +92,7 @@ def test_rotations_and_not_equally_named_dofs_are_transferred() -> None:
     assert np.abs([x - 0.5, y - 0.6, z - 0.7]).max() > 0.1
 
 
-def test_missing_joints_are_listed_and_others_unchanged() -> None:
+def test_missing_joints_are_listed_and_others_unchanged():
     one = figure(["a", "b", "tail", "tip"], ["xyz"] * 4, "cat")
     other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
     start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
@@ -105,7 +105,7 @@ def test_missing_joints_are_listed_and_others_unchanged() -> None:
     assert_allclose(start.dofs[:6], 0)
 
 
-def test_extra_joint_in_between_is_compensated() -> None:
+def test_extra_joint_in_between_is_compensated():
     # In the target, "b" is the child of an extra joint rotated by 0.3, which b compensates.
     one = figure(["a", "b"], ["xyz", "xyz"])
     other = figure(["a", "extra", "b"], ["xyz"] * 3, "other")
@@ -114,7 +114,7 @@ def test_extra_joint_in_between_is_compensated() -> None:
     assert_allclose(pose.dofs[[2, 5, 8]], [0.2, 0.3, 0.2], atol=1e-12)
 
 
-def test_rest_rotations_may_differ() -> None:
+def test_rest_rotations_may_differ():
     # The target's joint has a rest rotation of 90 degrees about x, so a rotation about the world's
     # y is one about the joint's -z: Rx(-90) y = -z.
     one = figure("a", ["xyz"])
@@ -124,7 +124,7 @@ def test_rest_rotations_may_differ() -> None:
     assert_allclose(pose.dofs, [0, 0, -0.4], atol=1e-12)
 
 
-def test_up_axes_may_differ() -> None:
+def test_up_axes_may_differ():
     # The rotation is about the up axis, which is y in one figure and z in the other.
     one, other = figure("a", ["xyz"]), figure("a", ["xyz"], "other", up="z")
     pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
@@ -133,7 +133,7 @@ def test_up_axes_may_differ() -> None:
     assert_allclose(back.dofs, [0, 0.4, 0], atol=1e-12)
 
 
-def test_limits_and_missing_axes_are_applied_and_reported() -> None:
+def test_limits_and_missing_axes_are_applied_and_reported():
     one = figure("ab", ["xyz", "xyz"])
     other = figure("ab", ["xyz", "x"], "stiff", limits=[[-0.1, 0.1]] * 3 + [[0, 1]])
     pose, notes = transfer_pose(one, posed(one, 0.5, 0, 0, 0.4, 0, 0.2), other,
@@ -144,7 +144,7 @@ def test_limits_and_missing_axes_are_applied_and_reported() -> None:
     assert told(notes)[1:] == [("F007.joints-limited", {"names": ["a", "b"]})]
 
 
-def test_placement_scale_and_shape_are_unchanged() -> None:
+def test_placement_scale_and_shape_are_unchanged():
     one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
     source = posed(one, 0.1, 0.2, 0.3)
     source.figure_translation[:] = 1, 2, 3
@@ -155,7 +155,7 @@ def test_placement_scale_and_shape_are_unchanged() -> None:
     assert pose.figure_scale == 0.5 and not pose.figure_translation.any()
 
 
-def test_pose_without_common_joints_is_refused() -> None:
+def test_pose_without_common_joints_is_refused():
     one, other = figure("ab", ["xyz", "x"], "cat"), figure("cd", ["x", "x"], "man")
     with pytest.raises(RigError) as caught:
         transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
@@ -163,13 +163,13 @@ def test_pose_without_common_joints_is_refused() -> None:
     assert caught.value.diagnostic.values == {"pose": "cat", "figure": "man"}
 
 
-def test_repeated_and_empty_names_are_not_matched() -> None:
+def test_repeated_and_empty_names_are_not_matched():
     one = figure(["a", "leg", "leg", ""], ["x"] * 4)
     other = figure(["leg", "a", ""], ["x"] * 3)
     assert joints_by_name(one.skeleton.names, other.skeleton.names).tolist() == [-1, 0, -1]
 
 
-def test_values_are_copied_only_for_equal_dofs_rest_pose_and_up_axis() -> None:
+def test_values_are_copied_only_for_equal_dofs_rest_pose_and_up_axis():
     one = figure("ab", ["xyz", "xyz"])
     assert shares_dofs(one, one) and shares_dofs(one, figure("ab", ["xyz", "xyz"], "other"))
     assert shares_dofs(one, shaped(one, 3)) and shares_dofs(shaped(one, 10), shaped(one, 8))
@@ -180,7 +180,7 @@ def test_values_are_copied_only_for_equal_dofs_rest_pose_and_up_axis() -> None:
     assert not shares_dofs(one, figure("ab", ["xyz"] * 2, rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]]))
 
 
-def test_long_lists_are_truncated() -> None:
+def test_long_lists_are_truncated():
     one = figure(["a", *(f"j{k}" for k in range(20))], ["xyz"] * 21)
     other = figure("a", ["zyx"], "man")
     _, notes = transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
@@ -188,7 +188,7 @@ def test_long_lists_are_truncated() -> None:
     assert told(notes)[1] == ("F007.joints-lacking", {"figure": "man", "names": names})
 
 
-def test_rotations_are_relative_to_the_axes_of_the_figure() -> None:
+def test_rotations_are_relative_to_the_axes_of_the_figure():
     # The second joint rotates about x, its parent about z; the product is Rz(0.5) Rx(0.3).
     one = figure("ab", ["z", "x"])
     turns = relative_rotations(one, posed(one, 0.5, 0.3))
@@ -198,7 +198,7 @@ def test_rotations_are_relative_to_the_axes_of_the_figure() -> None:
     assert (turns.figure, turns.names, turns.up) == ("one", ("a", "b"), "y")
 
 
-def test_record_of_the_same_dofs_restores_rotations_below_the_dofs() -> None:
+def test_record_of_the_same_dofs_restores_rotations_below_the_dofs():
     # A motion has also rotated the hinge "b" about y, and moved it.
     one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
     pose = posed(one, 0.1, 0.2, 0.3, 0.4)
@@ -212,7 +212,7 @@ def test_record_of_the_same_dofs_restores_rotations_below_the_dofs() -> None:
     assert found.translations.tolist() == pose.translations.tolist()
 
 
-def test_record_for_different_dofs_rotates_joints_and_keeps_placement_and_scale() -> None:
+def test_record_for_different_dofs_rotates_joints_and_keeps_placement_and_scale():
     one, other = figure("ab", ["xyz", "xyz"], "cat"), figure("ab", ["zxy", "yzx"], "man")
     pose = posed(one, 0.3, -0.5, 0.8, 1.0, 0.2, -0.7)
     pose.figure_translation[:] = 1, 0, 0
@@ -227,7 +227,7 @@ def test_record_for_different_dofs_rotates_joints_and_keeps_placement_and_scale(
     assert found.figure_scale == 1.0 and not found.figure_translation.any()
 
 
-def test_refused_record_does_not_change_the_pose() -> None:
+def test_refused_record_does_not_change_the_pose():
     one, other = figure("a", ["xyz"], "cat"), figure("b", ["x"], "man")
     found = rest_pose(other.skeleton)
     before = pose_key(found)
@@ -238,7 +238,7 @@ def test_refused_record_does_not_change_the_pose() -> None:
     assert pose_key(found) == before
 
 
-def test_handwritten_partial_record_keeps_rotations_below_the_dofs() -> None:
+def test_handwritten_partial_record_keeps_rotations_below_the_dofs():
     one = figure("ab", ["xyz", "x"])
     found = rest_pose(one.skeleton)
     found.rotations[1] = 0.0, 1.0, 0.0, 0.0
@@ -247,7 +247,7 @@ def test_handwritten_partial_record_keeps_rotations_below_the_dofs() -> None:
     assert found.dofs.tolist() == [0, 0, 0, 0.25] and found.rotations[1].tolist() == [0, 1, 0, 0]
 
 
-def test_edited_dofs_override_the_stored_rotations() -> None:
+def test_edited_dofs_override_the_stored_rotations():
     one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
     record = record_of(one, posed(one, 0.1, 0.2, 0.3, 0.4))
     edited = replace(record, dofs={**record.dofs, "a.y": -0.5, "b.x": 0.25})
@@ -263,7 +263,7 @@ def test_edited_dofs_override_the_stored_rotations() -> None:
     assert_allclose(joint_rotations(one.skeleton, found)[1], turned, atol=1e-12)
 
 
-def test_edited_dofs_keep_rotations_below_the_dofs() -> None:
+def test_edited_dofs_keep_rotations_below_the_dofs():
     one = figure("ab", ["xyz", "x"])
     pose = posed(one, 0, 0, 0, 0.4)
     pose.rotations[1] = 0.0, np.sin(0.35), 0.0, np.cos(0.35)
@@ -276,7 +276,7 @@ def test_edited_dofs_keep_rotations_below_the_dofs() -> None:
     assert found.translations.tolist() == [[0, 0, 0], [0.5, 0.25, -1.0]]
 
 
-def test_edited_dof_beyond_its_limit_leaves_no_rotation_below_the_dofs() -> None:
+def test_edited_dof_beyond_its_limit_leaves_no_rotation_below_the_dofs():
     one = figure("a", ["xyz"], limits=[[-0.5, 0.5]] * 3)
     record = record_of(one, posed(one, 0.1, 0.2, 0.3))
     found = rest_pose(one.skeleton)
@@ -286,7 +286,7 @@ def test_edited_dof_beyond_its_limit_leaves_no_rotation_below_the_dofs() -> None
     assert found.rotations.tolist() == [[0, 0, 0, 1]]
 
 
-def test_partial_record_restores_rotations_below_its_dofs() -> None:
+def test_partial_record_restores_rotations_below_its_dofs():
     one = figure("ab", ["xyz", "x"])
     pose = posed(one, 0, 0, 0, 0.4)
     pose.rotations[1] = 0.0, 1.0, 0.0, 0.0
@@ -298,7 +298,7 @@ def test_partial_record_restores_rotations_below_its_dofs() -> None:
     assert found.translations.tolist() == [[0, 2, 0], [0, 0, 0]]
 
 
-def test_lists_of_another_length_than_the_skeleton_are_matched_by_name() -> None:
+def test_lists_of_another_length_than_the_skeleton_are_matched_by_name():
     # A joint was removed from the file's lists, but the digest of the DOFs was kept.
     one = figure("ab", ["xyz", "x"], "cat")
     record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
@@ -329,7 +329,7 @@ def body_pose(fig: Figure):
 
 
 @pytest.mark.parametrize("cut", [False, True])
-def test_pose_for_fewer_shapes_transfers_placement_scale_and_common_shapes(cut) -> None:
+def test_pose_for_fewer_shapes_transfers_placement_scale_and_common_shapes(cut):
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), replace(shaped(bones, 2, 1), name="kin")
     found = rest_pose(bones.skeleton)
@@ -344,7 +344,7 @@ def test_pose_for_fewer_shapes_transfers_placement_scale_and_common_shapes(cut) 
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_pose_for_more_shapes_transfers_placement_scale_and_common_shapes() -> None:
+def test_pose_for_more_shapes_transfers_placement_scale_and_common_shapes():
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), shaped(bones, 5, 3)
     found = rest_pose(bones.skeleton)
@@ -354,7 +354,7 @@ def test_pose_for_more_shapes_transfers_placement_scale_and_common_shapes() -> N
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_pose_for_a_figure_without_shapes_reports_dropped_shapes() -> None:
+def test_pose_for_a_figure_without_shapes_reports_dropped_shapes():
     bones = figure("ab", ["xyz", "x"], "bones")
     one = shaped(bones, 4, 2)
     found = rest_pose(bones.skeleton)
@@ -368,7 +368,7 @@ def test_pose_for_a_figure_without_shapes_reports_dropped_shapes() -> None:
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_humanoids_exchange_poses_by_their_bones() -> None:
+def test_humanoids_exchange_poses_by_their_bones():
     half = np.diag([-1.0, 1.0, -1.0])  # VRM 0.x faces -z
     one, other = figure_of(BODY, "body"), figure_of(BODY, "hero", half)
     bones = {bone: list(BODY).index(name) for bone, name in HUMAN_BONES.items() if name in BODY}

@@ -49,7 +49,7 @@ def assert_same_limbs(source: SkeletonMotion, figure: Figure, clip: SampledClip,
         np.testing.assert_allclose(bones(mine, own), wanted, atol=EXACT, err_msg=own[0])
 
 
-def test_retargeting_onto_itself_is_the_identity() -> None:
+def test_retargeting_onto_itself_is_the_identity():
     motion = moving(figure_of(HIK, "mocap"))
     clip, notes = retarget(motion, motion.figure)
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
@@ -62,7 +62,7 @@ def test_retargeting_onto_itself_is_the_identity() -> None:
     ]
 
 
-def test_joints_with_repeated_names_are_matched_by_hierarchy() -> None:
+def test_joints_with_repeated_names_are_matched_by_hierarchy():
     table = {"a": ("", (0, 0, 0)), "b": ("a", (1, 0, 0)), "c": ("b", (2, 0, 0))}
     figure = figure_of(table, "snake")
     figure = replace(figure, skeleton=replace(figure.skeleton, names=("tail", "tail", "")))
@@ -72,7 +72,7 @@ def test_joints_with_repeated_names_are_matched_by_hierarchy() -> None:
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
 
 
-def test_limb_directions_match_the_source_from_t_pose_to_a_pose() -> None:
+def test_limb_directions_match_the_source_from_t_pose_to_a_pose():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
@@ -91,7 +91,7 @@ def test_limb_directions_match_the_source_from_t_pose_to_a_pose() -> None:
     ]
 
 
-def test_very_different_rest_pose_of_the_trunk_is_aligned() -> None:
+def test_very_different_rest_pose_of_the_trunk_is_aligned():
     bowed = {**HIK, "Head": ("Neck", (0, 145, 12)), "Spine1": ("Spine", (0, 112, 14))}
     source, figure = moving(figure_of(bowed, "mocap")), figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
@@ -103,7 +103,7 @@ def test_very_different_rest_pose_of_the_trunk_is_aligned() -> None:
         np.testing.assert_allclose(bones(mine, own), bones(theirs, pair), atol=EXACT)
 
 
-def test_limb_directions_match_the_source_from_a_pose_to_t_pose() -> None:
+def test_limb_directions_match_the_source_from_a_pose_to_t_pose():
     source, figure = moving(figure_of(BODY, "body")), figure_of(HIK, "mocap")
     clip, _ = retarget(source, figure)
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
@@ -111,7 +111,7 @@ def test_limb_directions_match_the_source_from_a_pose_to_t_pose() -> None:
         np.testing.assert_allclose(bones(mine, own), bones(theirs, pair), atol=EXACT)
 
 
-def test_trunk_and_feet_keep_their_rest_shape() -> None:
+def test_trunk_and_feet_keep_their_rest_shape():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
     # In the rest pose of the source, the slightly bent spine of the figure keeps its shape.
@@ -122,7 +122,7 @@ def test_trunk_and_feet_keep_their_rest_shape() -> None:
         )
 
 
-def test_eyes_and_jaw_do_not_tilt_the_head() -> None:
+def test_eyes_and_jaw_do_not_tilt_the_head():
     """One person has the head joint at the neck, the other one between the ears."""
     high = {"LeftEye": ("Head", (3, 172, 4)), "RightEye": ("Head", (-3, 172, 4))}
     far = {
@@ -137,7 +137,7 @@ def test_eyes_and_jaw_do_not_tilt_the_head() -> None:
     np.testing.assert_allclose(np.abs(clip.rotations[0, head, 3]), 1.0, atol=EXACT)
 
 
-def test_result_does_not_depend_on_the_joint_axes_of_the_figure() -> None:
+def test_result_does_not_depend_on_the_joint_axes_of_the_figure():
     source, plain = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     rng = np.random.default_rng(1)
     skeleton = plain.skeleton
@@ -170,7 +170,7 @@ def matrix(quaternion: np.ndarray) -> np.ndarray:
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
 
 
-def test_source_with_z_up_is_rotated_upright() -> None:
+def test_source_with_z_up_is_rotated_upright():
     source = moving(figure_of(HIK, "mocap", TO_Y.T, "z"))
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
@@ -199,7 +199,7 @@ def path_scale() -> float:
     return lengths[0] / lengths[1]
 
 
-def test_path_is_scaled_by_leg_length() -> None:
+def test_path_is_scaled_by_leg_length():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     assert_same_path(places(figure, clip), places(source.figure, source.clip))
@@ -208,7 +208,7 @@ def test_path_is_scaled_by_leg_length() -> None:
     assert clip.figure_translations is None
 
 
-def test_path_in_a_different_unit_than_the_skeleton_is_scaled_by_leg_length() -> None:
+def test_path_in_a_different_unit_than_the_skeleton_is_scaled_by_leg_length():
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     count, ahead = source.clip.n_rows, np.array([0.0, 0.0, 3.0])
     metres = replace(
@@ -224,7 +224,7 @@ def test_path_in_a_different_unit_than_the_skeleton_is_scaled_by_leg_length() ->
         np.testing.assert_allclose(moved[name], place + scale * ahead, atol=1e-12)
 
 
-def test_skinned_figure_moves_with_its_root() -> None:
+def test_skinned_figure_moves_with_its_root():
     source, bare = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     corners = np.eye(3)
     figure = replace(bare, mesh=Mesh(corners, corners, np.array([[0, 1, 2]], dtype=np.int32)))
@@ -235,7 +235,7 @@ def test_skinned_figure_moves_with_its_root() -> None:
         np.testing.assert_allclose(place, expected[name], atol=1e-12)
 
 
-def test_source_with_a_different_front_at_rest_rotates_the_figure() -> None:
+def test_source_with_a_different_front_at_rest_rotates_the_figure():
     quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # maps z, the front, to x
     source = moving(figure_of(HIK, "mocap", quarter))
     figure = figure_of(BODY, "body")
@@ -246,7 +246,7 @@ def test_source_with_a_different_front_at_rest_rotates_the_figure() -> None:
     np.testing.assert_allclose(bones(where, ("right_hip", "left_hip"))[0], [0, 0, -1], atol=EXACT)
 
 
-def test_humanoid_with_arbitrary_names_that_faces_backwards_moves_forwards() -> None:
+def test_humanoid_with_arbitrary_names_that_faces_backwards_moves_forwards():
     half = np.diag([-1.0, 1.0, -1.0])  # VRM 0.x
     bones = {VRM_BONES[name]: joint for joint, name in enumerate(BODY)}
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body", half)
@@ -257,7 +257,7 @@ def test_humanoid_with_arbitrary_names_that_faces_backwards_moves_forwards() -> 
     assert_same_path(places(figure, clip), places(source.figure, source.clip))
 
 
-def test_source_with_a_lying_rest_pose_stands_up_in_its_frames() -> None:
+def test_source_with_a_lying_rest_pose_stands_up_in_its_frames():
     down = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     source = moving(figure_of(HIK, "mocap", down))  # y is up, but the body is along z
     figure = figure_of(BODY, "body")
@@ -265,7 +265,7 @@ def test_source_with_a_lying_rest_pose_stands_up_in_its_frames() -> None:
     assert_same_limbs(source, figure, clip)
 
 
-def test_rotations_of_joints_between_matched_joints_are_included() -> None:
+def test_rotations_of_joints_between_matched_joints_are_included():
     table = dict(HIK)
     table["LeftArmRoll"] = ("LeftArm", (30, 145, 0))
     table["LeftForeArm"] = ("LeftArmRoll", HIK["LeftForeArm"][1])
@@ -283,7 +283,7 @@ def test_rotations_of_joints_between_matched_joints_are_included() -> None:
     assert ("F007.joints-without-partner", {"motion": "mocap", "names": names}) in told(notes)
 
 
-def test_unmapped_joints_stay_at_rest_relative_to_their_parent() -> None:
+def test_unmapped_joints_stay_at_rest_relative_to_their_parent():
     table = {**BODY, "jaw": ("head", (0.0, 1.52, 0.08)), "tail": ("pelvis", (0, 0.9, -0.2))}
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
     clip, notes = retarget(source, figure)
@@ -291,7 +291,7 @@ def test_unmapped_joints_stay_at_rest_relative_to_their_parent() -> None:
     assert ("F007.joints-at-rest", {"names": ["spine2", "jaw", "tail"]}) in told(notes)
 
 
-def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles() -> None:
+def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles():
     def with_fingers(table: dict, wrist: str, names: list[str], turn: np.ndarray) -> dict:
         base = np.array(table[wrist][1], dtype=float)
         size = 0.01 if base[1] > 10 else 0.0001
@@ -324,7 +324,7 @@ def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles() -> None:
         np.testing.assert_allclose(bones(mine, ours), bones(theirs, pair), atol=EXACT)
 
 
-def test_equal_hierarchy_with_different_proportions_receives_equal_rotations() -> None:
+def test_equal_hierarchy_with_different_proportions_receives_equal_rotations():
     source = moving(figure_of(BODY, "one"))
     names = list(BODY)
     # Depth-first instead of breadth-first, with 0.9 times the width and 1.1 times the height.
@@ -349,7 +349,7 @@ def test_equal_hierarchy_with_different_proportions_receives_equal_rotations() -
     assert told(notes)[0] == ("F007.joints-matched", values)
 
 
-def test_joint_translations_are_transferred_between_equal_hierarchies() -> None:
+def test_joint_translations_are_transferred_between_equal_hierarchies():
     figure = figure_of(BODY, "one")
     motion = moving(figure)
     shifts = motion.clip.translations.copy()
@@ -365,7 +365,7 @@ def test_joint_translations_are_transferred_between_equal_hierarchies() -> None:
     assert told(notes)[-1] == ("F007.joint-positions-left-out", values)
 
 
-def test_mapping_matches_names_without_rules() -> None:
+def test_mapping_matches_names_without_rules():
     strange = {
         f"x{i}": (f"x{list(HIK).index(p)}" if p else "", at)
         for i, (p, at) in enumerate(HIK.values())
@@ -390,7 +390,7 @@ def test_mapping_matches_names_without_rules() -> None:
     assert resting[1]["names"][:2] == ["left_hip", "right_hip"]
 
 
-def test_equal_names_match_without_a_known_meaning() -> None:
+def test_equal_names_match_without_a_known_meaning():
     table = {
         "base": ("", (0, 0, 0)),
         "tail_01": ("base", (0, 0, 1)),
@@ -439,9 +439,7 @@ def test_equal_names_match_without_a_known_meaning() -> None:
         ),
     ],
 )
-def test_incompatible_figures_are_refused(
-    mapping: dict[str, str] | None, key: str, values: dict[str, object]
-) -> None:
+def test_incompatible_figures_are_refused(mapping, key, values):
     snake = figure_of({"base": ("", (0, 0, 0)), "tail": ("base", (0, 0, 1))}, "snake")
     with pytest.raises(RigError) as caught:
         retarget(moving(snake), figure_of(BODY, "body"), mapping)
@@ -449,7 +447,7 @@ def test_incompatible_figures_are_refused(
     assert found is not None and (found.key, found.values) == (key, values)
 
 
-def test_gaps_are_preserved() -> None:
+def test_gaps_are_preserved():
     motion = moving(figure_of(HIK, "mocap"))
     timing = Timing(25.0, np.array([0, 1, -1, -1, 2, 3, 4]), first_frame=7)
     clip, _ = retarget(
@@ -458,7 +456,7 @@ def test_gaps_are_preserved() -> None:
     assert clip.timing is timing and clip.n_rows == 5
 
 
-def test_scaled_motion_scales_all_lengths() -> None:
+def test_scaled_motion_scales_all_lengths():
     motion = moving(figure_of(HIK, "mocap"))
     boxes = np.tile([[-1.0, -1, -1], [1, 1, 2]], (20, 1, 1))
     figure = replace(motion.figure, skeleton=replace(motion.figure.skeleton, boxes=boxes))
@@ -481,7 +479,7 @@ def renamed(table: dict, **names: str) -> dict:
             for name, (parent, at) in table.items()}  # fmt: skip
 
 
-def test_limbs_without_a_recognised_joint_of_the_motion_are_a_warning() -> None:
+def test_limbs_without_a_recognised_joint_of_the_motion_are_a_warning():
     body = figure_of(BODY, "body")
     assert limb_warnings(moving(figure_of(HIK, "walk")), body) == []
     foreign = renamed(HIK, LeftLeg="Knie_l", RightLeg="Knie_r")
@@ -494,14 +492,14 @@ def test_limbs_without_a_recognised_joint_of_the_motion_are_a_warning() -> None:
     assert limb_warnings(moving(figure_of(foreign, "walk")), body, pairs) == []
 
 
-def test_limbs_without_a_recognised_joint_of_the_figure_are_a_warning() -> None:
+def test_limbs_without_a_recognised_joint_of_the_figure_are_a_warning():
     body = figure_of(renamed(BODY, left_elbow="codo"), "body")
     (found,) = limb_warnings(moving(figure_of(HIK, "walk")), body)
     assert (found.key, found.values["parts"]) == ("C018.limbs-unknown", ["left elbow"])
     assert found.values["idle"] == ["codo"]
 
 
-def test_knees_that_never_bend_in_a_moving_leg_are_a_warning() -> None:
+def test_knees_that_never_bend_in_a_moving_leg_are_a_warning():
     motion, body = moving(figure_of(HIK, "walk")), figure_of(BODY, "body")
     names, rotations = motion.figure.skeleton.names, motion.clip.rotations.copy()
     for name in ("LeftLeg", "RightLeg"):

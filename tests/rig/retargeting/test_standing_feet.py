@@ -58,9 +58,7 @@ MOTIONS = {"jump": lambda: jump()[:2], "kneel": kneel, "walk": walk, "jerky walk
 
 @pytest.mark.parametrize("figure", [OTHER, SHORT], ids=["long", "short"])
 @pytest.mark.parametrize("motion", ["jump", "kneel", "walk", "jerky walk"])
-def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(
-    figure: Figure, motion: str
-) -> None:
+def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(figure, motion):
     rotations, path = MOTIONS[motion]()
     source = written(t_pose(), rotations, path, rate=RATE)
     clip, changes = plant_feet(retargeted(source, figure), figure)
@@ -80,7 +78,7 @@ def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(
         assert knees[0] <= 1.2 * knees[1]
 
 
-def test_jump_leaves_the_ground_and_lands_on_it() -> None:
+def test_jump_leaves_the_ground_and_lands_on_it():
     rotations, path, rise = jump()
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
@@ -93,7 +91,7 @@ def test_jump_leaves_the_ground_and_lands_on_it() -> None:
         assert_allclose(height.max(), found.scale * rise.max(), rtol=0.15)
 
 
-def test_ball_of_a_foot_that_points_down_is_on_the_ground() -> None:
+def test_ball_of_a_foot_that_points_down_is_on_the_ground():
     found = retargeted(written(t_pose(), *kneel(), rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert changes.gap_before > 1.0  # cm
@@ -102,7 +100,7 @@ def test_ball_of_a_foot_that_points_down_is_on_the_ground() -> None:
     assert_allclose(np.ptp(ball[10:-10], axis=0), 0.0, atol=EXACT)
 
 
-def test_feet_on_a_treadmill_are_held_as_on_the_ground() -> None:
+def test_feet_on_a_treadmill_are_held_as_on_the_ground():
     motions = [written(t_pose(), *parts, rate=RATE) for parts in (walk(), treadmill())]
     found = [retargeted(motion, OTHER) for motion in motions]
     (walked, first), (ran, second) = (plant_feet(each, OTHER) for each in found)
@@ -112,14 +110,14 @@ def test_feet_on_a_treadmill_are_held_as_on_the_ground() -> None:
     assert (first.n_contacts, second.n_contacts) == (6, 6)
 
 
-def test_sliding_person_is_not_on_a_treadmill() -> None:
+def test_sliding_person_is_not_on_a_treadmill():
     rotations, path = treadmill()
     path[:, 2] -= 1.0 * np.arange(len(path))  # the body moves with the feet
     _, changes = plant_feet(retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER), OTHER)
     assert changes.n_contacts == 0 and changes.ground_speed == 0.0
 
 
-def test_soles_are_level_while_those_of_a_tilted_source_are_on_the_ground() -> None:
+def test_soles_are_level_while_those_of_a_tilted_source_are_on_the_ground():
     rotations, path = walk()
     tilt = matrices(np.array([-0.12 * X + 0.05 * Y]))[0]  # the file's rest pose is inexact
     for side in ("Left", "Right"):
@@ -136,7 +134,7 @@ def test_soles_are_level_while_those_of_a_tilted_source_are_on_the_ground() -> N
         assert_allclose(after[..., 1, 1], 1.0, atol=1e-9)
 
 
-def test_noise_of_standing_feet_does_not_affect_the_knees() -> None:
+def test_noise_of_standing_feet_does_not_affect_the_knees():
     rotations, path = walk()
     noise = matrices(np.random.default_rng(3).normal(scale=0.02, size=(len(path), 3)))
     for side in ("Left", "Right"):
@@ -154,7 +152,7 @@ def test_noise_of_standing_feet_does_not_affect_the_knees() -> None:
     assert peaks[0] < 2.0 * peaks[1]
 
 
-def test_feet_follow_a_sudden_jump_of_the_recording_instead_of_bending_the_knees() -> None:
+def test_feet_follow_a_sudden_jump_of_the_recording_instead_of_bending_the_knees():
     rotations, path = walk()
     jumped = path.copy()
     jumped[30] += [1.5, -1.0, 0.0]  # cm, for one frame; the left foot stands

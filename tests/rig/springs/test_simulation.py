@@ -61,13 +61,13 @@ def run(skeleton: Skeleton, n_steps: int, tails=None):
     return tails, rotations
 
 
-def test_spring_without_forces_stays_at_rest() -> None:
+def test_spring_without_forces_stays_at_rest():
     tails, rotations = run(skeleton_of(springs_of([0], [[0, -2, 0]])), 10)
     assert_allclose(tails.now, [[0, -1, 0]], rtol=0, atol=1e-12)
     assert_allclose(rotations, [[0, 0, 0, 1]], rtol=0, atol=1e-12)
 
 
-def test_pendulum_comes_to_rest_along_gravity() -> None:
+def test_pendulum_comes_to_rest_along_gravity():
     springs = springs_of([0], [[2, 0, 0]], gravity=(0, -3, 0), drags=0.2)
     tails, rotations = run(skeleton_of(springs), 600)
     assert_allclose(tails.now, [[0, -1, 0]], rtol=0, atol=1e-6)
@@ -76,14 +76,14 @@ def test_pendulum_comes_to_rest_along_gravity() -> None:
     assert_allclose(rotations, [[0, 0, -half, half]], rtol=0, atol=1e-6)
 
 
-def test_stiffness_and_gravity_balance_along_their_sum() -> None:
+def test_stiffness_and_gravity_balance_along_their_sum():
     # At rest, the point is in the direction of stiffness * axis + gravity, 3 x - 4 y.
     springs = springs_of([0], [[1, 0, 0]], gravity=(0, -4, 0), stiffness=3.0, drags=0.5)
     tails, _ = run(skeleton_of(springs), 600)
     assert_allclose(tails.now, [[0.6, 1.0 - 0.8, 0]], rtol=0, atol=1e-9)
 
 
-def test_stiffness_alone_returns_to_the_rest_direction() -> None:
+def test_stiffness_alone_returns_to_the_rest_direction():
     springs = springs_of([0], [[1, 0, 0]], stiffness=2.0, drags=0.6)
     skeleton = skeleton_of(springs)
     simulation = Simulation(skeleton)
@@ -94,14 +94,14 @@ def test_stiffness_alone_returns_to_the_rest_direction() -> None:
     assert_allclose(rotations, [[0, 0, 0, 1]], rtol=0, atol=1e-9)
 
 
-def test_first_step_moves_by_the_force_times_the_time_step() -> None:
+def test_first_step_moves_by_the_force_times_the_time_step():
     springs = springs_of([0], [[1, 0, 0]], gravity=(0, -3, 0))
     tails, _ = run(skeleton_of(springs), 1)
     wanted = np.array([1.0, -3.0 * STEP, 0.0])
     assert_allclose(tails.now[0] - [0, 1, 0], wanted / np.linalg.norm(wanted), rtol=0, atol=1e-12)
 
 
-def test_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
+def test_sphere_stops_the_point_at_the_sum_of_both_radii():
     # The sphere is below the pivot, in the path of a pendulum that swings down from +x.
     shape = Colliders(
         np.array([1]), np.array([[0, -1, 0]]), np.array([[0, -1, 0]]), np.array([0.5])
@@ -136,9 +136,7 @@ def test_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
     ],
     ids=["plane", "sphere", "capsule"],
 )
-def test_planes_and_hollow_shapes_hold_the_point(
-    kind: int, offset: tuple[float, ...], tail: tuple[float, ...], radius: float
-) -> None:
+def test_planes_and_hollow_shapes_hold_the_point(kind, offset, tail, radius):
     """The point with the radius 0.25 falls from +x onto the plane, or to the wall of the shape."""
     rows = np.array([offset], float), np.array([tail], float), np.array([radius])
     shape = Colliders(np.array([1]), *rows, np.array([kind]))
@@ -161,7 +159,7 @@ def test_planes_and_hollow_shapes_hold_the_point(
     assert point[0] > 0.5
 
 
-def test_scaled_plane_pushes_along_its_own_normal() -> None:
+def test_scaled_plane_pushes_along_its_own_normal():
     """The plane 3 y = 4 x through the pivot, four times as wide in x, is 3 y = x."""
     normal = np.array([[-0.8, 0.6, 0.0]])
     shape = Colliders(np.array([1]), np.zeros((1, 3)), normal, np.zeros(1), np.array([PLANE]))
@@ -176,7 +174,7 @@ def test_scaled_plane_pushes_along_its_own_normal() -> None:
     assert_allclose(tails.now[0] - [0, 1, 0], np.array([3, 1, 0]) / np.sqrt(10), atol=1e-12)
 
 
-def test_colliders_on_other_chains_are_met_where_they_have_swung() -> None:
+def test_colliders_on_other_chains_are_met_where_they_have_swung():
     """A plane hangs from a joint that has swung from +x to -y, where it is the floor y = -1."""
     normal = np.array([[-1.0, 0.0, 0.0]])
     shape = Colliders(np.array([1]), np.zeros((1, 3)), normal, np.zeros(1), np.array([PLANE]))
@@ -192,7 +190,7 @@ def test_colliders_on_other_chains_are_met_where_they_have_swung() -> None:
 
 
 @pytest.mark.parametrize("center", [-1, 0])
-def test_inertia_is_relative_to_the_center(center: int) -> None:
+def test_inertia_is_relative_to_the_center(center):
     springs = springs_of([1], [[0, -1, 0]], drags=0.0, center=center)
     skeleton = skeleton_of(springs, places=((0, 1, 0), (0, 0, 0)))
     simulation = Simulation(skeleton)
@@ -232,7 +230,7 @@ def _random_figure(rng: np.random.Generator) -> Skeleton:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_chains_agree_with_the_pseudocode_of_the_specification(seed: int) -> None:
+def test_chains_agree_with_the_pseudocode_of_the_specification(seed):
     rng = np.random.default_rng(seed)
     skeleton = _random_figure(rng)
     simulation, turns = Simulation(skeleton), skeleton.rest_rotations.copy()
@@ -250,7 +248,7 @@ def test_chains_agree_with_the_pseudocode_of_the_specification(seed: int) -> Non
             assert_allclose(turn(rotations[row]), wanted[joint], rtol=0, atol=1e-9)
 
 
-def test_joints_hidden_by_a_scale_of_zero_do_not_swing() -> None:
+def test_joints_hidden_by_a_scale_of_zero_do_not_swing():
     springs = springs_of([1], [[0, -1, 0]], gravity=(1, 0, 0), center=0)
     skeleton = skeleton_of(springs)
     world, local, scales, place = pose_of(skeleton)
