@@ -194,49 +194,25 @@ class Figure:
         return self.is_attached and is_posed
 
     def require_mesh(self) -> Mesh:
-        """Return the mesh of a figure that must have one.
-
-        Raises
-        ------
-        RigError
-            If there is none.
-        """
+        """Return the mesh; ``RigError`` if there is none."""
         if self.mesh is None:
             raise RigError(f"figure {self.name} has no mesh")
         return self.mesh
 
     def require_skeleton(self) -> Skeleton:
-        """Return the skeleton of a figure that must have one.
-
-        Raises
-        ------
-        RigError
-            If there is none.
-        """
+        """Return the skeleton; ``RigError`` if there is none."""
         if self.skeleton is None:
             raise RigError(f"figure {self.name} has no skeleton")
         return self.skeleton
 
     def require_skin(self) -> Skin:
-        """Return the skin of a figure that must have one.
-
-        Raises
-        ------
-        RigError
-            If there is none.
-        """
+        """Return the skin; ``RigError`` if there is none."""
         if self.skin is None:
             raise RigError(f"figure {self.name} has no skin")
         return self.skin
 
     def attached(self) -> AttachedFigure:
-        """Return mesh, skeleton and skin of a figure whose mesh must follow its skeleton.
-
-        Raises
-        ------
-        RigError
-            If one of them is missing.
-        """
+        """Return mesh, skeleton and skin; ``RigError`` if one of them is missing."""
         return AttachedFigure(self.require_mesh(), self.require_skeleton(), self.require_skin())
 
 

@@ -145,25 +145,13 @@ class Actor:
             self.pose = figure_pose(self.figure)
 
     def require_pose(self) -> Pose:
-        """Return the pose of an actor that must have one.
-
-        Raises
-        ------
-        RigError
-            If there is no pose because the figure has no skeleton.
-        """
+        """Return the pose; ``RigError`` if there is none, as without a skeleton."""
         if self.pose is None:
             raise RigError(f"{self.name} has no pose, as it has no skeleton")
         return self.pose
 
     def require_clip(self) -> Motion:
-        """Return the motion of an actor that must have one.
-
-        Raises
-        ------
-        RigError
-            If there is none.
-        """
+        """Return the motion; ``RigError`` if there is none."""
         if self.clip is None:
             raise RigError(f"{self.name} has no motion")
         return self.clip

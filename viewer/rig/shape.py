@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.kinematics import world_matrices
@@ -198,11 +198,16 @@ def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Fl
     return correctives.feature.weights(skeleton, pose)
 
 
-def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:
-    """Return the vertices (V, 3) before skinning: the rest mesh plus the pose correctives."""
+def rest_positions(
+    figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True, vertices: Ints | None = None
+) -> Floats:
+    """Return vertices (N, 3), by default all, before skinning: at rest plus pose correctives."""
+    rest = mesh.positions if vertices is None else mesh.positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
-        return mesh.positions
+        return rest
     weights = pose_weights(figure.correctives, figure.skeleton, pose)
     if not weights.any():
-        return mesh.positions
-    return mesh.positions + figure.correctives.displacement(weights)
+        return rest
+    if vertices is None:
+        return rest + figure.correctives.displacement(weights)
+    return rest + figure.correctives.of_vertices(vertices, weights)

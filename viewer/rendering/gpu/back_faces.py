@@ -58,7 +58,7 @@ class BackFaces:
         """Return the vertices around openings in a pose, figure space: (B, 3)."""
         if not len(shell.borders):
             return np.zeros((0, 3))
-        from viewer.rig.inspection.single_vertices import rest_vertices
+        from viewer.rig.shape import rest_positions
 
         skin = figure.require_skin()
         palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
@@ -67,7 +67,7 @@ class BackFaces:
             places, normals = mesh.positions[shell.borders], mesh.normals[shell.borders]
             around = Mesh(places, normals, np.zeros((0, 3), dtype=np.int32))
             self._around = around, skin_rows(skin, shell.borders)
-        rest = rest_vertices(figure, pose, shell.borders, how.correctives)
+        rest = rest_positions(figure, figure.require_mesh(), pose, how.correctives, shell.borders)
         return skinned(*self._around, rest, palette, how)[0]
 
     def regions(

@@ -13,12 +13,12 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.inspection.single_vertices import check_vertices, rest_vertices
+from viewer.rig.inspection.single_vertices import check_vertices
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scalars import joint_text
-from viewer.rig.shape import shaped
+from viewer.rig.shape import rest_positions, shaped
 from viewer.rig.skin import Skin, bind_positions, has_influence, skin_rows, strongest_first
 from viewer.rig.skinning import METHODS, Skinning, skin_used, skinned
 from viewer.rig.skinning.dqs import split_palette
@@ -111,7 +111,7 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
         skinning = replace(skinning, blend_factor=factor)
     stored, figure = figure.require_mesh().positions[vertex], shaped(figure, pose.shape_weights)
     mesh, skeleton, skin = figure.attached()
-    rest = rest_vertices(figure, pose, chosen, skinning.correctives)[0]
+    rest = rest_positions(figure, mesh, pose, skinning.correctives, chosen)[0]
     row = strongest_first(skin_rows(skin_used(skin, skinning), chosen))
     palette = posed_skeleton(skeleton, pose).palette(skin)
     matrices = palette[row.joints]

@@ -11,16 +11,12 @@ from viewer.errors import RigError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.number_text import number_text
-from viewer.rig.pose import Pose, placement_matrix, rest_pose
+from viewer.rig.pose import Pose
 from viewer.rig.scalars import joint_text
-from viewer.rig.shape import pose_weights, shaped
 from viewer.rig.skeleton import shown_joint_of
 from viewer.rig.skin import merged, skin_rows, strongest_first
-from viewer.rig.skinning import Skinning, skin_used, skinned
+from viewer.rig.skinning import Skinning, deformed, skin_used
 
 
 def deform_vertices(
@@ -28,27 +24,7 @@ def deform_vertices(
 ) -> tuple[Floats, Floats]:
     """Skin vertices (N,) with the same result as ``viewer.rig.skinning.deform``: two of (N, 3)."""
     check_vertices(figure, vertices)
-    if pose is not None:
-        figure = shaped(figure, pose.shape_weights)
-    mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None  # checked by check_vertices
-    if skeleton is None or skin is None:
-        moved, normals = mesh.positions[vertices], unit(mesh.normals[vertices])
-        return moved if pose is None else apply_transform(placement_matrix(pose), moved), normals
-    pose = rest_pose(skeleton) if pose is None else pose
-    palette = posed_skeleton(skeleton, pose).palette(skin)
-    rest = rest_vertices(figure, pose, vertices, skinning.correctives)
-    moved, normals = skinned(mesh, skin, rest, palette, skinning, vertices)
-    return apply_transform(placement_matrix(pose), moved), normals
-
-
-def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = True) -> Floats:
-    """Return vertices (N, 3) before skinning: the rest mesh plus, if wanted, the correctives."""
-    rest = figure.require_mesh().positions[vertices]
-    if not correct or figure.correctives is None or figure.skeleton is None:
-        return rest
-    weights = pose_weights(figure.correctives, figure.skeleton, pose)
-    return rest + figure.correctives.of_vertices(vertices, weights) if weights.any() else rest
+    return deformed(figure, pose, skinning, vertices)
 
 
 def check_vertices(figure: Figure, vertices: Ints) -> None:

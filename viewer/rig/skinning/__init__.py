@@ -57,7 +57,12 @@ METHODS = {
         result="{blend_factor} of the way",
     ),
 }
-"""Modules in this folder, each with ``deform`` and a GLSL chunk in ``shaders/skin``."""
+"""Modules in this folder, each with a GLSL chunk in ``shaders/skin`` and a function
+``deform(positions, normals, skin, palette, blend_factor)``.
+
+It transforms positions and normals (V, 3) of the bind pose by skinning matrices (J, 4, 4), bind to
+posed, which may scale and shear, and returns both (V, 3) in figure units, normals of unit length. A
+vertex without influence stays at its bind position. Weights are used as stored."""
 PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 """Methods that are not interpolated between others; the first is the reference."""
 
@@ -142,16 +147,24 @@ def deform(
         from viewer.near_names import name_hint
 
         raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
+    return deformed(figure, pose, how)
+
+
+def deformed(
+    figure: Figure, pose: Pose | None, how: Skinning, vertices: Ints | None = None
+) -> tuple[Floats, Floats]:
+    """Return posed vertices (N, 3), by default all, and their normals; see ``deform``."""
     weights = figure.rest_shape_weights if pose is None else pose.shape_weights
     figure = shaped(figure, weights)
     mesh = figure.require_mesh()
     if figure.skeleton is None or figure.skin is None:
-        moved, normals = mesh.positions, unit(mesh.normals)
+        chosen = slice(None) if vertices is None else vertices
+        moved, normals = mesh.positions[chosen], unit(mesh.normals[chosen])
     else:
         pose = rest_pose(figure.skeleton) if pose is None else pose
         palette = posed_skeleton(figure.skeleton, pose).palette(figure.skin)
-        rest = rest_positions(figure, mesh, pose, how.correctives)
-        moved, normals = skinned(mesh, figure.skin, rest, palette, how)
+        rest = rest_positions(figure, mesh, pose, how.correctives, vertices)
+        moved, normals = skinned(mesh, figure.skin, rest, palette, how, vertices)
     return moved.copy() if pose is None else apply_transform(placement_matrix(pose), moved), normals
 
 

@@ -37,10 +37,6 @@ def deform(
     Weights are divided by their sum. Quaternions are negated if necessary to lie in the hemisphere
     of the strongest influence (eq. 14 and its text: antipodality). Normals are transformed by the
     inverse transpose of the blended stretch, then by the blended rotation.
-
-    ``positions``, ``normals``: (V, 3), in the bind pose. ``skin``: a vertex without influence stays
-    at its bind position. ``palette``: (J, 4, 4), skinning matrices, bind to posed; they may scale,
-    uniformly or not. Returns ``positions``: (V, 3), figure units; ``normals``: (V, 3), unit length.
     """
     skin = strongest_first(skin)
     centers = bind_positions(skin)

@@ -41,10 +41,6 @@ def deform(
 
     If all joints of a vertex are rigid, its normal uses the blended matrix itself (CSE169 course
     notes). If one of them scales or shears, it uses the inverse transpose, n' = unit(B^-T n).
-
-    ``positions``, ``normals``: (V, 3), in the bind pose. ``skin``: weights as stored; a vertex
-    without influence stays at its bind position. ``palette``: (J, 4, 4), skinning matrices, bind to
-    posed. Returns ``positions``: (V, 3), figure units; ``normals``: (V, 3), unit length.
     """
     moved, rotated = move(positions, skin, palette, normals)
     assert rotated is not None  # normals were given

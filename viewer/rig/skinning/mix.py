@@ -20,12 +20,8 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Interpolate each vertex: (1 - blend_factor) LBS + blend_factor DQS.
 
-    Where joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
-
-    ``positions``, ``normals``: (V, 3), in the bind pose. ``palette``: (J, 4, 4), skinning matrices,
-    bind to posed. ``blend_factor``: 0 for LBS alone, 1 for DQS alone; None for the fractions of the
-    skin at each vertex. Returns ``positions``: (V, 3), figure units; ``normals``: (V, 3), unit
-    length.
+    None stands for the fractions of the skin at each vertex. Where joints scale or shear, normals
+    use the inverse transpose of the interpolated linear maps.
     """
     factor: Floats | float
     if blend_factor is not None:
