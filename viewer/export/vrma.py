@@ -21,6 +21,7 @@ from viewer.export._gaps import filled, frames_phrase, gaps_note
 from viewer.export._losses.largest_distances import Apart, Farthest, apart_notes, negligible
 from viewer.export._options import ExportOptions
 from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.keyed import AnimationParts
 from viewer.export.vrm.canonical_pose import in_t_pose, standing, unit_rotation, vrm_axes
 from viewer.export.vrm.humanoid import bone_above, human_bones
 from viewer.export.vrm.new_extension import PRESETS
@@ -130,25 +131,26 @@ def _fill(
             parent.setdefault("children", []).append(nodes[bone])
     document.root["scene"] = document.add("scenes", {"nodes": [nodes["hips"]]})
     turns, hips = _moved(figure, frames, world_up, bones, rotations)
-    keys = _Keys(document, np.arange(frames.n_frames) / animation.frame_rate)
+    seconds = np.arange(frames.n_frames) / animation.frame_rate
+    keys, at = AnimationParts(), document.array(seconds, "SCALAR", bounds=True)
     for bone in order:
         local = turns[bone]
         if above[bone]:
             local = np.swapaxes(turns[above[bone]], -1, -2) @ local
         quaternions = matrix_to_quaternion(local)
         align_signs(quaternions)
-        keys.add(nodes[bone], "rotation", quaternions, "VEC4")
-    keys.add(nodes["hips"], "translation", hips, "VEC3")
+        keys.add(nodes[bone], "rotation", at, document.array(quaternions, "VEC4"))
+    keys.add(nodes["hips"], "translation", at, document.array(hips, "VEC3"))
     extension: Json = {
         "specVersion": "1.0",
         "humanoid": {"humanBones": {bone: {"node": nodes[bone]} for bone in order}},
     }
-    weights = _add_expressions(document, keys, figure, frames)
+    weights = _add_expressions(document, keys, at, figure, frames)
     if weights:
         extension["expressions"] = weights
-    keys.finish(animation.motion.name or animation.name)
+    keys.put(document, {"name": text_of(animation.motion.name or animation.name)})
     document.root["extensions"] = {_EXTENSION: extension}
-    document.root["extensionsUsed"] = [_EXTENSION]
+    document.declare(_EXTENSION)
     return weights
 
 
@@ -221,7 +223,7 @@ def _losses(
 
 
 def _add_expressions(
-    document: Document, keys: _Keys, figure: Figure, frames: Frames
+    document: Document, keys: AnimationParts, at: int, figure: Figure, frames: Frames
 ) -> dict[str, Json]:
     """Add a node for each expression that is used; return the members of the extension."""
     shapes, weights = figure.blend_shapes, frames.shape_weights
@@ -238,32 +240,9 @@ def _add_expressions(
         document.root["scenes"][0]["nodes"].append(node)
         places = np.zeros((frames.n_frames, 3))
         places[:, 0] = np.clip(weights[:, row], 0.0, 1.0)
-        keys.add(node, "translation", places, "VEC3")
+        keys.add(node, "translation", at, document.array(places, "VEC3"))
         preset = presets.get(row, name)
         is_preset = preset in PRESETS and preset not in found.get("preset", {})
         kind, key = ("preset", preset) if is_preset else ("custom", text_of(name))
         found.setdefault(kind, {})[key] = {"node": node}
     return found
-
-
-class _Keys:
-    """Samplers and channels of the animation, with a key at each of the times (F,), seconds."""
-
-    def __init__(self, document: Document, times: Floats) -> None:
-        self._document = document
-        self._times = document.array(times, "SCALAR", bounds=True)
-        self._samplers: list[Json] = []
-        self._channels: list[Json] = []
-
-    def add(self, node: int, path: str, values: Floats, kind: str) -> None:
-        """Add one property of a node."""
-        output = self._document.array(values, kind)
-        target = {"node": node, "path": path}
-        self._channels.append({"sampler": len(self._samplers), "target": target})
-        sampler = {"input": self._times, "output": output, "interpolation": "LINEAR"}
-        self._samplers.append(sampler)
-
-    def finish(self, name: str) -> None:
-        """Add the animation to the document."""
-        item = {"name": text_of(name), "samplers": self._samplers, "channels": self._channels}
-        self._document.add("animations", item)

@@ -224,6 +224,20 @@ def test_attributes_are_normalised_integers_with_exact_sums(tmp_path):
     assert weights.sum(axis=1).tolist() == [65535] * 6
 
 
+def test_extensions_of_all_figures_are_declared(tmp_path):
+    figure = two_parts()
+    mesh = figure.require_mesh()
+    slots = np.zeros(mesh.n_triangles, dtype=np.int32)
+    bright = Material("bright", unlit=True)
+    own = replace(mesh, materials=(bright,), triangle_materials=slots)
+    actors = [Actor(replace(figure, mesh=own)), Actor(two_parts())]
+    export_figures(actors, tmp_path / "small.glb", optimizes=True)
+    root, _ = document(tmp_path / "small.glb")
+    assert root["materials"][0]["extensions"] == {"KHR_materials_unlit": {}}
+    assert root["extensionsUsed"] == ["KHR_mesh_quantization", "KHR_materials_unlit"]
+    assert root["extensionsRequired"] == ["KHR_mesh_quantization"]
+
+
 def test_quantised_figure_moves_like_the_original(tmp_path):
     figure = two_parts()
     notes = export_clips(Actor(figure), tmp_path / "small.glb", optimizes=True)

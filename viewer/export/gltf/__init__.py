@@ -22,7 +22,7 @@ from viewer.export._losses.motion_errors import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import ExportOptions
 from viewer.export.gltf.body import Body, Built
-from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.document import Document, named
 from viewer.export.gltf.figures import Added, add_figure, figure_losses, place_figures
 from viewer.export.gltf.keyed import Clips
 from viewer.export.gltf.losses import GltfFile, Written, not_held
@@ -392,7 +392,7 @@ def _add_cameras(
     keyed = dict(zip([actor for actor, _ in written], clips, strict=False))
     built, actors = dict(written), [actor for actor, _ in written]
     for view in views:
-        camera: Json = {"name": text_of(view.name)} if view.name else {}
+        camera = named(view.name)
         focal_x, focal_y = float(view.intrinsic[0, 0]), float(view.intrinsic[1, 1])
         width, height = _size(view)
         angle = 2.0 * math.atan(0.5 * height / focal_y)
@@ -469,7 +469,7 @@ def _add_path(
     """Add the nodes above a camera and their keys in some clips; return the topmost node."""
     rest, made = path.nodes, list[int]()
     for joint, parent in enumerate(rest.parents.tolist()):
-        node: Json = {"name": text_of(rest.names[joint])} if rest.names[joint] else {}
+        node = named(rest.names[joint])
         node |= item if joint == rest.n_joints - 1 else {}
         node["translation"] = rest.rest_translations[joint].tolist()
         node["rotation"] = rest.rest_rotations[joint].tolist()

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
-from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.document import Document, named, text_of
 from viewer.export.gltf.materials import Color, Materials
 from viewer.export.gltf.mesh import EXTENSION, Encoding, Placed, add_mesh, parts_of, quantized
 from viewer.export.gltf.nodes import Locals, Tree, add_nodes
@@ -107,8 +107,8 @@ def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
     """Return the writer of vertex attributes."""
     if not optimizes:
         return Encoding(document)
-    for name in ("extensionsUsed", "extensionsRequired"):
-        document.root[name] = [EXTENSION]
+    for member in ("extensionsUsed", "extensionsRequired"):
+        document.declare(EXTENSION, member=member)
     shapes, offsets = body.figure.blend_shapes, list[Floats]()
     if shapes is not None and len(body.shape.targets):
         offsets = [shapes.direction_values()[row] for row in body.shape.targets]
@@ -129,7 +129,7 @@ def _add_meshes(
             node = tree.joints[part.joint]
             document.root["nodes"][node]["mesh"] = mesh
         else:
-            item: Json = {"name": text_of(part.name)} if part.name else {}
+            item = named(part.name)
             if record is not None and part.index in record.part_extras:
                 item["extras"] = record.part_extras[part.index]
             node = document.add("nodes", {**item, "mesh": mesh})

@@ -52,6 +52,11 @@ class Document:
         items.append(item)
         return len(items) - 1
 
+    def declare(self, *extensions: str, member: str = "extensionsUsed") -> None:
+        """Add extensions to those that the file uses, or to ``extensionsRequired``."""
+        known: list[str] = self.root.setdefault(member, [])
+        known += [name for name in extensions if name not in known]
+
     def array(
         self, values: NDArray[np.number], kind: str, target: int = 0, bounds: bool = False
     ) -> int:
@@ -188,6 +193,11 @@ def _finite(value: object) -> tuple[Any, int]:
 
 def _is_odd(value: object) -> bool:
     return isinstance(value, float) and not math.isfinite(value)
+
+
+def named(name: str) -> Json:
+    """Return the members of an object with a name; none if it is empty."""
+    return {"name": text_of(name)} if name else {}
 
 
 def text_of(name: str) -> str:

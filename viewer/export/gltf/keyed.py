@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.document import Document, named, text_of
 from viewer.export.gltf.mesh import Placed
 from viewer.export.gltf.nodes import Locals, Tree
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -30,6 +30,33 @@ _MODES = {"linear": "LINEAR", "step": "STEP", "cubic": "CUBICSPLINE"}
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 _RATE = 60.0  # frames per second at which channels of different interpolation are merged
 _NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
+
+
+class AnimationParts:
+    """Samplers and channels of one animation."""
+
+    def __init__(self) -> None:
+        self.samplers: list[Json] = []
+        self.channels: list[Json] = []
+
+    def add(self, node: int, path: str, times: int, output: int, mode: str = "LINEAR") -> None:
+        """Add the keys of a property of a node: accessors of times in seconds, and of values."""
+        target = {"node": node, "path": path}
+        self.channels.append({"sampler": len(self.samplers), "target": target})
+        self.samplers.append({"input": times, "output": output, "interpolation": mode})
+
+    def put(self, document: Document, item: Json, into: int = -1) -> int:
+        """Add all to an animation, or to a new one with other members; return its index."""
+        if into < 0:
+            parts = {"samplers": self.samplers, "channels": self.channels}
+            return document.add("animations", {**item, **parts})
+        known = document.root["animations"][into]
+        first = len(known["samplers"])
+        for channel in self.channels:
+            channel["sampler"] += first
+        known["samplers"] += self.samplers
+        known["channels"] += self.channels
+        return into
 
 
 class Clips:
@@ -61,15 +88,15 @@ class Clips:
                 joined = _joined_weights(moved, rows, weights)
                 if joined is not None:
                     keys.add(placed.node, joined)
-            if not keys.channels:
+            if not keys.parts.channels:
                 continue
             # Share the animation of another figure that played the same clip, or begin a new one.
             name = (clip.name, clip.number, clip.start, clip.end, first_time(clip))
             known = self._known.setdefault(name, [])
             common = next((index for index in known if index not in added), -1)
-            item: Json = {"name": text_of(clip.name)} if clip.name else {}
+            item = named(clip.name)
             item |= {} if clip.extras is None else {"extras": clip.extras}
-            index = _put_animation(self._document, item, keys.samplers, keys.channels, common)
+            index = keys.parts.put(self._document, item, common)
             if common < 0:
                 known.append(index)
             added[index] = clip
@@ -83,17 +110,14 @@ def first_time(clip: TransformClip) -> float:
 
 
 class _Keys:
-    """Samplers and channels of one animation; equal times are written once per file."""
+    """Keys of one animation; equal times are written once per file."""
 
     def __init__(self, document: Document, times: dict[bytes, int], first: float) -> None:
         self._document, self._times, self._first = document, times, first
-        self.samplers: list[Json] = []
-        self.channels: list[Json] = []
+        self.parts = AnimationParts()
 
     def add(self, node: int, channel: TransformChannel) -> None:
         """Add the keys of a joint or mesh."""
-        target = {"node": node, "path": channel.path}
-        self.channels.append({"sampler": len(self.samplers), "target": target})
         is_cubic = channel.tangents is not None and len(channel.times) > 1
         values, kind = channel.values, _KINDS[channel.path]
         if channel.path == "rotation" and not is_cubic:
@@ -105,8 +129,7 @@ class _Keys:
             values = values.ravel()
         mode = "linear" if channel.tangents is not None and not is_cubic else channel.interpolation
         output = self._document.array(values, kind)
-        sampler = {"input": self._input(channel.times), "output": output}
-        self.samplers.append({**sampler, "interpolation": _MODES[mode]})
+        self.parts.add(node, channel.path, self._input(channel.times), output, _MODES[mode])
 
     def _input(self, times: Floats) -> int:
         single = _increasing(times - self._first)
@@ -197,65 +220,29 @@ def add_animation(
 ) -> int:
     """Add frames at times (F,) in seconds from 0 to an animation, -1 for a new one; return it."""
     # Single precision distinguishes the times of eight million frames at any rate.
-    keys = _AnimationParts(
-        document, document.array(times.astype(np.float32), "SCALAR", bounds=True)
-    )
+    keys, at = AnimationParts(), document.array(times.astype(np.float32), "SCALAR", bounds=True)
     rotations = np.swapaxes(_continuous(frames.rotations), 0, 1)
     for node, output in zip(tree.joints, document.arrays(rotations, "VEC4"), strict=True):
-        keys.add(node, "rotation", output)
+        keys.add(node, "rotation", at, output)
     moves = np.flatnonzero(moving(skeleton, frames))
     if len(moves):
         places = skeleton.rest_translations[moves] + frames.translations[:, moves]
         outputs = document.arrays(np.swapaxes(places, 0, 1), "VEC3")
         for joint, output in zip(moves, outputs, strict=True):
-            keys.add(tree.joints[joint], "translation", output)
+            keys.add(tree.joints[joint], "translation", at, output)
     stretches = np.flatnonzero(_scaling(frames))
     if len(stretches):
         outputs = document.arrays(np.swapaxes(frames.scales[:, stretches], 0, 1), "VEC3")
         for joint, output in zip(stretches, outputs, strict=True):
-            keys.add(tree.joints[joint], "scale", output)
+            keys.add(tree.joints[joint], "scale", at, output)
     if np.ptp(frames.figure_translations, axis=0).any():
-        keys.add(tree.place, "translation", document.array(frames.figure_translations, "VEC3"))
+        keys.add(tree.place, "translation", at, document.array(frames.figure_translations, "VEC3"))
     if np.ptp(frames.figure_scales):
         scales = np.repeat(frames.figure_scales[:, None], 3, axis=1)
-        keys.add(tree.place, "scale", document.array(scales, "VEC3"))
+        keys.add(tree.place, "scale", at, document.array(scales, "VEC3"))
     for node, weights in morphs:
-        keys.add(node, "weights", document.array(weights.ravel(), "SCALAR"))
-    return _put_animation(document, {"name": text_of(name)}, keys.samplers, keys.channels, into)
-
-
-def _put_animation(
-    document: Document,
-    item: Json,
-    samplers: list[Json],
-    channels: list[Json],
-    into: int = -1,
-) -> int:
-    """Add samplers and their channels to an animation, -1 for a new one; return its index."""
-    if into < 0:
-        return document.add("animations", {**item, "samplers": samplers, "channels": channels})
-    known = document.root["animations"][into]
-    first = len(known["samplers"])
-    for channel in channels:
-        channel["sampler"] += first
-    known["samplers"] += samplers
-    known["channels"] += channels
-    return into
-
-
-class _AnimationParts:
-    """Samplers and channels of one animation."""
-
-    def __init__(self, document: Document, times: int) -> None:
-        self.document, self.times = document, times
-        self.samplers: list[Json] = []
-        self.channels: list[Json] = []
-
-    def add(self, node: int, path: str, output: int) -> None:
-        target = {"node": node, "path": path}
-        self.channels.append({"sampler": len(self.samplers), "target": target})
-        sampler = {"input": self.times, "output": output, "interpolation": "LINEAR"}
-        self.samplers.append(sampler)
+        keys.add(node, "weights", at, document.array(weights.ravel(), "SCALAR"))
+    return keys.put(document, {"name": text_of(name)}, into)
 
 
 def _continuous(rotations: Floats) -> Floats:

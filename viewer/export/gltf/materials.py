@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.document import Document, named
 from viewer.media.png import encode_png
 from viewer.phrases import brief
 from viewer.rig.arrays import Bytes, Floats
@@ -106,14 +106,15 @@ class Materials:
             extensions["KHR_materials_unlit"] = {}
         if extensions:
             rest["extensions"] = extensions
-            self._declare(*extensions)
+            self._document.declare(*extensions)
         return self._add(title, surface, rest)
 
     def _add(self, name: str, surface: Json, rest: Json | None = None) -> int:
         # Triangles may be wound either way unless the file states that they are single-sided.
         rest = {"doubleSided": True} if rest is None else rest
-        item = {"name": text_of(name)} if name else {}
-        return self._document.add("materials", {**item, "pbrMetallicRoughness": surface, **rest})
+        return self._document.add(
+            "materials", {**named(name), "pbrMetallicRoughness": surface, **rest}
+        )
 
     def _reference(self, texture: Texture, name: str) -> Json:
         """Return a texture's index with its transform; each image is written once."""
@@ -136,7 +137,7 @@ class Materials:
             reference["texCoord"] = texture.uv_set
         if not texture.is_placed_plainly:
             reference["extensions"] = {"KHR_texture_transform": _placement(texture.matrix)[0]}
-            self._declare("KHR_texture_transform")
+            self._document.declare("KHR_texture_transform")
         return reference
 
     def _sampler(self, texture: Texture) -> int:
@@ -148,10 +149,6 @@ class Materials:
             wraps = {"wrapS": _WRAPS[texture.wrap[0]], "wrapT": _WRAPS[texture.wrap[1]]}
             self._samplers[key] = self._document.add("samplers", {**filters, **wraps})
         return self._samplers[key]
-
-    def _declare(self, *extensions: str) -> None:
-        used: list[str] = self._document.root.setdefault("extensionsUsed", [])
-        used += [name for name in extensions if name not in used]
 
 
 def material_losses(mesh: Mesh) -> list[Diagnostic]:

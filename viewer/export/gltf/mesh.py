@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.export.gltf.document import INDICES, VERTICES, Document, text_of
+from viewer.export.gltf.document import INDICES, VERTICES, Document, named, text_of
 from viewer.export.gltf.materials import Materials
 from viewer.export.gltf.skin import Influences, Shape, influence_sets
 from viewer.rig.arrays import Floats, Ints
@@ -59,7 +59,7 @@ def add_mesh(
         sets = [*influence_sets(influences, part.sources)]
         for number, (joints, weights) in enumerate(encoding.influences(sets)):
             attributes |= {f"JOINTS_{number}": joints, f"WEIGHTS_{number}": weights}
-    item: Json = {"name": text_of(part.mesh_name)} if part.mesh_name else {}
+    item = named(part.mesh_name)
     shared: Json = {"attributes": attributes}
     record = shape.figure.record
     extras = None if record is None else record.mesh_extras.get(part.index)

@@ -19,7 +19,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.export.gltf.document import Document, text_of
+from viewer.export.gltf.document import Document, named, text_of
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.file_record import Json
@@ -130,7 +130,7 @@ def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[i
         if parent >= 0:
             below[parent].append(first + joint)
     for joint, name in enumerate(skeleton.names):
-        node: Json = {"name": text_of(name)} if name else {}
+        node = named(name)
         _put(node, "translation", still.translations[joint], 0.0)
         rotation = still.rotations[joint]
         _put(node, "rotation", rotation / np.linalg.norm(rotation), _NO_ROTATION)

@@ -276,7 +276,7 @@ def _add_kept(
     _add(document, body, built, extensions)
     colliders = list_in(extensions.get(_SPRINGS), "colliders")
     if any(part(each, "extensions", EXTENDED) is not None for each in colliders):
-        _declare(document, EXTENDED)
+        document.declare(EXTENDED)
     return [_written(data, extensions), *_lost(maps.lost)]
 
 
@@ -289,13 +289,13 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
             item.pop(_UNLIT, None)
         if _TOON in given:
             item[_TOON] = kept_toon(given[_TOON], maps)
-            _declare(document, _TOON)
+            document.declare(_TOON)
             extensions = (part(each, "extensions") for each in item[_TOON].values())
             if any(isinstance(each, dict) and _TRANSFORM in each for each in extensions):
-                _declare(document, _TRANSFORM)
+                document.declare(_TRANSFORM)
         if _UNLIT in given:
             item[_UNLIT] = given[_UNLIT]
-            _declare(document, _UNLIT)
+            document.declare(_UNLIT)
         if not item:
             del document.root["materials"][written]["extensions"]
     items = document.root.get("materials", ())
@@ -326,19 +326,14 @@ def _add_made(
 def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, Any]) -> None:
     """Add root extensions, and the constraints of nodes."""
     document.root["extensions"] = dict(extensions)
-    _declare(document, *extensions)
+    document.declare(*extensions)
     skeleton = body.figure.require_skeleton()
     joints = built.tree.joints
     for each in skeleton.constraints:
         item = {"specVersion": "1.0", "constraint": {each.kind: _item(each, joints)}}
         extended = document.root["nodes"][joints[each.joint]].setdefault("extensions", {})
         extended[_CONSTRAINT] = item
-        _declare(document, _CONSTRAINT)
-
-
-def _declare(document: Document, *names: str) -> None:
-    used: list[str] = document.root.setdefault("extensionsUsed", [])
-    used += [name for name in names if name not in used]
+        document.declare(_CONSTRAINT)
 
 
 def _written(data: Mapping[str, Any], extensions: Mapping[str, Any]) -> Diagnostic:
