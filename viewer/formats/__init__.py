@@ -6,7 +6,7 @@ import contextlib
 import re
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, wording
@@ -222,7 +222,7 @@ _REEXPORTED = {
 """Names that the package re-exports, by module; each module is imported on first use."""
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     for module, names in _REEXPORTED.items():
         if name in names:
             return getattr(import_module(module), name)

@@ -19,7 +19,7 @@ _Content = TypeVar("_Content")
 class _Kept:
     """An immutable figure, and what its reader recorded."""
 
-    state: tuple[Any, ...]
+    state: tuple[object, ...]
     content: Any
     diagnostics: tuple[Diagnostic, ...]
     also_read: tuple[Path, ...]
@@ -69,7 +69,7 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
     return content
 
 
-def _state(source: Source, others: Collection[Path]) -> tuple[Any, ...]:
+def _state(source: Source, others: Collection[Path]) -> tuple[object, ...]:
     """Return a key that changes if a figure would now be read differently."""
     stamps = []
     for path in (source.path, *others):

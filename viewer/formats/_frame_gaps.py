@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +69,7 @@ def no_frames(source: Source, count: int) -> FormatError:
     )
 
 
-def _problem(source: Source) -> Any:
+def _problem(source: Source) -> Diagnostic:
     return replace(source.frame_faults[0], path=None, line=None)
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,7 +76,7 @@ class Source:
         self.options: dict[str, str] = {}
         self.used_options: set[str] = set()
         self.frame_faults: list[Diagnostic] = []
-        self._opened: dict[Callable[[Source], Any], Any] = {}
+        self._opened: dict[Callable[[Source], object], object] = {}
         self._data = None if data is None else without_marks(data)
         self._is_stored = data is None  # whether the data can be read again
         self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
@@ -200,7 +200,7 @@ class Source:
         """Offset after the last word, at which missing items are reported."""
         return len(self.data.rstrip())
 
-    def fault(self, key: str, offset: int | str | None = None, **values: Any) -> FormatError:
+    def fault(self, key: str, offset: int | str | None = None, **values: object) -> FormatError:
         """Return the exception for an error after which the reader cannot continue."""
         return FormatError(self._diagnostic(key, offset, values))
 
@@ -211,7 +211,7 @@ class Source:
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,
-        **values: Any,
+        **values: object,
     ) -> None:
         """Record an error that makes the file invalid but after which the reader can continue.
 
@@ -233,7 +233,7 @@ class Source:
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,
-        **values: Any,
+        **values: object,
     ) -> None:
         """Record a warning or note that leaves the file valid; arguments as for ``refuse``."""
         self.diagnostics.add(self._diagnostic(key, offset, values, count, part, places))
@@ -242,7 +242,7 @@ class Source:
         self,
         key: str,
         offset: int | str | None,
-        values: dict[str, Any],
+        values: dict[str, object],
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -243,18 +242,18 @@ class _Parser:
         line = self.source.line(self.starts[self.channel])
         return Phrase("{where} begins on line {line}", where=channel, line=line)
 
-    def _values(self, own: dict[str, Any]) -> dict[str, Any]:
+    def _values(self, own: dict[str, object]) -> dict[str, object]:
         """Return the values that all messages about the current word have in common."""
         found = quoted(None if self.word is None else self.word.group())
         begins = optional(" ({})", self._begins())
         return {"where": self._where(), "found": found, "begins": begins, **own}
 
-    def _fault(self, key: str, **values: Any) -> FormatError:
+    def _fault(self, key: str, **values: object) -> FormatError:
         """Return the exception for an error at the current word that stops parsing."""
         where = self.source.end if self.word is None else self.word.start()
         return self.source.fault(key, where, **self._values(values))
 
-    def _refuse(self, key: str, word: Word | None = None, **values: Any) -> None:
+    def _refuse(self, key: str, word: Word | None = None, **values: object) -> None:
         """Record an error at a word, by default the current one, and continue."""
         word = self.word if word is None else word
         where = self.source.end if word is None else word.start()

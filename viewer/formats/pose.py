@@ -451,7 +451,7 @@ class _NamedValues:
             path = path[:-1]
         return _byte_offset(self.text, place)
 
-    def fault(self, key: str, *path: str | int, **values: Any) -> FormatError:
+    def fault(self, key: str, *path: str | int, **values: object) -> FormatError:
         """Return an error with the file, and the line of a value if the file has lines."""
         return self.source.fault(key, self.offset(*path), **values)
 
@@ -497,11 +497,11 @@ def _described(value: Any) -> Phrase:
     return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)
 
 
-def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
+def _odd_value(value: object, kinds: str) -> tuple[tuple[int, ...] | None, object]:
     """Return indices and value of the first item of another kind; None for ragged lists."""
     if not isinstance(value, list | tuple):
         return (), value
-    waiting: list[tuple[tuple[int, ...], Any]] = [((), value)]
+    waiting: list[tuple[tuple[int, ...], object]] = [((), value)]
     while waiting:
         path, one = waiting.pop()
         if isinstance(one, list | tuple):
@@ -511,7 +511,7 @@ def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
     return None, value
 
 
-def _is_of(one: Any, kinds: str) -> bool:
+def _is_of(one: object, kinds: str) -> bool:
     """Return whether a single value is of one of the kinds, given by numpy's letters."""
     if kinds == "U":
         return isinstance(one, str)
@@ -525,7 +525,7 @@ def _parse_json(source: Source) -> _NamedValues:
     text = source.data.decode("utf-8", "surrogateescape")
     constants: list[str] = []  # Python accepts these words, but JSON does not
 
-    def fault(key: str, offset: int | None, **values: Any) -> FormatError:
+    def fault(key: str, offset: int | None, **values: object) -> FormatError:
         return source.fault(key, None if offset is None else _byte_offset(text, offset), **values)
 
     decoder = json.JSONDecoder(
@@ -588,10 +588,10 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
         save_text(path, "".join(f"{number!r}\n" for number in content.vector.tolist()))
     else:
         named = _values_of(content)
-        dofs = named.pop("dofs")
+        named.pop("dofs")
         arrays = {key: np.asarray(value) for key, value in named.items()}
-        arrays["dof_names"] = np.array(list(dofs), dtype=np.str_)
-        arrays["dofs"] = np.array(list(dofs.values()))
+        arrays["dof_names"] = np.array(list(content.dofs), dtype=np.str_)
+        arrays["dofs"] = np.array(list(content.dofs.values()))
         save_arrays(path, arrays)
     return []
 
@@ -602,8 +602,8 @@ def pose_text(record: PoseRecord) -> str:
     return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def _values_of(record: PoseRecord) -> dict[str, Any]:
-    named: dict[str, Any] = {"dofs": dict(record.dofs)}
+def _values_of(record: PoseRecord) -> dict[str, object]:
+    named: dict[str, object] = {"dofs": dict(record.dofs)}
     space = record.shape_space
     named |= {key: text for key, text in (("model", space.model), ("gender", space.gender)) if text}
     for name, array in (
@@ -627,9 +627,9 @@ def _values_of(record: PoseRecord) -> dict[str, Any]:
     )
 
 
-def named_rotations(rotations: JointRotations) -> dict[str, Any]:
+def named_rotations(rotations: JointRotations) -> dict[str, object]:
     """Return joint rotations by their keys in files; rest transforms are omitted."""
-    named: dict[str, Any] = {
+    named: dict[str, object] = {
         "figure": printable(rotations.figure, _LONGEST_WORD),
         "up": rotations.up,
         "dof_layout": rotations.layout,

@@ -49,7 +49,7 @@ from viewer.formats._source import Source
 from viewer.media.named_arrays import save_arrays
 from viewer.phrases import counted, optional, quoted
 from viewer.rig.annotations import VertexField
-from viewer.rig.arrays import Bytes, Deferred, Floats
+from viewer.rig.arrays import Bytes, Deferred, Floats, Ints
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
@@ -254,7 +254,7 @@ def _skeleton(archive: Archive) -> Skeleton:
     )
 
 
-def _parents(archive: Archive, count: int) -> NDArray[Any]:
+def _parents(archive: Archive, count: int) -> Ints:
     """Return the parents; refuse parents that do not precede their joints, which become roots."""
     parents = _numbers(archive, "parents", (count,))
     late: dict[str, list[int]] = {}
@@ -405,17 +405,19 @@ def _texts(archive: Archive, key: str) -> tuple[str, ...]:
     return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))
 
 
-def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | None = None) -> None:
+def save(
+    figure: Figure, path: str | Path, more: Mapping[str, NDArray[np.generic]] | None = None
+) -> None:
     """Write a figure with mesh, skeleton and skin."""
     save_arrays(path, {**figure_arrays(figure), **(more or {})})
 
 
-def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
+def figure_arrays(figure: Figure) -> dict[str, NDArray[np.generic]]:
     """Return the arrays of a rigged figure by key, as in the file; correctives are float32."""
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     if mesh is None or skeleton is None or skin is None:
         raise RigError(f"figure {figure.name}: expected mesh, skeleton and skin to write a rig")
-    arrays: dict[str, NDArray[Any] | None] = {
+    arrays: dict[str, NDArray[np.generic] | None] = {
         "viewer_rig": np.array(_VERSION),
         "name": np.array(figure.name),
         "up": np.array(figure.up),
@@ -439,9 +441,9 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
     return {key: array for key, array in arrays.items() if array is not None}
 
 
-def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
+def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     """Return the arrays of a mesh with its materials; normals are not stored."""
-    arrays: dict[str, NDArray[Any] | None] = {
+    arrays: dict[str, NDArray[np.generic] | None] = {
         "positions": mesh.positions,
         "triangles": mesh.triangles,
         "uvs": mesh.uvs,
@@ -455,11 +457,11 @@ def _mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
     return found | _material_arrays(mesh)
 
 
-def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
+def _material_arrays(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     """Return the arrays that describe a mesh's materials; an empty dict if it has no material."""
     if not mesh.materials:
         return {}
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: dict[str, NDArray[np.generic]] = {
         "material_names": np.array([material.name for material in mesh.materials]),
         "material_textures": np.array([material.texture or "" for material in mesh.materials]),
         "triangle_materials": mesh.material_indices,
@@ -474,9 +476,9 @@ def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
     return arrays | {f"picture_{number}": image for number, image in pictures.values()}
 
 
-def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[str, Any]:
+def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[str, object]:
     """Return the fields that differ from their defaults, as plain data."""
-    record: dict[str, Any] = {}
+    record: dict[str, object] = {}
     for name in _NUMBERS:
         if getattr(material, name) != getattr(_PLAIN_MATERIAL, name):
             record[name] = getattr(material, name)
@@ -496,9 +498,9 @@ def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[
     return record
 
 
-def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) -> dict[str, Any]:
+def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) -> dict[str, object]:
     """Return a texture's fields that differ from their defaults, and add to ``pictures``."""
-    placing: dict[str, Any] = {}
+    placing: dict[str, object] = {}
     for part in _PLACING:
         value = np.asarray(getattr(texture, part)).tolist()
         if value != np.asarray(getattr(_PLAIN_TEXTURE, part)).tolist():
@@ -511,7 +513,7 @@ def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) ->
     return placing
 
 
-def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[Any]]:
+def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[np.generic]]:
     if layout is None:
         return {}
     return {
@@ -521,8 +523,8 @@ def _layout_arrays(layout: PoseLayout | None) -> dict[str, NDArray[Any]]:
     }
 
 
-def _field_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {}
+def _field_arrays(figure: Figure) -> dict[str, NDArray[np.generic]]:
+    arrays: dict[str, NDArray[np.generic]] = {}
     for index, field in enumerate(figure.fields):
         for key in ("name", "title", "unit"):
             arrays[f"field_{index}_{key}"] = np.array(getattr(field, key))

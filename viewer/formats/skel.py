@@ -19,7 +19,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -427,7 +426,7 @@ def _check_names(skeleton: Skeleton) -> None:
             )
 
 
-def _unsupported(key: str, **values: Any) -> UnsupportedFormatError:
+def _unsupported(key: str, **values: object) -> UnsupportedFormatError:
     return UnsupportedFormatError(Diagnostic(key, values=values))
 
 

@@ -29,7 +29,7 @@ class _RepeatedKeyError(ValueError):
     """A key that occurs twice in an object."""
 
 
-def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
     """Return an object of a text, as the hook of a decoder that refuses repeated keys."""
     values = dict(pairs)
     if len(values) != len(pairs):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.arrays import Bytes, Floats, Item
 
 _AT_ONCE = 1 << 13  # numbers per part, whose temporary arrays stay in the processor's cache
 _EXACT = 1e15  # integers of up to 15 digits survive the conversion to float64 and back
@@ -16,7 +15,7 @@ _POWERS = 10.0 ** np.arange(23)  # all powers of ten that are exact in float64
 
 
 def row_texts(
-    rows: NDArray[Any],
+    rows: NDArray[np.number],
     digits: int | None = None,
     between: bytes = b" ",
     within: bytes = b"/",
@@ -48,20 +47,20 @@ def fixed_texts(rows: Floats, decimals: int, between: bytes = b" ") -> Iterator[
         yield text if between == b" " else text.replace(b" ", between)
 
 
-def dumped(values: NDArray[Any]) -> bytes:
+def dumped(values: NDArray[np.number]) -> bytes:
     """Return numbers as JSON."""
     import orjson
 
     return orjson.dumps(np.ascontiguousarray(values), option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _parts(rows: NDArray[Any]) -> Iterator[NDArray[Any]]:
+def _parts(rows: NDArray[Item]) -> Iterator[NDArray[Item]]:
     step = max(_AT_ONCE // max(rows[:1].size, 1), 1)
     for first in range(0, len(rows), step):
         yield rows[first : first + step]
 
 
-def _significant(values: Floats, digits: int) -> Floats:
+def _significant(values: NDArray[np.number], digits: int) -> Floats:
     """Return numbers whose shortest text has at most this many digits, as ``%.{digits}g`` has."""
     sizes = np.abs(values)
     places = digits - 1 - np.floor(np.log10(sizes, where=sizes > 0.0, out=np.zeros(sizes.shape)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import field
-from typing import Any
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, wording
@@ -281,7 +280,7 @@ class _Parser:
     def _found(self) -> bytes | None:
         return None if self.word is None else self.word.group()
 
-    def _fault(self, key: str, **values: Any) -> FormatError:
+    def _fault(self, key: str, **values: object) -> FormatError:
         """Return the exception for an error at the current word."""
         where = self.source.end if self.word is None else self.word.start()
         return self.source.fault(key, where, found=quoted(self._found()), **values)

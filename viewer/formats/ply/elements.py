@@ -619,7 +619,7 @@ def _even_binary(
 ) -> tuple[_Columns, int] | None:
     """Return columns and bytes per row; None if later lists are not as long as the first row's."""
     left = iter(counts)
-    fields: list[tuple[Any, ...]] = []
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     for number, prop in enumerate(element.properties):
         if prop.count_kind:
             fields += [
