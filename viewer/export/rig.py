@@ -84,13 +84,11 @@ def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
 
 
 def _with_picture_names(rig: Figure, skin: Path) -> Figure:
-    """Return a figure whose embedded images are named as files, after the ``.skin``.
-
-    glTF files name them ``image0`` or not at all: without a suffix, few programs would open them,
-    and two figures in one folder would have different images of one name.
-    """
+    """Return a figure whose embedded images are named as files, after the ``.skin``."""
     if rig.mesh is None:
         return rig
+    # glTF files name images image0 or not at all: without a suffix, few programs would open them,
+    # and two figures in one folder would have different images of one name.
     names: dict[bytes, str] = {}  # by the pixels of the image, which materials may share
     materials = []
     for index, material in enumerate(rig.mesh.materials):
@@ -131,13 +129,11 @@ def _as_rig(actor: Actor, skinning: Skinning) -> tuple[_CourseSkeleton, Figure, 
 
 
 def _scaling_bindings(actor: Actor, course: _CourseSkeleton) -> Floats:
-    """Return inverse binding matrices that scale as the posed joints do: (J, 4, 4).
-
-    With the skinning matrices M of the figure and the matrices W of the unscaled joints in the same
-    pose, both in the scaled figure, they are W^-1 M.
-    """
+    """Return inverse binding matrices that scale as the posed joints do: (J, 4, 4)."""
     figure, pose = actor.figure, actor.require_pose()
     skin = shaped(figure, pose.shape_weights).require_skin()
+    # With the skinning matrices M of the figure and the matrices W of the unscaled joints in the
+    # same pose, both in the scaled figure, the bindings are W^-1 M.
     palette = joint_matrices(figure, pose) @ skin.inverse_bind
     palette[:, :3, :3] /= pose.figure_scale  # the mesh is scaled already
     joints = world_matrices(course.skeleton, rest_pose(course.skeleton))
@@ -274,16 +270,10 @@ class _CourseSkeleton:
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> _CourseSkeleton:
-    """Return a skeleton in the form of ``.skel`` files, with the pose as its rest pose.
-
-    A joint of a ``.skel`` has the local matrix T(offset) Rz Ry Rx, in the axes of its parent. So
-    translations are part of the offsets. A joint with a rest rotation R0 has the angles of
-    R0 R(DOFs), its rotation in the pose, instead of its DOFs. In a scaled pose, offsets are those
-    of the posed joints.
-
-    ``skeleton``: its lengths already include the figure's scale.
-    ``pose``: the figure's translation is added to the roots' offsets.
-    """
+    """Return a skeleton in the form of ``.skel`` files, with the pose as its rest pose."""
+    # A joint of a .skel has the local matrix T(offset) Rz Ry Rx in the axes of its parent, so
+    # translations are part of the offsets. A joint with a rest rotation R0 has the angles of
+    # R0 R(DOFs), its rotation in the pose, instead of its DOFs.
     pose, moved = _scaled(skeleton, pose)
     order = depth_first(skeleton.parents)
     place = np.empty_like(order)

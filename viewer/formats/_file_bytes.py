@@ -60,14 +60,10 @@ def kind_of(path: Path, max_size: int) -> str | None:
 
 
 def read_pipe(path: Path, max_size: int) -> bytes | None:
-    """Return what a pipe that this process was given delivers; None for any other file.
-
-    Such a pipe is an open descriptor: ``/dev/stdin``, or ``/dev/fd/63`` of ``<(…)`` in a shell. It
-    can be read only once, so its bytes are kept for all readers. Other pipes in the file system are
-    not read: without a writer, opening one waits forever.
-
-    Raises ``FormatError`` if more than ``max_size`` bytes arrive, or the pipe cannot be read.
-    """
+    """Return what a pipe that this process was given delivers; None for any other file."""
+    # A pipe is an open descriptor: /dev/stdin, or /dev/fd/63 of <(…) in a shell. It can be read
+    # once only, so its bytes are kept for all readers. Other pipes in the file system are not read:
+    # without a writer, opening one waits forever.
     number = _descriptor(path)
     try:
         status = None if number is None else os.fstat(number)

@@ -12,15 +12,9 @@ _LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide
 
 
 def euler_angles(matrices: Floats, order: str) -> Floats:
-    """Return angles a, b, c with R = R_i(a) R_j(b) R_k(c), i, j, k being the axes of ``order``.
-
-    With e = 1 if i, j, k is a cyclic permutation of x, y, z, else -1: R[j, k] = -e sin a cos b,
-    R[k, k] = cos a cos b, and R_i(a)^T R = R_j(b) R_k(c) gives b and c.
-
-    ``matrices`` (..., 3, 3): rotations for column vectors.
-    ``order``: ``"zyx"`` for R = Rz Ry Rx.
-    Returns (..., 3): radians, in the order of the axes; the middle angle is from -pi / 2 to pi / 2.
-    """
+    """Return radians a, b, c (..., 3) with R = R_i(a) R_j(b) R_k(c) for the axes of ``order``."""
+    # With e = 1 if i, j, k is a cyclic permutation of x, y, z, else -1: R[j, k] = -e sin a cos b,
+    # R[k, k] = cos a cos b, and R_i(a)^T R = R_j(b) R_k(c) gives b, from -pi / 2 to pi / 2, and c.
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)
     m = matrices
@@ -38,24 +32,12 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
 
 
 def unrolled(angles: Floats, order: str) -> Floats:
-    """Return equivalent angles that are nearest to those of the previous frame.
-
-    (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation, as are angles that differ by
-    multiples of 2 pi. If the middle angle is +-pi / 2, only the sum or difference of the outer two
-    is defined.
-
-    ``angles`` (N, ..., 3): radians, one row per frame; result of ``euler_angles``.
-    ``order``: order of the axes.
-    Returns (N, ..., 3): radians, not limited to one revolution.
-    """
+    """Return equivalent angles (N, ..., 3) that are nearest to those of the previous frame."""
     return Unroller(order).following(angles)
 
 
 class Unroller:
-    """Unwrapping of angles over time, block by block; see ``unrolled``.
-
-    ``order``: order of the axes.
-    """
+    """Unwrapping of angles over time, block by block, for one order of the axes."""
 
     def __init__(self, order: str) -> None:
         self._sign = _sign(order)
@@ -98,6 +80,7 @@ class Unroller:
         # The distance to the other form is at least 2 pi - stay.
         if (stay < np.pi).all() and not self._is_other.any():
             return angles
+        # (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation.
         other = angles * [1.0, -1.0, 1.0] + np.pi
         # Switching costs the same from either form, so the number of switches accumulates.
         switches = np.abs(_wrapped(other - before)).sum(axis=-1) < stay - 1e-9
@@ -107,16 +90,14 @@ class Unroller:
         return np.where(changed[..., None], other, angles)
 
     def _unlocked(self, angles: Floats) -> Floats:
-        """Set the first angle of frames in gimbal lock to that of the previous frame.
-
-        R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined, and the
-        third angle compensates.
-        """
+        """Set the first angle of frames in gimbal lock to that of the previous frame."""
         assert self._first is not None  # set by the caller
         locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
         if not locked.any():
             self._first = angles[-1, ..., 0].copy()
             return angles
+        # R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined, and the
+        # third angle compensates for a change of the first.
         frames = np.arange(1, len(angles) + 1).reshape(-1, *[1] * (locked.ndim - 1))
         before = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)
         known = np.concatenate([self._first[None], angles[..., 0]])

@@ -104,11 +104,9 @@ def _is_plain(figure: Figure, frames: Frames, scale: float) -> bool:
 def _still_positions(
     figure: Figure, frames: Frames, weights: Floats, scale: float, space: Space
 ) -> Floats:
-    """Return the positions of joints that only rotate and translate: (F, J, 3).
-
-    With place_j - place_parent = W t_j, W being the rotation of the parent in this frame, and D =
-    x W W_parent^-1 e^-1, they are e W_parent t_j.
-    """
+    """Return the positions of joints that only rotate and translate: (F, J, 3)."""
+    # With place_j - place_parent = W t_j, W being the rotation of the parent in this frame, and
+    # D = x W W_parent^-1 e^-1, the positions D_parent^-1 (x W t_j) are e W_parent t_j.
     skeleton = figure.require_skeleton()
     inner = skeleton.parents >= 0
     axes = _parent_axes(skeleton, space)

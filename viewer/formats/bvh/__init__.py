@@ -61,12 +61,7 @@ _THINNEST, _THICKEST = 0.05, 0.3
 
 
 def read(source: Source) -> SkeletonMotion:
-    """Read a skeleton and its motion.
-
-    Lengths are those of the file. Every joint is a ball joint; the clip's translations are the
-    position channels minus the OFFSET. End Sites are the far ends of the joints' boxes. Raises
-    ``FormatError`` if the text violates the grammar; the error has the file and line.
-    """
+    """Read a skeleton of ball joints and its motion; lengths are those of the file."""
     head = read_head(source)
     table = head.table
     values, lost = read_motion(source, head)
@@ -145,11 +140,8 @@ def _parts(path: Path, start: int, width: int) -> Iterator[Floats]:
 
 
 def open_long(source: Source) -> LongMotion | None:
-    """Return a motion that stays in its file, or None if the file must be read as a whole.
-
-    Only the whole file tells what is wrong with its frames, and which frames replace wrong ones.
-    Warnings are added to the source, unless the result is None.
-    """
+    """Return a motion that stays in its file, or None if the file must be read as a whole."""
+    # Only the whole file tells what is wrong with its frames, and which frames replace wrong ones.
     start = Source(source.path, source.peek(_HEAD))
     try:
         head = read_head(start)

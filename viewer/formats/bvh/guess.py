@@ -119,17 +119,10 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
 ) -> tuple[Literal["y", "z"], Facts, tuple[Phrase, ...]]:
-    """Return the up axis: from feet to head in the rest skeleton, or along its longest side.
-
-    Animals are longer than high; y is up if their legs then reach the ground. If the skeleton is
-    upright along another axis in the frames, that one is up, because some programs rotate the root
-    of a skeleton with y up into a world with z up. A person who lies on the ground is no evidence:
-    see ``_lies``.
-
-    ``points``: (P, 3), positions of joints and End Sites in the rest pose. Returns ``up``: as in
-    ``Figure.up``; ``facts``: as in ``Figure.facts``; ``notes``: as in ``SkeletonMotion.up_notes``;
-    empty if y is up in the rest pose and in the frames.
-    """
+    """Return the up axis, facts and notes, from the rest pose (P, 3) and from the frames."""
+    # Animals are longer than high; y is up if their legs then reach the ground. If the skeleton is
+    # upright along another axis in the frames, that one is up, because some programs rotate the
+    # root of a skeleton with y up into a world with z up.
     skeleton = figure.skeleton
     assert skeleton is not None  # created by the reader
     names = joint_meanings(skeleton)

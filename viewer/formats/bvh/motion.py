@@ -208,11 +208,7 @@ def _faulty_rows(
 def _held_frames(
     source: Source, start: int, width: int, declared: int | None
 ) -> tuple[Floats, Bools | None] | None:
-    """Record all errors in the frames, and return the frames with invalid ones replaced.
-
-    Frames with numbers that are not finite, such as ``nan`` and ``-1.#IND``, are gaps, which are
-    returned too. None if there is no error in the frames, or their starts are unknown.
-    """
+    """Record all errors in the frames; return frames and gaps, None if their starts are unknown."""
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
     rest = 0
@@ -266,10 +262,7 @@ def _held_frames(
 
 
 def _gaps(source: Source, words: Words, bad: _Places, frames: _Places, count: int) -> Bools | None:
-    """Return which of all frames have numbers that are not finite, and report them.
-
-    ``bad`` are the indices of these words, ``frames`` their frames. None if there are none.
-    """
+    """Report the words that are not finite, in ``frames``; return which of all frames have any."""
     if len(bad) == 0:
         return None
     word, offset = words.word(int(bad[0])), int(words.offsets[bad[0]])

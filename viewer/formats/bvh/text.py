@@ -91,18 +91,7 @@ def head_text(
     n_frames: int,
     digits: int,
 ) -> bytes:
-    """Return the text of a file before its frames.
-
-    ``names``: names that the format can hold, see ``held_names``.
-    ``parents`` (J,): parent indices; the first joint is the only root.
-    ``offsets`` (J, 3): offsets from the parent; the root's offset is written as 0.
-    ``ends``: offset of the End Site of every joint without children.
-    ``moves`` (J,) bool: which joints have position channels.
-    ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
-    ``rate``: frames per second.
-    ``n_frames``: number of frames.
-    ``digits``: number of decimals.
-    """
+    """Return the text before the frames; ``ends`` are End Sites, ``names`` as of held_names."""
     lines = ["HIERARCHY"]
     rotations = " ".join(f"{axis.upper()}rotation" for axis in rotation_order)
     open_joints: list[int] = []
