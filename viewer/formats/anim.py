@@ -15,7 +15,6 @@ joint 0, 1, 2 and so on, which is the order of the skeleton's DOF table.
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Part, Phrase, wording
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._source import Source
+from viewer.formats._text.joint_parser import Word, WordParser
 from viewer.formats._text.numbers import to_number
 from viewer.formats._text.words import number_key
 from viewer.formats._translation_limit import FARTHEST
@@ -43,7 +43,6 @@ _MODES: dict[bytes, Extrapolation] = {mode.encode(): mode for mode in EXTRAPOLAT
 _RULES: dict[bytes, Tangent] = {rule.encode(): rule for rule in TANGENT_RULES}
 _WORDS_PER_KEY = 4
 
-Word = re.Match[bytes]
 _Key = tuple[float, float, Tangent, Tangent, int]  # the last item is the key's offset
 
 
@@ -52,13 +51,11 @@ def read(source: Source) -> Clip:
     return _Parser(source).clip()
 
 
-class _Parser:
+class _Parser(WordParser):
     """Recursive-descent parser over the words of a file."""
 
     def __init__(self, source: Source) -> None:
-        self.source = source
-        self.words = source.words()
-        self.word: Word | None = None
+        super().__init__(source)
         # The channel and the key that contain the current word.
         self.channel: int | None = None
         self.key: int | None = None
@@ -66,7 +63,6 @@ class _Parser:
 
     def clip(self) -> Clip:
         """Return the whole file as a clip."""
-        self._advance()
         self._expect(b"animation")
         self._expect(b"{")
         span: tuple[float, float] | None = None
@@ -76,15 +72,15 @@ class _Parser:
         while self.word is not None and self.word.group() != b"}":
             text = self.word.group()
             if text == b"range":
-                self._advance()
+                self.advance()
                 span = self._range()
             elif text == b"numchannels":
-                self._advance()
+                self.advance()
                 stated, count = self.word, self._count("numchannels")
             elif text == b"channel":
                 channels.append(self._channel(len(channels)))
             else:
-                raise self._fault("F002.anim-item: {where}: expected a channel, found {found}")
+                raise self.fault("F002.anim-item: {where}: expected a channel, found {found}")
         self.channel, found = None, len(channels)
         if self.word is None:
             self.source.warn(wording.CLOSING)
@@ -101,7 +97,7 @@ class _Parser:
                 expected=counted(count, "channel"),
                 found=found,
             )
-        self._advance()
+        self.advance()
         if self.word is not None:
             self.source.warn(
                 "F006.anim-after: ignored data after the animation, starting with {found}",
@@ -138,28 +134,28 @@ class _Parser:
     def _channel(self, index: int) -> Channel:
         self.channel = index
         self.starts.append(self.word.start() if self.word else 0)
-        self._advance()
+        self.advance()
         # Some files label channels with numbers, but only the order matters.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
-            self._advance()
+            self.advance()
         self._expect(b"{")
         extrapolation: tuple[Extrapolation, Extrapolation] = ("constant", "constant")
         rows: list[_Key] | None = None
         while self.word is not None and self.word.group() != b"}":
             text = self.word.group()
             if text == b"extrapolate":
-                self._advance()
+                self.advance()
                 extrapolation = (self._mode(), self._mode())
             elif text == b"keys":
                 if rows is not None:
-                    raise self._fault(
+                    raise self.fault(
                         "F002.anim-keys-again: {where}: expected a single list of keys, found a "
                         "second one"
                     )
-                self._advance()
+                self.advance()
                 rows = self._keys()
             else:
-                raise self._fault(
+                raise self.fault(
                     "F002.anim-channel-item: {where}: expected extrapolate or keys, found {found}"
                 )
         self._expect(b"}")
@@ -219,9 +215,6 @@ class _Parser:
         self._expect(b"}")
         return rows
 
-    def _advance(self) -> None:
-        self.word = next(self.words, None)
-
     def _where(self) -> Phrase:
         """Return the phrase for the item that contains the current word."""
         if self.channel is None:
@@ -244,37 +237,34 @@ class _Parser:
 
     def _values(self, own: dict[str, object]) -> dict[str, object]:
         """Return the values that all messages about the current word have in common."""
-        found = quoted(None if self.word is None else self.word.group())
         begins = optional(" ({})", self._begins())
-        return {"where": self._where(), "found": found, "begins": begins, **own}
+        return {"where": self._where(), "found": quoted(self.text), "begins": begins, **own}
 
-    def _fault(self, key: str, **values: object) -> FormatError:
+    def fault(self, key: str, **values: object) -> FormatError:
         """Return the exception for an error at the current word that stops parsing."""
-        where = self.source.end if self.word is None else self.word.start()
-        return self.source.fault(key, where, **self._values(values))
+        return self.source.fault(key, self.place, **self._values(values))
 
     def _refuse(self, key: str, word: Word | None = None, **values: object) -> None:
         """Record an error at a word, by default the current one, and continue."""
-        word = self.word if word is None else word
-        where = self.source.end if word is None else word.start()
+        where = self.place if word is None else word.start()
         part: Part = "" if self.channel is None else "channels"
         places = None if self.channel is None else [self.channel]
         self.source.refuse(key, where, 1, part, places, **self._values(values))
 
     def _expect(self, text: bytes) -> None:
-        if self.word is None or self.word.group() != text:
+        if self.text != text:
             looks = self.source.looks_like() if text == b"animation" else None
-            raise self._fault(
+            raise self.fault(
                 'F002.anim-word: {where}: expected "{expected}", found {found}{looks}{begins}',
                 expected=text.decode(),
                 looks=optional(" ({})", looks),
             )
-        self._advance()
+        self.advance()
 
     def _number(self, item: str, of_key: bool = False) -> float:
         """Read a number; NaN if it belongs to a key and is invalid."""
         if self.word is None:
-            raise self._fault(
+            raise self.fault(
                 "F002.anim-end: {item}: expected a number, found the end of the file{begins}",
                 item=self._item(item),
             )
@@ -282,7 +272,7 @@ class _Parser:
         value = to_number(word)
         if value is None:
             if not of_key or word in (b"{", b"}"):
-                raise self._fault(number_key(word), item=self._item(item))
+                raise self.fault(number_key(word), item=self._item(item))
             self._refuse(number_key(word), item=self._item(item))
             value = math.nan
         elif item == "value" and abs(value) > FARTHEST:
@@ -290,7 +280,7 @@ class _Parser:
                 wording.BEYOND, item=self._item(item), most=rounded(FARTHEST, 2), found=value
             )
             value = math.nan
-        self._advance()
+        self.advance()
         return value
 
     def _item(self, item: str) -> Phrase:
@@ -301,7 +291,7 @@ class _Parser:
         left = len(self.source.data) - (word.end() if word else 0)
         if value != int(value) or value < 0 or value * _WORDS_PER_KEY > left:
             self.word = word
-            raise self._fault(
+            raise self.fault(
                 "F002.anim-count: {item}: expected a count that fits the file, found {found} with "
                 "{left} bytes left",
                 item=self._item(item),
@@ -310,18 +300,18 @@ class _Parser:
         return int(value)
 
     def _mode(self) -> Extrapolation:
-        mode = _MODES.get(self.word.group()) if self.word else None
+        mode = _MODES.get(self.keyword)
         if mode is None:
-            raise self._fault(
+            raise self.fault(
                 "F002.anim-mode: {where}: extrapolate: expected one of {modes}, found "
                 "{found}{begins}",
                 modes=listed(EXTRAPOLATIONS),
             )
-        self._advance()
+        self.advance()
         return mode
 
     def _tangent(self) -> Tangent:
-        text = self.word.group() if self.word else b""
+        text = self.keyword
         tangent = _RULES.get(text, to_number(text))
         if tangent is None:
             message = (
@@ -329,10 +319,10 @@ class _Parser:
                 "{found}{begins}"
             )
             if self.word is None or text in (b"{", b"}"):
-                raise self._fault(message, rules=listed(TANGENT_RULES))
+                raise self.fault(message, rules=listed(TANGENT_RULES))
             self._refuse(message, rules=listed(TANGENT_RULES))
             tangent = "smooth"
-        self._advance()
+        self.advance()
         return tangent
 
 

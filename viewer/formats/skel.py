@@ -15,7 +15,6 @@ three rotation DOFs; the first also has three translations, the root's translati
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
@@ -26,8 +25,9 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Part, Phrase, wording
 from viewer.errors import UnsupportedFormatError
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import LARGEST, is_infinite, is_number, to_number
-from viewer.phrases import brief, counted, optional, quoted, rounded
+from viewer.formats._text.joint_parser import JointParser, Word, called_joint
+from viewer.formats._text.numbers import LARGEST, is_infinite, is_number
+from viewer.phrases import counted, optional, quoted, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
@@ -40,7 +40,7 @@ KEYWORDS = frozenset((*_VECTORS, *_LIMITS, _JOINT))
 _UNLIMITED = 100_000.0
 """CSE169's value for "no limit", which some files contain."""
 _DEEPEST = 32  # maximum number of tabs at the beginning of a line
-_Word = re.Match[bytes]
+_AT_END = "F002.width-end: {item}: expected {expected}, found {found} before the end of the file"
 
 
 @dataclass(slots=True)
@@ -57,10 +57,15 @@ class _Joint:
     # Limits and their offsets in the file, by axis.
     limits: dict[int, tuple[list[float], int]] = field(default_factory=dict)
 
+    @property
+    def called(self) -> Phrase:
+        """The phrase for the joint in messages."""
+        return called_joint(self.name)
+
 
 def read(source: Source) -> Figure:
     """Read a skeleton; DOFs are clamped to their limits."""
-    joints = _Parser(source).joints()
+    joints = _Parser(source, KEYWORDS).joints()
     if not joints:
         looks = source.looks_like()
         where = None if looks else source.end
@@ -74,160 +79,79 @@ def read(source: Source) -> Figure:
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
 
 
-class _Parser:
-    """Parser without recursion, because invalid files may be nested arbitrarily deeply."""
-
-    def __init__(self, source: Source) -> None:
-        self.source = source
-        self.words = source.words()
-        self.word: _Word | None = None
-        self.found: list[_Joint] = []
-        self.open: list[int] = []
-        self.extra_braces = 0
-
+class _Parser(JointParser[_Joint]):
     def joints(self) -> list[_Joint]:
         """Return all joints in file order."""
-        self._advance()
         while self.word is not None:
             text = self.word.group()
             if text == _JOINT:
-                self._open_joint()
+                self._open_joint(self.word.start())
             elif text == b"}":
-                self._close()
+                self.leave()
             elif self.open and text in _VECTORS:
-                values = self._numbers(3)
+                values = self._numbers(self.word, 3)
                 if values:
                     setattr(self.found[self.open[-1]], text.decode(), values)
             elif self.open and text in _LIMITS:
-                self._limit(_LIMITS[text])
+                start = self.word.start()
+                values = self._numbers(self.word, 2)
+                if values:
+                    self.found[self.open[-1]].limits[_LIMITS[text]] = values, start
             else:
-                self._skip_unknown()
-        self._finish()
+                self._skip_unknown(self.word)
+        if len(self.open) > 1:
+            raise self.still_open()
+        if self.open:
+            self.source.warn(wording.CLOSING)
+        if self.extra_braces:
+            self.source.warn(wording.EXTRA_BRACES, n=self.extra_braces)
         return self.found
 
-    def _advance(self) -> None:
-        self.word = next(self.words, None)
-
-    def _open_joint(self) -> None:
-        assert self.word is not None  # checked by the caller
-        start = self.word.start()
+    def _open_joint(self, start: int) -> None:
         name: list[str] = []
-        self._advance()
-        while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
+        self.advance()
+        while self.word is not None and self.keyword not in self.ends:
             name.append(self.word.group().decode("utf-8", "surrogateescape"))
-            self._advance()
-        joint = _Joint(" ".join(name), self.open[-1] if self.open else -1, start)
-        if self.word is None or self.word.group() != b"{":
-            where = start if self.word is None else self.word.start()
-            raise self.source.fault(
-                wording.OPENING, where, item=_called(joint), found=quoted(_text(self.word))
-            )
-        self.open.append(len(self.found))
-        self.found.append(joint)
-        self._advance()
+            self.advance()
+        self.enter(_Joint(" ".join(name), self.open[-1] if self.open else -1, start))
 
-    def _close(self) -> None:
-        if self.open:
-            self.open.pop()
-        else:
-            self.extra_braces += 1
-        self._advance()
-
-    def _limit(self, axis: int) -> None:
-        assert self.word is not None  # checked by the caller
-        start = self.word.start()
-        values = self._numbers(2)
-        if values:
-            self.found[self.open[-1]].limits[axis] = values, start
-
-    def _numbers(self, count: int) -> list[float]:
+    def _numbers(self, keyword: Word, count: int) -> list[float]:
         """Read the numbers after the current keyword; none if the item has an error."""
-        assert self.word is not None  # checked by the caller
-        keyword = self.word
         values: list[float] = []
-        self._advance()
-        while len(values) < count:
-            value = None if self.word is None else to_number(self.word.group())
-            if value is None:
-                self._refuse(keyword, count, len(values))
-                return []
+        self.advance()
+        while len(values) < count and (value := self.number) is not None:
             values.append(value)
-            self._advance()
-        if self.word is not None and is_number(self.word.group()):
-            self._refuse(keyword, count, count)
-            return []
-        return values
-
-    def _refuse(self, keyword: _Word, expected: int, found: int) -> None:
-        """Record an error in an item with a wrong number of values, and skip the item."""
-        from viewer.formats._text.words import number_key
-
-        refuse, word, places = self.source.refuse, _text(self.word), [self.open[-1]]
-        part: Part = "joints" if keyword.group() == b"offset" else "items"
-        owner = _called(self.found[self.open[-1]])
-        item = Phrase("{item} of {owner}", item=keyword.group().decode(), owner=owner)
-        start, here = keyword.start(), self.word.start() if self.word else 0
-        if found == expected:
-            refuse(
-                wording.MORE,
-                here,
-                1,
-                part,
-                places,
-                item=item,
-                expected=counted(expected, "number"),
-                found=quoted(word),
-            )
-        elif word is None:
-            refuse(
-                "F002.width-end: {item}: expected {expected}, found {found} before the end of the "
-                "file",
-                start,
-                1,
-                part,
-                places,
-                item=item,
-                expected=counted(expected, "number"),
-                found=found,
-            )
-        elif word in (b"{", b"}", *KEYWORDS):
-            refuse(
-                wording.WIDTH,
-                start,
-                1,
-                part,
-                places,
-                item=item,
-                expected=counted(expected, "number"),
-                found=found,
-            )
-        else:
-            refuse(number_key(word), here, 1, part, places, item=item, found=quoted(word))
+            self.advance()
+        if len(values) == count and self.number is None:
+            return values
+        found = self.word if self.word is not None and len(values) == count else len(values)
+        item = keyword.group().decode()
+        part: Part = "joints" if item == "offset" else "items"
+        self.refuse_numbers(keyword, item, count, found, part, [self.open[-1]], _AT_END)
         self._skip_item()
+        return []
 
     def _skip_item(self, on_line: bool = True) -> None:
         """Skip the remainder of an item: the rest of its line, and numbers on the lines below."""
-        while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
+        while self.word is not None and self.keyword not in self.ends:
             last = self.word
             if not (on_line or is_number(last.group()) or is_infinite(last.group())):
                 return
-            self._advance()
+            self.advance()
             on_line = on_line and self._is_beside(last)
 
-    def _is_beside(self, last: _Word) -> bool:
+    def _is_beside(self, last: Word) -> bool:
         """Return whether the current word is on the same line as the previous one."""
         if self.word is None:
             return False
         between = self.source.data[last.end() : self.word.start()]
         return b"\n" not in between and b"\r" not in between
 
-    def _skip_unknown(self) -> None:
+    def _skip_unknown(self, keyword: Word) -> None:
         """Skip an unknown word with its line and numbers, or with its whole balanced block."""
-        assert self.word is not None  # checked by the caller
-        keyword = self.word
         self.source.warn(wording.UNKNOWN, keyword.start(), found=quoted(keyword.group()))
         if keyword.group() != b"{":
-            self._advance()
+            self.advance()
             # One warning for the whole line: "colour red" is a single unknown item.
             self._skip_item(self._is_beside(keyword))
         if not self._finds_block():
@@ -235,7 +159,7 @@ class _Parser:
         depth = 0
         while self.word is not None:
             depth += {b"{": 1, b"}": -1}.get(self.word.group(), 0)
-            self._advance()
+            self.advance()
             if depth == 0:
                 return
         raise self.source.fault(wording.OPEN, keyword.start(), word=quoted(keyword.group()))
@@ -249,31 +173,8 @@ class _Parser:
         following = self.source.next_word(self.word.end())
         if following is None or following.group() != b"{":
             return False
-        self._advance()
+        self.advance()
         return True
-
-    def _finish(self) -> None:
-        if len(self.open) > 1:
-            joint = self.found[self.open[-1]]
-            raise self.source.fault(
-                wording.JOINT_OPEN,
-                self.source.end,
-                found=quoted(None),
-                joint=_called(joint),
-                line=self.source.line(joint.start),
-            )
-        if self.open:
-            self.source.warn(wording.CLOSING)
-        if self.extra_braces:
-            self.source.warn(wording.EXTRA_BRACES, n=self.extra_braces)
-
-
-def _text(word: _Word | None) -> bytes | None:
-    return None if word is None else word.group()
-
-
-def _called(joint: _Joint) -> Phrase:
-    return Phrase("joint {name}", name=brief(joint.name)) if joint.name else Phrase("unnamed joint")
 
 
 def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
@@ -324,7 +225,7 @@ def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
             axis=DOF_KINDS[3 + axis],
             low=low,
             high=high,
-            joint=_called(joint),
+            joint=joint.called,
         )
         limits[wrong] = -np.inf, np.inf
 

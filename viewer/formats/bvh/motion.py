@@ -22,7 +22,7 @@ from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats._text.numbers import is_infinite, parse_numbers, to_number
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.formats._translation_limit import FARTHEST, is_beyond
-from viewer.formats.bvh.hierarchy import BvhJoint, called, read_hierarchy
+from viewer.formats.bvh.hierarchy import BvhJoint, read_hierarchy
 from viewer.phrases import brief, counted, optional, quoted, rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.geometry.quaternion import align_signs
@@ -103,11 +103,10 @@ def read_motion(source: Source, head: Head) -> tuple[Floats, Bools | None]:
 
 def read_head(source: Source) -> Head:
     """Read everything that precedes the frames."""
-    hierarchy = read_hierarchy(source)
-    table = table_of(source, hierarchy.joints)
-    starts = [joint.start for joint in hierarchy.joints if not joint.is_end]
+    joints, start = read_hierarchy(source)
+    table = table_of(source, joints)
+    starts = [joint.start for joint in joints if not joint.is_end]
     source.remember("joints", starts.__getitem__)
-    start = hierarchy.motion
     if start < 0:
         return Head(table, start)
     declared: int | None = None
@@ -340,7 +339,7 @@ def table_of(source: Source, joints: list[BvhJoint]) -> Table:
                 joint.start,
                 part="joints",
                 places=[at],
-                joint=called(joint),
+                joint=joint.called,
             )
         codes = joint.channels or []
         if joint.is_end:
@@ -351,7 +350,7 @@ def table_of(source: Source, joints: list[BvhJoint]) -> Table:
                     joint.start,
                     part="joints",
                     places=[place[joint.parent]],
-                    joint=called(joint),
+                    joint=joint.called,
                 )
         else:
             place[index] = len(kept)
