@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.diagnostics import Phrase, wording
+from viewer.diagnostics import wording
 from viewer.formats._placeholders import neutral_positions
 from viewer.formats._polygons import (
     filled_normals,
@@ -36,7 +36,7 @@ from viewer.formats._references import load_image
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.formats.ply.elements import CORNERS, Header, Table, read_header, read_tables
-from viewer.phrases import brief, counted, listed, printable
+from viewer.phrases import counted, listed, printable
 from viewer.rig.arrays import Floats, Ints, freeze
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
@@ -154,7 +154,7 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
                 int((~(np.abs(values) <= LARGEST)).sum()),
                 "positions" if is_place else "",
                 odd if is_place else None,
-                item=Phrase("{element} {row}", element=brief(table.element.name), row=int(odd[0])),
+                item=table.row(int(odd[0])),
                 names=" ".join(names),
                 found=float(row[~(np.abs(row) <= LARGEST)][0]),
             )
@@ -256,7 +256,7 @@ def _wedges(source: Source, faces: Table, counts: _Indices) -> Floats | None:
             source.refuse(
                 wording.PLY_FINITE,
                 count=len(odd),
-                item=Phrase("{element} {row}", element=brief("face"), row=face),
+                item=faces.row(face),
                 names="texcoord",
                 found=float(uvs[odd[0]].max()),
             )

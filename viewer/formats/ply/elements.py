@@ -222,6 +222,10 @@ class Table:
         """Return the offset of a row in the file; None in a binary file, which has no lines."""
         return None if self.offset_of is None else self.offset_of(row)
 
+    def row(self, row: int) -> Phrase:
+        """Return the phrase for a row in messages."""
+        return Phrase("{element} {row}", element=brief(self.element.name), row=row)
+
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
     """Read all elements and return them by name."""
@@ -348,7 +352,9 @@ class _TextRows:
             rows = np.flatnonzero(np.isnan(values))
             is_place = table.element.name == "vertex" and prop.name in ("x", "y", "z")
             part: Part = "positions" if is_place and table.is_first else ""
-            self._refuse_words(table, cursor[rows], rows, part, rows if part else None)
+            if len(rows):
+                item = table.row(int(rows[0]))
+                self._refuse_words(cursor[rows], item, part, rows if part else None)
         return values, cursor + 1
 
     def take_lists(
@@ -369,31 +375,16 @@ class _TextRows:
             bad = np.flatnonzero(np.isnan(values))
             rows = np.repeat(np.arange(len(whole)), whole)[bad]
             is_face = table.element.name == "face" and prop.name in CORNERS and table.is_first
-            part: Part = "triangles" if is_face else ""
-            lost = triangles_of(whole, rows) if is_face else None
-            self._refuse_words(table, places[bad], rows, part, lost)
+            if len(bad):
+                lost = triangles_of(whole, rows) if is_face else None
+                part: Part = "triangles" if is_face else ""
+                self._refuse_words(places[bad], table.row(int(rows[0])), part, lost)
         return whole, values, cursor + whole
 
     def _refuse_words(
-        self,
-        table: Table,
-        words: _Places,
-        rows: _Places,
-        part: Part,
-        places: _Indices | None,
+        self, words: _Places, item: Phrase, part: Part = "", places: _Indices | None = None
     ) -> None:
-        """Refuse words that are not numbers, each in a row of a table."""
-        if len(words):
-            item = Phrase("{element} {row}", element=brief(table.element.name), row=int(rows[0]))
-            self._refuse_first(words, item, part, places)
-
-    def _refuse_first(
-        self,
-        words: _Places,
-        item: Phrase,
-        part: Part = "",
-        places: _Indices | None = None,
-    ) -> None:
+        """Refuse words that are not numbers; the first is in ``item``."""
         first = int(words[0])
         word = self._word(first)
         self.source.refuse(
@@ -408,8 +399,7 @@ class _TextRows:
 
     def _no_count(self, table: Table, row: int, word: int) -> FormatError:
         """Return the error for a list without a valid count."""
-        item = Phrase("{element} {row}", element=brief(table.element.name), row=row)
-        found = float(self.values[word])
+        item, found = table.row(row), float(self.values[word])
         if np.isnan(found):
             text = self._word(word)
             return self.source.fault(
@@ -433,7 +423,7 @@ class _TextRows:
             first = self.firsts[self.line]
             words = first + np.flatnonzero(np.isnan(self.values[first:]))
             if len(words):
-                self._refuse_first(words, Phrase("after the last element"))
+                self._refuse_words(words, Phrase("after the last element"))
         del self._lines
         self.source.release()
 
@@ -562,8 +552,7 @@ class _BinaryRows:
         wrong = np.flatnonzero(whole < 0)
         if len(wrong):
             row = int(wrong[0])
-            item = Phrase("{element} {row}", element=brief(table.element.name), row=row)
-            raise self.source.fault(wording.PLY_LIST, item=item, found=int(whole[row]))
+            raise self.source.fault(wording.PLY_LIST, item=table.row(row), found=int(whole[row]))
         size = int(prop.kind[1])
         values, _ = self._numbers(_list_places(cursor, whole, size), prop.kind)
         return whole, values, cursor + whole * size
