@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.autorig.rigged import Rigged
 from viewer.diagnostics import Diagnostic, wording
@@ -17,6 +15,7 @@ from viewer.export._losses.pose_errors import PoseLosses
 from viewer.export.rig import course_pose, course_skeleton
 from viewer.formats import Source, all_or_none, keeping_written
 from viewer.phrases import counted
+from viewer.rig.arrays import Arrays
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import Pose
@@ -108,7 +107,7 @@ def without_correctives(rigged: Rigged) -> Figure:
     return replace(figure, mesh=plain, correctives=None)
 
 
-def _arrays(rigged: Rigged) -> dict[str, NDArray[Any]]:
+def _arrays(rigged: Rigged) -> Arrays:
     """Return the data about the rig transfer that accompanies the figure."""
     pose = rigged.pose
     found = rigged.alignment

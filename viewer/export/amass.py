@@ -13,10 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, note
 from viewer.export._exporter import Selection
@@ -36,11 +34,12 @@ from viewer.export._options import ExportOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.phrases import counted
+from viewer.rig.arrays import Arrays
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
-Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
+Layout = Callable[[FamilyFrames, slice, float, str], Arrays]
 """Returns the arrays of a range of rows, given the frame rate and the up axis."""
 FEWEST = 16
 """Minimum number of shape coefficients, as readers of AMASS require."""
@@ -123,10 +122,10 @@ def write_layout(
     ]
 
 
-def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
+def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> Arrays:
     shape = padded(body.shape, FEWEST)
     vectors = body.vectors[part]
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: Arrays = {
         "poses": vectors.reshape(len(vectors), -1),
         "trans": body.translations[part],
         "betas": shape[0] if len(shape) == 1 else shape[part],

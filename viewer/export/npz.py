@@ -21,10 +21,8 @@ For K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not vi
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, note
 from viewer.errors import RigError
@@ -36,7 +34,7 @@ from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
 from viewer.phrases import all_of, counted, optional
-from viewer.rig.arrays import Bools, Deferred, Floats
+from viewer.rig.arrays import Arrays, Bools, Deferred, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
@@ -176,7 +174,7 @@ def _export_points(
     up, points = options.up or options.world_up, animation.points
     if up != options.world_up:
         points = points @ np.round(rotation_vector_to_matrix(_turn(up))).T
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: Arrays = {
         "name": np.array(animation.name),
         "up": np.array(up),
         "frame_rate": np.array(animation.frame_rate),
@@ -215,9 +213,7 @@ def _check(unit: str, options: ExportOptions) -> None:
         raise RigError(f'quaternions: expected {known}, found "{options.quaternions}"')
 
 
-def _point_arrays(
-    layout: PointLayout, places: Floats, confidences: Floats
-) -> dict[str, NDArray[Any]]:
+def _point_arrays(layout: PointLayout, places: Floats, confidences: Floats) -> Arrays:
     return {
         "points": places,
         "confidences": confidences,

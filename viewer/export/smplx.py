@@ -16,10 +16,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, note
 from viewer.export._exporter import Selection
@@ -27,6 +25,7 @@ from viewer.export._family import FamilyFrames, member_of_figure, padded
 from viewer.export._options import ExportOptions
 from viewer.export.amass import FEWEST, write_layout
 from viewer.phrases import Remedy, counted
+from viewer.rig.arrays import Arrays
 from viewer.rig.bodies.smpl_family import FAMILY
 from viewer.rig.figure import Figure
 
@@ -76,15 +75,13 @@ def require(figure: Figure) -> None:
     member_of_figure(figure, "an SMPL-X motion", ("pelvis",))
 
 
-def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
+def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> Arrays:
     vectors = np.zeros((len(body.vectors[part]), len(_MEMBER.names), 3))
     for row, name in enumerate(body.member.names):
         if name in _MEMBER.names:  # SMPL's hand joints do not exist in SMPL-X
             vectors[:, _MEMBER.names.index(name)] = body.vectors[part, row]
     count = len(vectors)
-    arrays: dict[str, NDArray[Any]] = {
-        key: vectors[:, joints].reshape(count, -1) for key, joints in _PARTS.items()
-    }
+    arrays: Arrays = {key: vectors[:, joints].reshape(count, -1) for key, joints in _PARTS.items()}
     # Filled frames repeat or blend others and must not count.
     rows = body.shape if len(body.shape) == 1 else body.shape[body.present]
     shape = padded(rows.mean(axis=0, keepdims=True), FEWEST)[0]

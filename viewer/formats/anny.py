@@ -84,6 +84,8 @@ _MIDDLE = (
 )
 ACTIONS = tuple(sorted([*(a + s for a in _SIDED for s in ("Left", "Right")), *_MIDDLE.split()]))
 """Facial actions, named as in ARKit."""
+_Json = dict[str, Any]
+"""An object of a file; its values are checked where they are used."""
 _Target = tuple[str, tuple[str, ...]]
 """A target's file, and the variations of phenotypes to which it belongs."""
 
@@ -203,7 +205,7 @@ def _change_targets(package: _Package) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _listed(about: object, key: str) -> list[dict[str, Any]]:
+def _listed(about: object, key: str) -> list[_Json]:
     """Return the objects in a list of an object; an empty list if there is no such list."""
     found = about.get(key) if isinstance(about, dict) else None
     return [each for each in found if isinstance(each, dict)] if isinstance(found, list) else []
@@ -429,7 +431,7 @@ def _read_rig(package: _Package, name: str, base: _BaseMesh) -> Rig:
     return Rig(tuple(order), parents, regressor, vertices, joints, weights)
 
 
-def _parents_first(bones: dict[str, Any]) -> Iterator[str]:
+def _parents_first(bones: _Json) -> Iterator[str]:
     """Yield the joints below each root, each followed by its descendants."""
     children: dict[str, list[str]] = {}
     for name, bone in bones.items():
@@ -441,13 +443,11 @@ def _parents_first(bones: dict[str, Any]) -> Iterator[str]:
         waiting += children.get(name, [])[::-1]
 
 
-def _parent(bone: dict[str, Any]) -> str:
+def _parent(bone: _Json) -> str:
     return str(bone.get("parent") or "")
 
 
-def _regressor(
-    package: _Package, file: str, bones: list[dict[str, Any]], base: _BaseMesh
-) -> JointRegressor:
+def _regressor(package: _Package, file: str, bones: list[_Json], base: _BaseMesh) -> JointRegressor:
     """Return the joints as means of the vertices at their heads."""
     joints, vertices, weights = [], [], []
     for joint, bone in enumerate(bones):
@@ -582,7 +582,7 @@ class _Package:
         with self._archive.open(self._place + name) as stream:
             return stream.read(_MOST_BYTES + 1)
 
-    def read_json(self, name: str) -> dict[str, Any]:
+    def read_json(self, name: str) -> _Json:
         """Return the object in a JSON file; errors as of ``read``."""
         try:
             found = json.loads(self.read(name))

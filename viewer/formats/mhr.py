@@ -18,7 +18,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -274,7 +273,7 @@ def _correctives(
                 finite(lod, "corrective_blendshapes", row)
         return values
 
-    def blocks() -> Iterator[NDArray[Any]]:
+    def blocks() -> Iterator[NDArray[np.generic]]:
         for block in array.blocks(_ROWS):
             if not np.isfinite(block).all():
                 finite(lod, "corrective_blendshapes", block)

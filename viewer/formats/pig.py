@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +119,7 @@ class _Part:
 
     name: str
     """File name or key, for messages."""
-    values: NDArray[Any]
+    values: Floats
     """(N, columns). Numbers; for a sparse matrix, rows of (joint, vertex, weight)."""
     source: Source
     """The file, which records errors."""
@@ -279,7 +278,7 @@ def _is_entries(archive: Archive, name: str) -> bool:
     return shape[1:] == (3,) and shape not in (sides, sides[::-1])
 
 
-def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
+def _entries(archive: Archive, name: str) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
     """Return joint, vertex and weight of each entry of a J x V or V x J matrix."""
     n_joints, n_vertices = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
     is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
+Arrays = dict[str, NDArray[np.generic]]
+"""Arrays of any types by name, to be written to an archive."""
 
 
 class Deferred:

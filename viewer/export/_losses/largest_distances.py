@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +137,7 @@ def followed_vertices(first: Side, second: Side, rows: Rows) -> Rows:
 
 
 def heights(
-    first: Side, second: Side, rows: Rows, others: Rows, followed: NDArray[Any] | None = None
+    first: Side, second: Side, rows: Rows, others: Rows, followed: NDArray[np.generic] | None = None
 ) -> Floats:
     """Return the largest distance of joints, and of some vertices, in each pose: (1 or 2, F)."""
     bodies = None

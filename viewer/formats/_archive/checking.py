@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +33,7 @@ def archive_of(source: Source) -> Archive:
 def finite(
     archive: Archive,
     key: str,
-    values: NDArray[Any],
+    values: NDArray[np.generic],
     part: Part = "",
     places: NDArray[np.integer] | None = None,
 ) -> Floats:
@@ -82,7 +80,7 @@ def last_axis_first(archive: Archive, key: str, array: Deferred) -> Deferred:
     return Deferred((array.shape[2], *array.shape[:2]), np.float64, load)
 
 
-def finite_or_nan(archive: Archive, key: str, values: NDArray[Any]) -> Floats:
+def finite_or_nan(archive: Archive, key: str, values: NDArray[np.generic]) -> Floats:
     """Return numbers of frames as float64, NaN (later a gap) for those that ``finite`` refuses."""
     numbers, bad = _invalid(values)
     if bad is None:
@@ -109,11 +107,11 @@ def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
     return np.where(far, np.nan, found)
 
 
-def _invalid(values: NDArray[Any]) -> tuple[Floats, Bools | None]:
+def _invalid(values: NDArray[np.generic]) -> tuple[Floats, Bools | None]:
     """Return numbers as float64, and a mask of those not finite or beyond single precision."""
     # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
-    numbers = values if is_ready else values.astype(np.float64)
+    numbers = values.astype(np.float64, copy=not is_ready)
     # Two reductions need no temporary array, and both propagate NaN.
     low, high = numbers.min(initial=0.0), numbers.max(initial=0.0)
     if low >= -LARGEST and high <= LARGEST:
@@ -122,11 +120,11 @@ def _invalid(values: NDArray[Any]) -> tuple[Floats, Bools | None]:
         return numbers, np.asarray(~(np.abs(numbers) <= LARGEST))
 
 
-def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
+def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, object]]:
     """Return the message about the first invalid number, without its code, and its values."""
     first = np.argwhere(bad)[0].tolist()
     found = float(numbers[tuple(first)])
-    values: dict[str, Any] = {
+    values: dict[str, object] = {
         "found": found,
         "at": optional(" at {}", Phrase("{indices}", indices=listed(first)) if first else ""),
     }
@@ -135,7 +133,7 @@ def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
     return wording.NOT_FINITE, values
 
 
-def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int) -> Ints:
+def corners_of(archive: Archive, key: str, values: NDArray[np.number], n_vertices: int) -> Ints:
     """Return vertex indices of triangles (T, 3) as int32; invalid ones are refused or replaced."""
     if are_indices(values, n_vertices):
         return values.astype(np.int32)
@@ -152,6 +150,6 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
     return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
 
 
-def are_indices(values: NDArray[Any], end: int) -> bool:
+def are_indices(values: NDArray[np.number], end: int) -> bool:
     """Return whether all numbers are integers from 0 to ``end - 1``."""
     return bool(((values >= 0) & (values < end) & (values == np.floor(values))).all())

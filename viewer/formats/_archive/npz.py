@@ -20,7 +20,7 @@ import struct
 import zipfile
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 
 @dataclass(frozen=True, slots=True)
 class _Header:
-    dtype: np.dtype[Any]
+    dtype: np.dtype[np.generic]
     shape: tuple[int, ...]
     is_fortran: bool
     n_items: int
@@ -57,8 +57,8 @@ class _Header:
 
     def deferred(
         self,
-        load: Callable[[], NDArray[Any]],
-        blocks: Callable[[int], Iterator[NDArray[Any]]] | None = None,
+        load: Callable[[], NDArray[np.generic]],
+        blocks: Callable[[int], Iterator[NDArray[np.generic]]] | None = None,
     ) -> Deferred:
         has_rows = bool(self.shape) and not self.is_fortran and self.dtype.isnative
         return Deferred(
@@ -214,14 +214,16 @@ def _opened(storage: StoredFile, member: zipfile.ZipInfo) -> Iterator[IO[bytes]]
         raise _damaged(storage, _key(member), problem) from None
 
 
-def _load_member(storage: StoredFile, member: zipfile.ZipInfo, header: _Header) -> NDArray[Any]:
+def _load_member(
+    storage: StoredFile, member: zipfile.ZipInfo, header: _Header
+) -> NDArray[np.generic]:
     with _opened(storage, member) as stream:
         return _load(storage, _key(member), header, stream)
 
 
 def _member_blocks(
     storage: StoredFile, member: zipfile.ZipInfo, header: _Header, count: int
-) -> Iterator[NDArray[Any]]:
+) -> Iterator[NDArray[np.generic]]:
     """Yield blocks of rows, all in the same memory."""
     row = math.prod(header.shape[1:])
     with _opened(storage, member) as stream:
@@ -234,7 +236,7 @@ def _member_blocks(
             yield part.reshape(n_rows, *header.shape[1:])
 
 
-def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[Any]:
+def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[np.generic]:
     try:
         with storage.open() as stream:
             return _load(storage, key, header, stream)
@@ -253,7 +255,7 @@ def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
     return storage.fault(key, wording.NPY_DAMAGED, reason=printable(problem, 100))
 
 
-def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> NDArray[Any]:
+def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> NDArray[np.generic]:
     stream.read(header.offset)
     size = header.n_items * header.dtype.itemsize
     try:
@@ -267,7 +269,7 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
         raise storage.fault(key, problem.problem) from None
 
 
-def _fill(storage: StoredFile, key: str, flat: NDArray[Any], stream: IO[bytes]) -> None:
+def _fill(storage: StoredFile, key: str, flat: NDArray[np.generic], stream: IO[bytes]) -> None:
     """Read the values of an array in chunks: as a whole they would need twice the memory."""
     size = flat.nbytes
     room = flat.view(np.uint8) if size else np.empty(0, np.uint8)

@@ -116,7 +116,7 @@ def _open_json(source: Source) -> Archive:
 
     text = source.data.decode("utf-8", "replace")
 
-    def fault(key: str, offset: int | None, **values: Any) -> FormatError:
+    def fault(key: str, offset: int | None, **values: object) -> FormatError:
         place = None if offset is None else len(text[:offset].encode())
         return source.fault(key, place, **values)
 

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,10 +50,10 @@ class Sparse:
     shape: tuple[int, int]
     """(2,). Rows and columns as declared by the file, to be checked before a dense matrix is
     created."""
-    data: NDArray[Any]
-    indices: NDArray[Any]
+    data: NDArray[np.generic]
+    indices: NDArray[np.integer]
     """(N,). Stored values, and the row (csc, coo) or column (csr) of each."""
-    indptr: NDArray[Any]
+    indptr: NDArray[np.integer]
     """(columns + 1,), (rows + 1,) or (N,). Start of each column (csc) or row (csr) in ``data``; the
     column of each value (coo)."""
     layout: str
@@ -101,7 +101,7 @@ class Sparse:
             )
         self._check_indices(self.indices, across)
 
-    def _check_indices(self, indices: NDArray[Any], across: int) -> None:
+    def _check_indices(self, indices: NDArray[np.integer], across: int) -> None:
         """Check the rows or columns of all stored values."""
         count = len(self.data)
         if len(indices) != count:
@@ -121,7 +121,7 @@ class Sparse:
                 high=high,
             )
 
-    def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[Any]]:
+    def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.generic]]:
         """Return row, column and value (N,) of every entry in file order; repeated ones add up."""
         starts = self.indptr.astype(np.intp)
         if self.layout == "coo":
@@ -136,7 +136,8 @@ class Sparse:
 _Plain: TypeAlias = str | bytes | int | float | bool | None
 """Values that need no conversion; numpy's scalars are returned as these."""
 Value: TypeAlias = (
-    _Plain | Deferred | Sparse | Opaque | list[Any] | tuple[Any, ...] | dict[str | bytes | int, Any]
+    "_Plain | Deferred | Sparse | Opaque | list[Value] | tuple[Value, ...]"
+    " | dict[str | bytes | int, Value]"
 )
 """Any value of an archive; containers contain such values in turn."""
 Axes: TypeAlias = Sequence[int | str | None]
@@ -275,18 +276,18 @@ class Archive:
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,
-        **values: Any,
+        **values: object,
     ) -> None:
         """Record an error in the value called ``item``; see ``Source.refuse``."""
         offset, item = self._offset(item), printable(self.label + item, 60)
         self.source.refuse(key, offset, count, part, places, item=item, **values)
 
-    def leave_gap(self, key: str, *, item: str, **values: Any) -> None:
+    def leave_gap(self, key: str, *, item: str, **values: object) -> None:
         """Record an error in frames of ``item``, which become gaps; only the first is reported."""
         if not self.source.frame_faults:
             self.source.frame_faults.append(self.fault(key, item=item, **values).diagnostic)
 
-    def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
+    def fault(self, key: str, *, item: str, **values: object) -> FormatError:
         """Return the exception for an error in the value called ``item``; see ``Source.fault``."""
         offset, item = self._offset(item), printable(self.label + item, 60)
         return self.source.fault(key, offset, item=item, **values)
@@ -300,7 +301,7 @@ class Archive:
         return None if place is None else len(text[:place].encode())
 
 
-def describe(value: Value) -> Phrase:
+def describe(value: object) -> Phrase:
     """Return a description of a value for messages, such as ``800 x 3 float32``."""
     if isinstance(value, Deferred):
         if value.dtype.kind not in "SU":
@@ -368,10 +369,11 @@ def _from_lists(value: Value) -> Deferred | None:
     """Return numbers or arrays in nested lists as an array; None if they are ragged or others."""
     try:
         items = _plain(value)
-        usual = [item for item in items if not _is_missing(item)] if isinstance(items, list) else []
-        if usual and len(usual) < len(items):
-            missing = np.full(np.shape(usual[0]), np.nan)
-            items = [missing if _is_missing(item) else item for item in items]
+        if isinstance(items, list):
+            usual = [item for item in items if not _is_missing(item)]
+            if usual and len(usual) < len(items):
+                missing = np.full(np.array(usual[0]).shape, np.nan)
+                items = [missing if _is_missing(item) else item for item in items]
         array = np.array(items)
     except (ValueError, TypeError, OverflowError):
         return None
@@ -380,7 +382,10 @@ def _from_lists(value: Value) -> Deferred | None:
     return Deferred(array.shape, array.dtype, lambda: array)
 
 
-def _plain(value: Value, is_item: bool = False) -> Any:
+_Numbers: TypeAlias = "list[_Numbers] | NDArray[np.generic] | float | None"
+
+
+def _plain(value: Value, is_item: bool = False) -> _Numbers:
     """Return nested lists of numbers and arrays; raise ValueError for other values."""
     if isinstance(value, list | tuple):
         return [_plain(item, not is_item) for item in value]
@@ -391,7 +396,7 @@ def _plain(value: Value, is_item: bool = False) -> Any:
     raise ValueError(value)
 
 
-def _is_missing(item: Any) -> bool:
+def _is_missing(item: object) -> bool:
     """Return whether an item of a list stands for a missing frame."""
     return item is None or (isinstance(item, list) and not item)
 
@@ -403,12 +408,12 @@ def _widened(array: Deferred) -> Deferred:
     return Deferred(array.shape, np.float64, lambda: _in_double(array.values()))
 
 
-def _in_double(values: NDArray[Any]) -> NDArray[Any]:
+def _in_double(values: NDArray[np.generic]) -> NDArray[np.generic]:
     """Return half floats as doubles, which is exact, and other values unchanged."""
     return values.astype(np.float64) if values.dtype == np.float16 else values
 
 
-def array_dtype(code: str) -> np.dtype[Any] | None:
+def array_dtype(code: str) -> np.dtype[np.generic] | None:
     """Return a numeric or string dtype by its numpy spelling; None for all others.
 
     >>> array_dtype(">f4"), array_dtype("|O"), array_dtype("S0")
@@ -435,7 +440,9 @@ def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
     return math.prod(shape)
 
 
-def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDArray[Any]:
+def shaped(
+    flat: NDArray[np.generic], shape: tuple[int, ...], is_fortran: bool
+) -> NDArray[np.generic]:
     """Return flat values in their shape, C order and native byte order; copied if needed.
 
     Raises ``InvalidValueError`` if an element of a string array is not a valid character.

@@ -299,7 +299,9 @@ class _Resolver:
             raise self.fail("expected {expected} indices in {name}, found {found}", **values)
         return Deferred(wanted, whole.dtype, partial(self.take, whole, chosen, wanted))
 
-    def take(self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]) -> NDArray[Any]:
+    def take(
+        self, whole: Deferred, chosen: Deferred, shape: tuple[int, ...]
+    ) -> NDArray[np.generic]:
         flat, indices = whole.values().reshape(-1), chosen.values()
         if indices.size and (int(indices.min()) < 0 or int(indices.max()) >= len(flat)):
             low, high = int(indices.min()), int(indices.max())

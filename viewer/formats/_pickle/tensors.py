@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ class Storage:
         """Size in bytes."""
         return self.count * _stored(self.code).itemsize
 
-    def flat(self, code: str) -> NDArray[Any]:
+    def flat(self, code: str) -> NDArray[np.generic]:
         """Return the elements as a type of this size, as stored."""
         if self._bytes is None:
             if self.load is None:
@@ -113,7 +113,7 @@ class Tensor:
         dtype = np.float32 if self.code == "bfloat16" else np.dtype(self.code)
         return Deferred(self.shape, dtype, partial(self._load, fail))
 
-    def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[Any]:
+    def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[np.generic]:
         try:
             flat = self.storage.flat(self.code)[self.offset :]
         except InvalidValueError as problem:
@@ -146,7 +146,7 @@ def storage_of(persistent: object) -> tuple[str, Storage] | None:
     return None
 
 
-def _stored(code: str) -> np.dtype[Any]:
+def _stored(code: str) -> np.dtype[np.generic]:
     return np.dtype("u2" if code == "bfloat16" else code)
 
 

@@ -11,7 +11,7 @@ import io
 from collections.abc import Callable
 from dataclasses import field
 from functools import partial
-from typing import Any, TypeGuard
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +110,7 @@ class Dtype:
     code: str
     order: str = "="
 
-    def dtype(self) -> np.dtype[Any] | None:
+    def dtype(self) -> np.dtype[np.generic] | None:
         """Return numpy's type, or None if its elements are neither numbers nor strings."""
         return array_dtype(self.order + self.code)
 
@@ -126,7 +126,7 @@ class Array:
 
     shape: tuple[int, ...] = ()
     """Shape of the stored values."""
-    dtype: np.dtype[Any] | None = None
+    dtype: np.dtype[np.generic] | None = None
     """Element type; None if the array is not evaluated, with the reason in ``what``."""
     payload: Span | None = None
     is_fortran: bool = False
@@ -164,7 +164,7 @@ class Array:
             shape = tuple(shape[axis] for axis in self.axes)
         return Deferred(shape, self.dtype.newbyteorder("="), partial(self._load, fail))
 
-    def values(self) -> NDArray[Any]:
+    def values(self) -> NDArray[np.generic]:
         """Return the values, as a view of the file if byte and memory order allow it."""
         if self.payload is None or self.dtype is None:
             raise InvalidValueError("expected an array of numbers, found {found}", found=self.what)
@@ -179,7 +179,7 @@ class Array:
         array = shaped(flat, self.shape, self.is_fortran)
         return array if self.axes is None else np.ascontiguousarray(array.transpose(self.axes))
 
-    def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[Any]:
+    def _load(self, fail: Callable[[Phrase], Exception]) -> NDArray[np.generic]:
         try:
             return self.values()
         except InvalidValueError as problem:

@@ -51,6 +51,7 @@ from viewer.formats.easymocap.cameras import find_cameras, find_images
 from viewer.formats.easymocap.files import (
     FrameFiles,
     FrameFolder,
+    Record,
     RecordError,
     find_frames,
     has_numbers,
@@ -230,7 +231,7 @@ class _Reading:
                 seen.add(person)
                 self._take_person(person, record, folder, frame, (path, place), part)
 
-    def _note_ids(self, path: str, record: dict[str, Any]) -> None:
+    def _note_ids(self, path: str, record: Record) -> None:
         """Add a note on the identity that is used if a record has none, or two different ones."""
         first, second = record.get("id"), record.get("personID")
         if first is None and second is None:
@@ -257,7 +258,7 @@ class _Reading:
     def _take_person(
         self,
         person: int,
-        record: dict[str, Any],
+        record: Record,
         folder: FrameFolder,
         frame: int,
         origin: tuple[str, int],
@@ -308,7 +309,7 @@ class _Reading:
                 path,
             )
 
-    def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
+    def _layout_of(self, record: Record, path: str) -> BodyLayout:
         """Return the layout of all bodies, extended by the first record with coefficients."""
         layout = self.body_layout
         if layout is None:
@@ -362,7 +363,7 @@ class _Reading:
         """Return the messages that require the whole recording."""
         found: list[Diagnostic] = []
         unseen = [person for person, has_seen in self._has_seen.items() if not has_seen]
-        values: dict[str, Any] = {"name": self.files.name}
+        values: dict[str, object] = {"name": self.files.name}
         if unseen:
             people = [*map(person_label, unseen)]
             found.append(
@@ -412,7 +413,7 @@ class _Reading:
         if self._n_faults <= _MOST_WARNINGS:
             self._found.append(remark_on("F007.record: {problem}", fault))
 
-    def note(self, key: str, path: str, **values: Any) -> None:
+    def note(self, key: str, path: str, **values: object) -> None:
         """Record a note about the files, without repeating it."""
         mark = key, *values.values()
         if mark not in self._said:
@@ -420,7 +421,7 @@ class _Reading:
             self._found.append(Diagnostic(key, Path(path), values=values))
 
 
-def _lacks(record: dict[str, Any], folder: FrameFolder) -> Phrase:
+def _lacks(record: Record, folder: FrameFolder) -> Phrase:
     wanted = ("poses",) * folder.has_bodies + (_POINTS,) * folder.has_points
     if not record:
         return Phrase("expected {expected}, found no keys", expected=one_of(wanted))
@@ -442,7 +443,7 @@ class _PointRows(Rows):
     buffer: array[float] = field(default_factory=lambda: array("d"))
     """x, y, z, confidence of all points, record after record."""
 
-    def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
+    def add(self, record: Record, frame: int, path: str, place: int) -> None:
         """Add one record."""
         before = len(self.buffer)
         try:
@@ -519,7 +520,7 @@ def _is_odd(points: Floats) -> Bools:
     return ~is_good & (confidence != 0.0)
 
 
-def _point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, _Parts]:
+def _point_layout(record: Record, title: str = "") -> tuple[PointLayout, _Parts]:
     """Return the layout of a record's keypoints, and its keys with their numbers of points."""
     parts = [(key, _count(record, key)) for key in (_POINTS, *_BESIDE) if key in record]
     counts = [count for _, count in parts]
@@ -546,7 +547,7 @@ def _one_hand(side: int) -> PointLayout:
     return PointLayout("hand", both.names[first:stop], limbs, both.sides[first:stop])
 
 
-def _count(record: dict[str, Any], key: str) -> int:
+def _count(record: Record, key: str) -> int:
     rows = record[key]
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
         raise RecordError(

@@ -11,7 +11,6 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from viewer.formats._text.numbers import LARGEST
 from viewer.formats._translation_limit import within_text
 from viewer.formats.easymocap.files import (
     FrameFiles,
+    Record,
     RecordError,
     has_numbers,
     limit_of,
@@ -87,7 +87,7 @@ _LAYOUTS = {
 }
 
 
-def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) -> BodyLayout:
+def body_layout(record: Record, usual: Mapping[str, int] | None = None) -> BodyLayout:
     """Return the layout of a valid record, found by the length of its ``poses``."""
     usual = usual or {}
     count = len(row_of(record, "poses"))
@@ -131,9 +131,7 @@ def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) 
     )
 
 
-def with_coefficients(
-    layout: BodyLayout, record: dict[str, Any], usual: Mapping[str, int]
-) -> BodyLayout:
+def with_coefficients(layout: BodyLayout, record: Record, usual: Mapping[str, int]) -> BodyLayout:
     """Return a layout extended by coefficients that occur in a record for the first time."""
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
@@ -226,7 +224,7 @@ class BodyRows(Rows):
     remarks: list[_Remark] = field(default_factory=list)
     """Remarks that ``values`` adds."""
     _lacking: dict[str, list[int]] = field(default_factory=dict)
-    _plan: list[tuple[str, int, Callable[[list[Any]], None]]] = field(default_factory=list)
+    _plan: list[tuple[str, int, Callable[[list[float]], None]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.widen(self.layout)
@@ -239,7 +237,7 @@ class BodyRows(Rows):
             self._lacking[key] = [*range(len(self.frames))]
         self._plan = [(key, count, buffer.fromlist) for (key, count), buffer in self._buffers()]
 
-    def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
+    def add(self, record: Record, frame: int, path: str, place: int) -> None:
         """Add one record, or raise ``RecordError`` if a value is missing or its length differs."""
         try:
             for key, count, put in self._plan:
@@ -256,7 +254,7 @@ class BodyRows(Rows):
             self._take_slowly(record)
         self.keep_origin(frame, path, place)
 
-    def _take_slowly(self, record: dict[str, Any]) -> None:
+    def _take_slowly(self, record: Record) -> None:
         """Add a record that may be invalid; the first error is raised with its exact location."""
         self._drop_unfinished()
         try:
@@ -272,7 +270,7 @@ class BodyRows(Rows):
             self._drop_unfinished()
             raise
 
-    def _lack(self, key: str, count: int, put: Callable[[list[Any]], None]) -> None:
+    def _lack(self, key: str, count: int, put: Callable[[list[float]], None]) -> None:
         """Add placeholders for coefficients that the person's other records have."""
         if key not in COEFFICIENTS:
             raise KeyError(key)
@@ -386,7 +384,7 @@ class BodyRows(Rows):
         )
 
 
-def _completed(key: str, values: list[Any], count: int) -> list[Any]:
+def _completed(key: str, values: list[object], count: int) -> list[object]:
     """Return coefficients with zeros for those that a record lacks; raise ValueError for others."""
     if key not in COEFFICIENTS or not 0 < len(values) < count:
         raise ValueError(key)

@@ -24,7 +24,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -63,14 +62,14 @@ class _Storage:
     lines: dict[str, int] = field(default_factory=dict)
     """Line of each key."""
 
-    def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
+    def fault(self, key: str, *, item: str, **values: object) -> FormatError:
         """Return an error at the line of an item or, if it is missing, of the cameras' names."""
         end = self.source.line(self.source.end)
         line = self.lines.get(item, self.lines.get("names", end))
         return _fault(self.source, key, line, item=printable(item, 40), **values)
 
 
-def _fault(source: Source, key: str, line: int, **values: Any) -> FormatError:
+def _fault(source: Source, key: str, line: int, **values: object) -> FormatError:
     return FormatError(Diagnostic(key, source.path, line, values=values))
 
 
@@ -339,13 +338,13 @@ def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> 
         item = printable(matrix.key, 60)
         raise _fault(source, number_key(word), matrix.lines[at], item=item, found=quoted(word))
     if matrix.is_open or matrix.rows * matrix.columns != len(numbers):
-        sizes: dict[str, Any] = {"item": matrix.key, "shape": axes((matrix.rows, matrix.columns))}
         raise _fault(
             source,
             "F002.camera-count: {item}: expected {shape} numbers, found {found}",
             matrix.line,
             found=len(numbers),
-            **sizes,
+            item=matrix.key,
+            shape=axes((matrix.rows, matrix.columns)),
         )
     array = np.array(numbers, dtype=np.float64).reshape(matrix.rows, matrix.columns)
     values[matrix.key] = array

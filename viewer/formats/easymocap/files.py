@@ -7,7 +7,7 @@ import os
 import re
 from array import array
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -242,7 +242,8 @@ def _put(source: Source, folder: FrameFolder, frames: Iterable[tuple[int, str]])
         )
 
 
-_Record = dict[str, Any]
+Record = dict[str, Any]
+"""A person in a frame file, as the file has it; the values are checked when they are taken."""
 _TRANSLATION = "Th"
 _WRAPPER = "annots"  # key of the people in files with more content
 _OF_PERSON = {"poses", "keypoints3d"}
@@ -266,11 +267,11 @@ class RecordError(InvalidValueError):
 _decode = json.JSONDecoder(object_pairs_hook=unique).decode
 
 
-def load_people(path: str, max_size: int) -> list[Any]:
+def load_people(path: str, max_size: int) -> list[Record]:
     """Return the people in a frame file, unchecked; NaN and infinities are accepted."""
     text = _text(path, max_size)
 
-    def fault(key: str, place: int | None, **values: Any) -> FormatError:
+    def fault(key: str, place: int | None, **values: object) -> FormatError:
         return _fault(key, path, _line(text, place), **values)
 
     content = decoded(text, fault, _decode)
@@ -289,7 +290,7 @@ def load_people(path: str, max_size: int) -> list[Any]:
     return content
 
 
-def _fault(key: str, path: str, line: int | None, **values: Any) -> FormatError:
+def _fault(key: str, path: str, line: int | None, **values: object) -> FormatError:
     return FormatError(Diagnostic(key, Path(path), line, values=values))
 
 
@@ -345,7 +346,7 @@ def _read(path: str, max_size: int) -> bytes:
         os.close(handle)
 
 
-def person_of(record: Any, place: int) -> int | str:
+def person_of(record: object, place: int) -> int | str:
     """Return a record's ``id`` or ``personID``, a name or a number, or its index in the list."""
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
@@ -376,12 +377,12 @@ def person_of(record: Any, place: int) -> int | str:
     return person
 
 
-def has_numbers(record: _Record, key: str) -> bool:
+def has_numbers(record: Record, key: str) -> bool:
     """Return whether a record has a key whose value is not an empty list or matrix."""
     return key in record and record[key] not in ([], [[]])
 
 
-def row_of(record: _Record, key: str) -> list[Any]:
+def row_of(record: Record, key: str) -> list[object]:
     """Return a key's numbers, which may be stored as a one-row matrix."""
     values = record.get(key)
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
@@ -397,7 +398,7 @@ def limit_of(key: str) -> float:
     return FARTHEST if key == _TRANSLATION else LARGEST
 
 
-def width_of(record: _Record, key: str, count: int | None = None) -> int:
+def width_of(record: Record, key: str, count: int | None = None) -> int:
     """Return the number of a key's finite values, which other records must have, too."""
     count = len(row_of(record, key)) if count is None else count
     numbers = array("d")
@@ -409,7 +410,7 @@ def width_of(record: _Record, key: str, count: int | None = None) -> int:
     return count
 
 
-def take_row(record: _Record, key: str, count: int, put: Any) -> None:
+def take_row(record: Record, key: str, count: int, put: Callable[[list[float]], None]) -> None:
     """Pass a key's ``count`` numbers to ``put``, the ``fromlist`` of an ``array("d")``."""
     try:
         values = record[key]
@@ -437,6 +438,6 @@ def take_row(record: _Record, key: str, count: int, put: Any) -> None:
     )
 
 
-def _odd_one(values: list[Any]) -> Any:
+def _odd_one(values: list[object]) -> object:
     odd = (value for value in values if not isinstance(value, int | float))
     return next(odd, max((value for value in values if isinstance(value, int)), key=abs, default=0))

@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import wording
@@ -27,7 +26,7 @@ from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
 
-Frames = np.ndarray[Any, np.dtype[np.int64]]
+Frames = NDArray[np.int64]
 # Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
 _MOST_ROWS = 2_000_000
 _PERSON = re.compile(r"-?[0-9]{1,9}")

@@ -13,10 +13,8 @@ people in ``tid`` for a while, but ``tracked_time`` counts the frames since they
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.diagnostics import note, wording
 from viewer.errors import FormatError
@@ -117,7 +115,7 @@ def _people(frame: Archive) -> list[tuple[int, Floats | None]]:
     return found
 
 
-def _as_numbers(archive: Archive, key: str, value: Value, count: int) -> NDArray[Any]:
+def _as_numbers(archive: Archive, key: str, value: Value, count: int) -> Floats:
     values = value.values() if isinstance(value, Deferred) else np.zeros(0)
     if values.dtype.kind not in "iuf" or values.size != count:
         raise archive.fault(
@@ -131,12 +129,14 @@ def _whole_numbers(frame: Archive, key: str) -> list[int]:
     values = frame.get(key)
     if isinstance(values, Deferred):
         values = values.values().reshape(-1).tolist()
-    if not isinstance(values, list | tuple) or not all(isinstance(n, int) for n in values):
+    items = values if isinstance(values, list | tuple) else [None]
+    numbers = [int(item) for item in items if isinstance(item, int)]
+    if len(numbers) < len(items):
         raise frame.fault(
             "F002.video-whole: {item}: expected a list of integers, found a different value",
             item=key,
         )
-    return [int(number) for number in values]
+    return numbers
 
 
 def _track(archive: Archive, rows: list[tuple[int, Floats]]) -> Track:

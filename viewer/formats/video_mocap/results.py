@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, note, wording
@@ -49,7 +49,7 @@ class Options:
 class Track:
     """One person in one space."""
 
-    frames: np.ndarray[Any, np.dtype[np.int64]]
+    frames: NDArray[np.int64]
     """(N,) int. Frames of the video in which the person is present, without duplicates."""
     joint_names: tuple[str, ...] = ()
     """Joints that ``vectors`` rotate, the root first; empty if there are only points."""
@@ -66,7 +66,7 @@ class Track:
     layout: PointLayout | None = None
     points: Floats | None = None
     """PointLayout, (N, P, 4). Captured points, instead of a body."""
-    rig: tuple[Floats, Floats, Floats, Floats] | None = None
+    rig: tuple[Floats, ...] | None = None
     """tuple of (N, P), (N, S), (N, E), (N, 3), or None. Model parameters, identity, expression and
     position of the Momentum Human Rig."""
     places_root: bool = False
@@ -74,7 +74,7 @@ class Track:
     gender: str = ""
     """Gender of the body, as stated by the file; empty if it is unknown."""
 
-    def selected(self, chosen: np.ndarray[Any, np.dtype[Any]]) -> Track:
+    def selected(self, chosen: NDArray[np.generic]) -> Track:
         """Return some of the frames: indices of rows, or a mask (N,)."""
         count, shape = len(self.frames), self.shape
 
@@ -124,7 +124,7 @@ class Track:
 class Cameras:
     """The camera of a video in each frame: K (R X + T) in pixels, as for ``CameraView``."""
 
-    frames: np.ndarray[Any, np.dtype[np.int64]]
+    frames: NDArray[np.int64]
     """(N,) int. Frames of the video."""
     intrinsics: Floats
     """(N, 3, 3) or (1, 3, 3). K, pixels."""
@@ -380,7 +380,7 @@ class _Capture:
     def name(self) -> str:
         return self.source.path.stem
 
-    def timing(self, frames: np.ndarray[Any, np.dtype[np.int64]]) -> Timing:
+    def timing(self, frames: NDArray[np.int64]) -> Timing:
         rows = np.full(self.n_frames, -1, dtype=np.int32)
         rows[frames - self.first_frame] = np.arange(len(frames))
         return Timing(self.rate, rows, self.first_frame, holds=False)
