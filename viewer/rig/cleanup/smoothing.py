@@ -24,9 +24,12 @@ from viewer.rig.geometry.quaternion import (
     rotation_vector_to_quaternion,
 )
 
-# One Euro filter.
-_SETTLED = 1e-4  # weight below which the first value is negligible
-_LONGEST = 1000  # maximum number of frames added at each end
+# One Euro filter (Casiez, Roussel and Vogel 2012).
+
+# Weight below which the first value is negligible: after n frames it is (1 - a)^n. A motion of 1 m
+# is then off by 0.1 mm.
+_SETTLED = 1e-4
+_LONGEST = 1000  # maximum number of frames added at each end, for cutoffs close to 0
 
 # Savitzky-Golay filter.
 _SECONDS = 0.2  # default length of the window, seconds
@@ -190,6 +193,8 @@ def _opposite_positions(middle: Floats, positions: Floats) -> Floats:
 
 def _factor(cutoff: Floats | float, rate: float) -> Floats:
     """Return a = 1 / (1 + r / (2 pi f)) for a cutoff frequency f at r frames per second."""
+    # A first-order low-pass filter: x' follows x with the time constant T = 1 / (2 pi f). One step
+    # of 1 / r seconds by the implicit Euler method is x' += (x - x') / (1 + r T).
     turns = 2.0 * np.pi * np.asarray(cutoff, dtype=np.float64)
     return turns / (turns + rate)
 
@@ -255,6 +260,10 @@ def _relative_to(found: Floats, known: Floats) -> Callable[[Ints], Floats]:
 
 def _smoothing_matrix(window: int, order: int) -> Floats:
     """Return H = A (A^T A)^-1 A^T of polynomials: row i yields the fitted value at frame i."""
+    # The polynomial with coefficients c has the values A c at the frames of a window, where row i
+    # of A has the powers of place i. The least-squares fit of values y is c = (A^T A)^-1 A^T y
+    # (Savitzky and Golay 1964), so A c = H y. Powers up to a high order are nearly dependent, so H
+    # is made of an orthonormal basis Q of A's columns: H = Q Q^T.
     place = np.linspace(-1.0, 1.0, window)
     basis, _ = np.linalg.qr(np.vander(place, order + 1))
     return basis @ basis.T

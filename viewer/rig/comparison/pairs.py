@@ -125,13 +125,17 @@ def rotation_distance(first: Floats, second: Floats) -> Floats:
 
     It stays accurate for small angles, unlike the arc cosine of the trace.
     """
+    # |A - B|^2 = tr A^T A + tr B^T B - 2 tr A^T B = 6 - 2 (1 + 2 cos t) = 8 sin^2(t / 2), where t
+    # is the angle of A^T B, whose trace is 1 + 2 cos t.
     norm = np.linalg.norm(first - second, axis=(-2, -1))
     return 2.0 * np.arcsin(np.minimum(norm / np.sqrt(8.0), 1.0))
 
 
 def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     """Return each vertex's sum over joints of |w - w'| (V,): 2 if no joint has weight in both."""
-    # Unmatched joints of the second skin get indices that the first skin does not use.
+    # The difference of two rows is one row with the weights of both, the second ones negative: its
+    # L1 norm adds up what each joint has in one and not in the other. Unmatched joints of the
+    # second skin get indices that the first skin does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
     return row_norms(

@@ -213,12 +213,12 @@ def slowest_points(
     # A foot that rolls or turns about its ball or its heel does not slide, although the other end
     # moves.
     low, result = foot.lowest(up), np.zeros(len(foot.toe))
-    flat = np.eye(3) - np.outer(up, up)
+    across = np.eye(3) - np.outer(up, up)  # removes the vertical component
     for first, last in spans:
         part, found = slice(first, last), []
         for points in (foot.toe[part], foot.heel[part]):
             is_on = points @ up < low[part] + limits.HIGH * size
-            found.append(np.where(is_on, mean_speeds(points @ flat, rate), np.inf))
+            found.append(np.where(is_on, mean_speeds(points @ across, rate), np.inf))
         result[part] = np.minimum(*found)
     return result
 
@@ -274,8 +274,8 @@ def _speeds(
             own = np.where((lowest[rows] == number)[:, None], moved, own)
         found.append(own)
         body.append(np.mean([_velocities(foot.hip, rows, half) for foot in feet], axis=0))
-    flat = np.eye(3) - np.outer(up, up)
-    return rate * np.concatenate(found) @ flat, rate * np.concatenate(body) @ flat
+    across = np.eye(3) - np.outer(up, up)  # removes the vertical component
+    return rate * np.concatenate(found) @ across, rate * np.concatenate(body) @ across
 
 
 def _velocities(path: Floats, rows: Ints, half: int) -> Floats:

@@ -31,14 +31,28 @@ from viewer.rig.retargeting.rest_alignment import shortest_arc
 from viewer.rig.skeleton import Skeleton
 
 _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
-_UPRIGHT = np.cos(np.radians(30.0))
-_STOOPED = np.cos(np.radians(60.0))
-_ENOUGH = 0.05  # minimum fraction of upright frames
-_COLLINEAR = np.cos(np.radians(10.0))  # between the bones of an arm that is straight
-_ALONG = np.cos(np.radians(30.0))  # between a forearm and the fingers of a straight hand
-_BENT = np.cos(np.radians(85.0))  # mean bend of a wrist beyond which its zero pose is not straight
-_SLOPE = np.radians(30.0)  # slope from the ankle down to the ball of a standing foot
-_STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sole level
+
+# Cosines of the angles of the trunk from the up axis, below which a person is upright, and beyond
+# which a person bends or lies. People walk and run within 15 degrees. If less than _ENOUGH of the
+# frames are upright, as of a person who stoops all the time, stooped ones are used as well.
+_UPRIGHT, _STOOPED = np.cos(np.radians(30.0)), np.cos(np.radians(60.0))
+_ENOUGH = 0.05
+
+# Of the zero pose: cosines of the angles between the bones of a straight arm, and between forearm
+# and fingers of a straight hand, which bend by a few degrees in models of relaxed hands.
+_COLLINEAR, _ALONG = np.cos(np.radians(10.0)), np.cos(np.radians(30.0))
+
+# Cosine of the mean bend of a wrist beyond which its zero pose is not straight: wrists bend by at
+# most 80 degrees, so a mean beyond that is a matter of the axes, not of the anatomy.
+_BENT = np.cos(np.radians(85.0))
+
+# Slope from the ankle, 80 mm above the sole, down to the ball, about 140 mm ahead, of a standing
+# foot. Used only if the person never stands.
+_SLOPE = np.radians(30.0)
+
+# Percentage of the frames in which a foot is lowest and its sole level. A walker's foot stands for
+# 60 % of the time, but heel and toes are both on the ground for only half of that.
+_STANCE = 25.0
 SIDES = ("left", "right")
 _NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")  # joints of limbs with names
 _MOST = 4000  # maximum number of frames; for longer motions, every n-th frame is used
@@ -337,17 +351,25 @@ def _axes_along(main: Floats, side: Floats) -> Floats:
 # of their joints, this rule determines the rest pose, without the bias of a mean over the motion.
 # Only the slope of feet whose axes follow the bone to the toes depends on toes or soles.
 
-_BONE = np.cos(np.radians(5.0))  # cosine of the maximum angle between a bone and an axis
+# Cosine of the maximum angle between a bone and an axis. Bones follow the rule exactly; files round
+# them to hundredths of a degree, and some rigs give the forearm or foot a slight offset.
+_BONE = np.cos(np.radians(5.0))
 
-# The same for bending axes, which are measured from the motion: of knees, and of elbows, which also
-# twist.
+# The same for bending axes, which are measured from the motion: of knees, which are hinges, and of
+# elbows, whose plane also tilts as the forearm twists. Both are below 45 degrees, half the angle
+# between two axes, at which the nearest axis is undecided.
 _KNEE, _ELBOW = np.cos(np.radians(20.0)), np.cos(np.radians(40.0))
-_SEEN = 3  # minimum number of limbs whose bending axis is measured
+_SEEN = 3  # minimum number of limbs whose bending axis is measured: one may stay straight
 
-# Maximum rotation, in radians, between the mean pose and a rest pose with the parent's axes.
+# Maximum rotation, in radians, between the mean pose and a rest pose with the parent's axes. Other
+# axes are at least 90 degrees from the parent's, and a mean posture (a bent neck, a hanging hand)
+# takes at most 25 of these away.
 _SAME_AXES = np.radians(65.0)
-_STIFF = np.radians(1.0)  # maximum rotation of toes that do not move
-_PARALLEL_SLOPE = np.radians(15.0)  # maximum difference between two estimates of a foot's slope
+_STIFF = np.radians(1.0)  # maximum rotation of toes that do not move: the rounding of files
+
+# Maximum difference between two estimates of a foot's slope. They err independently by a few
+# degrees; a larger difference shows that the toes are not level, and do not state the slope.
+_PARALLEL_SLOPE = np.radians(15.0)
 
 # Joints that have their parent's axes.
 _CHAINS = ("spine2", "spine3", "neck", "head", "wrist")
@@ -500,8 +522,15 @@ def _nearest(rotation: Floats) -> Floats:
 # joint.
 
 _LIMBS = (("hip", "knee", "ankle", -1.0), ("shoulder", "elbow", "wrist", 1.0))
-_LIMB_BENT = np.sin(np.radians(15.0))  # sine of the minimum bend that shows the axis of a joint
-_COHERENT = 0.7  # minimum ratio of the length of the mean normal to the mean length of the normals
+
+# Sine of the minimum bend that shows the axis of a joint: with less, noise of 1 degree in the
+# bones moves their normal by 1 / sin(15 degrees), 4 degrees, and more.
+_LIMB_BENT = np.sin(np.radians(15.0))
+
+# Minimum ratio of the length of the mean normal to the mean length of the normals: the mean cosine
+# of their angles to the mean normal. It is 1 for a hinge, 0.7 if all are 45 degrees off, and 0 if
+# they point everywhere.
+_COHERENT = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
