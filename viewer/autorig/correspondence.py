@@ -124,7 +124,10 @@ def sheet_normals(mesh: Welded) -> Floats:
 
 def match(template: Template, target: Welded, size: float, settings: MatchSettings) -> Matches:
     """Match the vertices of a target that lie on the template."""
-    points = _closest(template, target)
+    points, welded = template.surface.closest(target.positions), template.welded
+    same = same_vertices(welded, target, points.distances)
+    corners = welded.vertices[template.triangles]
+    points = at_vertices(points, target.positions, corners, welded.positions, same)
     normals = sheet_normals(target)
     angles = _angles(template, points, normals)
     meets = points.distances <= settings.max_distance * size
@@ -141,14 +144,6 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
     matched[rest[fits]] = True
     angles[rest[fits]] = side_angles[fits]
     return Matches(_replaced(points, rest[fits], sides, fits), matched, angles, inside_out)
-
-
-def _closest(template: Template, target: Welded) -> SurfacePoints:
-    """Return the closest points, or the template vertices that are identical to the target's."""
-    points, welded = template.surface.closest(target.positions), template.welded
-    same = same_vertices(welded, target, points.distances)
-    corners = welded.vertices[template.triangles]
-    return at_vertices(points, target.positions, corners, welded.positions, same)
 
 
 def _angles(template: Template, points: SurfacePoints, normals: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Result of a rig transfer: the rigged figure, and the origin of every vertex's weights."""
+"""Result of a rig transfer: the rigged figure, the origin of its weights, and its clips."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.autorig.alignment.surface_alignment import Alignment
-from viewer.autorig.transfer.clip_transfer import transfer_clip
 from viewer.autorig.weights.result import WeightTransfer
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.pose import Pose
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
-CONFIDENCE = ("matched", "inpainted", "rigid")
+_CONFIDENCE = ("matched", "inpainted", "rigid")
 """Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours,
 or the rigid attachment of its island."""
 
@@ -53,7 +54,7 @@ class Rigged:
 
     @property
     def confidence(self) -> Ints:
-        """Index into ``CONFIDENCE`` of every vertex: (V,) int32."""
+        """Index into ``_CONFIDENCE`` of every vertex: (V,) int32."""
         weights = self.weights
         return np.where(weights.matched, 0, np.where(weights.inpainted, 1, 2)).astype(np.int32)
 
@@ -68,7 +69,7 @@ def with_fields(rigged: Rigged) -> Rigged:
     confidence = rigged.confidence.astype(np.float64)
     guarded = rigged.guarded.astype(np.float64)
     fields = (
-        VertexField("confidence", "Origin of weights", confidence, names=CONFIDENCE),
+        VertexField("confidence", "Origin of weights", confidence, names=_CONFIDENCE),
         VertexField("distance", "Distance to the template", rigged.weights.distances, "length"),
         VertexField("guarded", "Rest position", guarded, names=("exact", "estimated")),
     )
@@ -81,3 +82,56 @@ def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
     return transfer_clip(
         clip, skeleton, rigged.length_scale, rigged.figure_scale, rigged.path_scale
     )
+
+
+def transfer_clip(
+    clip: Clip | SampledClip,
+    skeleton: Skeleton,
+    length_scale: float,
+    figure_scale: float = 1.0,
+    path_scale: float | None = None,
+) -> Clip | SampledClip:
+    """Return a clip of the template for the rigged target: angles unchanged, lengths scaled.
+
+    ``length_scale``: target units per unit of the template's figure space, 1 if nothing was scaled.
+    ``path_scale``: replaces it for the figure's translation and its roots, which scale with the
+    length of the legs. Shape weights of captures are dropped, as the target has a different shape.
+    Raises ``RigError`` if the clip has a different number of joints, or moves a missing DOF.
+    """
+    path = length_scale if path_scale is None else path_scale
+    roots = skeleton.parents < 0
+    inside = np.where(roots, path, length_scale) * figure_scale
+    if clip.kind == "curves":
+        channels = tuple(_scaled(channel, skeleton, inside) for channel in clip.channels)
+        return replace(clip, channels=channels)
+    if clip.n_joints != skeleton.n_joints:
+        raise RigError(
+            f"clip {clip.name} has {clip.n_joints} joints, but the figure has {skeleton.n_joints}"
+        )
+    places, scales, moves = clip.figure_translations, clip.figure_scales, clip.translations
+    return replace(
+        clip,
+        translations=None if moves is None else moves * inside[:, None],
+        figure_translations=None if places is None else places * path,
+        figure_scales=None if scales is None else scales / figure_scale,
+        shape_weights=None,
+    )
+
+
+def _scaled(channel: Channel, skeleton: Skeleton, factors: Floats) -> Channel:
+    """Scale a curve of lengths: its values, and its numeric slopes."""
+    if channel.target >= skeleton.n_dofs:
+        raise RigError(
+            f"a channel moves DOF {channel.target}, but the figure has {skeleton.n_dofs} DOFs"
+        )
+    if skeleton.dof_kinds[channel.target] >= FIRST_ROTATION:
+        return channel
+    factor = float(factors[skeleton.dof_joints[channel.target]])
+    tangents = tuple(
+        (
+            before if isinstance(before, str) else before * factor,
+            after if isinstance(after, str) else after * factor,
+        )
+        for before, after in channel.tangents
+    )
+    return replace(channel, values=channel.values * factor, tangents=tangents)

@@ -40,6 +40,7 @@ from viewer.rig.motion.evaluation import (
     time_span,
     world_frames,
 )
+from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene
@@ -119,6 +120,10 @@ class Subject:
             return size
         near = np.linalg.norm(positions - inner.mean(axis=0), axis=1) < _FAR / 2 * usual
         return box_size(bounding_box(positions[near]))
+
+    def times(self, timing: Timing, frames: NDArray[np.integer]) -> Floats:
+        """Return the times (N,) of frames of the actor's motion on the scene's clock."""
+        return timing.start + frames / timing.frame_rate + self.actor.offset
 
     def _relative(self, length: float) -> str:
         size = self.size()

@@ -12,7 +12,7 @@ from viewer.lint._subject import Subject
 from viewer.lint.clips import missing_frames
 from viewer.phrases import all_of, counted, listed, rounded
 from viewer.rig.arrays import Ints
-from viewer.rig.captures.points import PointClip
+from viewer.rig.captures.points import PointClip, visible_sizes
 
 LOW_FRACTION = 0.05
 """Fraction of a keypoint's visible frames: this much low confidence is normal."""
@@ -71,7 +71,7 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> Iterator
             part="clip",
             joints=[point],
             frames=frames + first_frame,
-            times=_times(subject, clip, frames),
+            times=subject.times(clip.timing, frames),
         )
     others = points[_SINGLE:]
     if len(others):
@@ -93,7 +93,7 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> Iterator
             part="clip",
             joints=others,
             frames=frames + first_frame,
-            times=_times(subject, clip, frames),
+            times=subject.times(clip.timing, frames),
         )
 
 
@@ -128,7 +128,7 @@ def _jumps(subject: Subject, clip: PointClip, names: list[str]) -> Iterator[Find
         part="clip",
         joints=[point],
         frames=frames + clip.timing.first_frame,
-        times=_times(subject, clip, frames),
+        times=subject.times(clip.timing, frames),
     )
 
 
@@ -140,14 +140,5 @@ def _n_frames(rows: Ints) -> int:
 
 def _size(clip: PointClip) -> float:
     """Return the median size of the bounding box of the visible points in a frame."""
-    seen = clip.points[..., 3:] > 0.0
-    low = np.where(seen, clip.points[..., :3], np.inf).min(axis=1)
-    high = np.where(seen, clip.points[..., :3], -np.inf).max(axis=1)
-    known = seen.any(axis=(1, 2))
-    if not known.any():
-        return 1.0
-    return float(np.median(np.linalg.norm(high[known] - low[known], axis=1)))
-
-
-def _times(subject: Subject, clip: PointClip, frames: np.ndarray) -> np.ndarray:
-    return clip.timing.start + frames / clip.timing.frame_rate + subject.actor.offset
+    sizes = visible_sizes(clip.points)
+    return float(np.median(sizes)) if len(sizes) else 1.0

@@ -59,7 +59,7 @@ def missing_frames(subject: Subject, timing: Timing) -> Iterator[Finding]:
         return
     runs = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
     first = timing.first_frame
-    times = timing.start + gaps / timing.frame_rate + subject.actor.offset
+    times = subject.times(timing, gaps)
     yield subject.found(
         "C005.gaps: {n} missing in {n_gaps}: {gaps}",
         n=counted(len(gaps), "frame", "is", "are", of=int(there[-1] - there[0]) + 1),

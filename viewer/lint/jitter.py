@@ -10,7 +10,7 @@ from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject, track_of
 from viewer.phrases import counted, rounded
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.captures.points import PointClip
+from viewer.rig.captures.points import PointClip, visible_sizes
 from viewer.rig.cleanup.frames import runs_of
 from viewer.rig.skeleton import joint_labels
 
@@ -59,20 +59,20 @@ def _points(subject: Subject, clip: PointClip) -> Iterator[Finding]:
         return
     rows = clip.points[np.maximum(timing.rows, 0)]
     seen = (rows[..., 3] > 0.0) & timing.present[:, None]
-    limit = _POINT_LIMIT * _size(rows[..., :3], seen)
+    sizes = visible_sizes(rows[timing.present])
+    limit = _POINT_LIMIT * float(np.median(sizes)) if len(sizes) else 0.0
     width = _width(timing.frame_rate)
     noise = np.zeros(seen.shape)
     for point in range(seen.shape[1]):
         noise[:, point] = noise_of(rows[:, point, None, :3], seen[:, point], width)[:, 0]
     names = [*layout.names, *(f"point {k}" for k in range(len(layout.names), seen.shape[1]))]
     frames = np.arange(timing.n_frames)
-    times = timing.start + frames / timing.frame_rate + subject.actor.offset
     numbers = frames + timing.first_frame
 
     def shown(length: float) -> str:
         return f"{rounded(length)} units"
 
-    yield from _found(subject, noise, limit, names, shown, numbers, times)
+    yield from _found(subject, noise, limit, names, shown, numbers, subject.times(timing, frames))
 
 
 def _found(
@@ -133,11 +133,3 @@ def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
 
 def _width(rate: float) -> int:
     return 2 * round(0.5 * _WINDOW * rate) + 1
-
-
-def _size(places: Floats, seen: Bools) -> float:
-    """Return the median size of the box around the visible points."""
-    low = np.where(seen[..., None], places, np.inf).min(axis=1)
-    high = np.where(seen[..., None], places, -np.inf).max(axis=1)
-    known = seen.any(axis=1)
-    return float(np.median(np.linalg.norm(high[known] - low[known], axis=1))) if known.any() else 0

@@ -8,10 +8,11 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.lint._finding import Finding
-from viewer.lint._subject import Indices, Subject
+from viewer.lint._subject import Subject
 from viewer.phrases import Remedy, counted, listed
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.points import visible_sizes
 from viewer.rig.geometry.transform import mean_scale
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import frames_of, rest_translations_of
@@ -108,7 +109,7 @@ def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> Iterat
         frame=number,
         part="clip",
         frames=frames + one.timing.first_frame,
-        times=_times(subject, one, frames),
+        times=subject.times(one.timing, frames),
     )
 
 
@@ -134,7 +135,7 @@ def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> Itera
         part="clip",
         severity="note",
         frames=numbers,
-        times=_times(subject, own, np.array([first])),
+        times=subject.times(own.timing, np.array([first])),
         remedy=Remedy("", f" (--merge-ids {ids} of viewer convert)"),
     )
 
@@ -150,9 +151,7 @@ def _path(actor: Actor) -> _Path | None:
         present = clip.timing.present & seen.any(axis=(1, 2))
         count = np.maximum(seen.sum(axis=1), 1)
         means = np.where(seen, points[..., :3], 0.0).sum(axis=1) / count
-        low = np.where(seen, points[..., :3], np.inf).min(axis=1)
-        high = np.where(seen, points[..., :3], -np.inf).max(axis=1)
-        sizes = np.linalg.norm(high[present] - low[present], axis=1)
+        sizes = visible_sizes(points[present])
         size = float(np.median(sizes)) if len(sizes) else 0.0
         return _Path(clip.timing, present, means @ turn.T + place, scale * size)
     if clip is None or figure.skeleton is None:
@@ -172,8 +171,3 @@ def _distance(one: Floats, other: Floats) -> Floats:
 
 def _length(subject: Subject, length: float) -> str:
     return subject.length(length / (mean_scale(subject.actor.placement) or 1.0))
-
-
-def _times(subject: Subject, path: _Path, frames: Indices) -> Floats:
-    timing = path.timing
-    return timing.start + frames / timing.frame_rate + subject.actor.offset

@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding
 from viewer.lint._subject import Subject
 from viewer.phrases import counted, listed, optional
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Bools
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.faults import are_singular, weight_faults
 from viewer.rig.motion.evaluation import frames_of, pose_of
@@ -106,7 +106,13 @@ def _cost(
     subject: Subject, skin: Skin, limit: int, crowded: np.ndarray
 ) -> tuple[Phrase, np.ndarray]:
     """Return the error of pruning, and the vertices with the largest errors first."""
-    errors, n_poses = _cut_errors(subject, limit)
+    figure = subject.actor.figure
+    poses = _some_poses(subject.actor)
+    whole, cut = Skinning(normalize=True), Skinning(max_influences=limit)
+    errors = np.zeros(0 if figure.mesh is None else figure.mesh.n_vertices)
+    for pose in poses:
+        moved = deform(figure, pose, whole)[0] - deform(figure, pose, cut)[0]
+        errors = np.maximum(errors, np.linalg.norm(moved, axis=1))
     is_known = (_posable(subject, skin) & np.isfinite(errors))[crowded]
     known, lost = crowded[is_known], crowded[~is_known]
     left_out = (
@@ -131,7 +137,7 @@ def _cost(
         most=subject.length(float(errors[known[0]])),
         vertex=int(known[0]),
         mean=subject.length(float(errors[known].mean())),
-        poses=counted(n_poses, "pose"),
+        poses=counted(len(poses), "pose"),
         left_out=optional("; {}", left_out),
     )
     return cost, np.concatenate([known, lost])
@@ -144,18 +150,6 @@ def _posable(subject: Subject, skin: Skin) -> Bools:
     holds = lost[skin.joints] & (skin.weights != 0.0)
     held = np.bincount(owners(skin), holds, minlength=skin.n_vertices)
     return subject.valid("positions", skin.n_vertices) & (held == 0)
-
-
-def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
-    """Return the largest displacement of each vertex by pruning its influences."""
-    figure = subject.actor.figure
-    poses = _some_poses(subject.actor)
-    whole, cut = Skinning(normalize=True), Skinning(max_influences=limit)
-    errors = np.zeros(0 if figure.mesh is None else figure.mesh.n_vertices)
-    for pose in poses:
-        moved = deform(figure, pose, whole)[0] - deform(figure, pose, cut)[0]
-        errors = np.maximum(errors, np.linalg.norm(moved, axis=1))
-    return errors, len(poses)
 
 
 def _label(subject: Subject, joint: int) -> str:

@@ -5,8 +5,8 @@ import pytest
 from autorig.rigged_shapes import arm
 from numpy.testing import assert_allclose, assert_array_equal
 
+from viewer.autorig.rigged import transfer_clip
 from viewer.autorig.transfer import corrective_transfer
-from viewer.autorig.transfer.clip_transfer import transfer_clip
 from viewer.autorig.transfer.corrective_transfer import transfer_correctives
 from viewer.errors import RigError
 from viewer.rig.blendshapes import Correctives

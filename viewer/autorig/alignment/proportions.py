@@ -19,7 +19,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.retargeting.mirror import joint_partners
-from viewer.rig.skin import Skin, influence_counts, weight_sums
+from viewer.rig.skin import Skin, owners, weight_sums
 from viewer.rig.skinning.lbs import move
 
 
@@ -41,7 +41,10 @@ def limbs_of(figure: Figure) -> Limbs:
     """Return a figure's limbs."""
     mesh, skeleton, skin = figure.attached()
     parents = skeleton.parents
-    weights = _dense(skin)
+    weights = np.zeros((skin.n_vertices, skin.n_joints))
+    np.add.at(weights, (owners(skin), skin.joints), skin.weights)
+    sums = weight_sums(skin)
+    weights /= np.where(sums > 0.0, sums, 1.0)[:, None]
     fractions = weights.copy()
     for joint in range(len(parents) - 1, -1, -1):
         # Children come after their parents, so this joint's own sum is already final.
@@ -94,15 +97,6 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
         skeleton=replace(skeleton, rest_translations=rest),
         skin=replace(skin, inverse_bind=inverse_bind),
     )
-
-
-def _dense(skin: Skin) -> Floats:
-    owners = np.repeat(np.arange(skin.n_vertices), influence_counts(skin))
-    weights = np.zeros((skin.n_vertices, skin.n_joints))
-    np.add.at(weights, (owners, skin.joints), skin.weights)
-    sums = weight_sums(skin)
-    scaled: Floats = weights / np.where(sums > 0.0, sums, 1.0)[:, None]
-    return scaled
 
 
 def _bound_joints(skin: Skin) -> Floats:

@@ -119,7 +119,12 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
         return offsets  # the template is not symmetric, so there is no symmetry to preserve
     flip = np.ones(3)
     flip[mirror_axis(template)] = -1.0
-    zero = _zero_pose(skeleton)
+    zero = Pose(
+        dofs=np.zeros(skeleton.n_dofs),
+        translations=np.zeros((skeleton.n_joints, 3)),
+        rotations=skeleton.rest_rotations.copy(),
+        scales=skeleton.rest_scales.copy(),
+    )
     rest = world_matrices(skeleton, zero)[:, :3, :3]
     has_parent = skeleton.parents >= 0
     frames = np.where(has_parent[:, None, None], rest[skeleton.parents], np.eye(3))
@@ -136,15 +141,6 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
     back = np.linalg.solve(frames, mixed[..., None])[..., 0]
     symmetric: Floats = scale * skeleton.rest_translations + back
     return symmetric
-
-
-def _zero_pose(skeleton: Skeleton) -> Pose:
-    return Pose(
-        dofs=np.zeros(skeleton.n_dofs),
-        translations=np.zeros((skeleton.n_joints, 3)),
-        rotations=skeleton.rest_rotations.copy(),
-        scales=skeleton.rest_scales.copy(),
-    )
 
 
 def _with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> Skeleton:

@@ -398,7 +398,13 @@ def weight_matrix(skin: Skin, triangles: Ints) -> csr_array:
             f"template: expected weights for {int(triangles.max()) + 1} vertices, "
             f"found {skin.n_vertices}"
         )
-    matrix = _matrix(skin)
+    from scipy import sparse
+
+    shape = (skin.n_vertices, skin.n_joints)
+    matrix = sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape, copy=True)
+    matrix.sum_duplicates()
+    matrix.data = np.maximum(matrix.data, 0.0)
+    matrix.eliminate_zeros()
     sums = np.asarray(matrix.sum(axis=1)).ravel()
     empty = np.unique(triangles[sums[triangles] <= _NO_SUM])
     if len(empty):
@@ -436,17 +442,6 @@ def put_rows(rows: csr_array, where: NDArray[np.integer], values: csr_array) -> 
         (np.ones(len(where)), (where, every)), shape=(rows.shape[0], len(where))
     )
     return sparse.csr_array(scaled_rows(rows, kept) + lift @ values)
-
-
-def _matrix(skin: Skin) -> csr_array:
-    from scipy import sparse
-
-    shape = (skin.n_vertices, skin.n_joints)
-    matrix = sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape, copy=True)
-    matrix.sum_duplicates()
-    matrix.data = np.maximum(matrix.data, 0.0)
-    matrix.eliminate_zeros()
-    return matrix
 
 
 def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:

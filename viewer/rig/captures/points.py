@@ -84,3 +84,12 @@ class PointClip:
         mixed = start + fraction[:, None, None] * (end - start)
         both = (start[..., 3] > 0.0) & (end[..., 3] > 0.0)
         return Samples(present, points=np.where(both[..., None], mixed, start))
+
+
+def visible_sizes(points: Floats) -> Floats:
+    """Return the diagonal of the box of visible points (F, K, 4) in each frame that has any."""
+    seen = points[..., 3:] > 0.0
+    low = np.where(seen, points[..., :3], np.inf).min(axis=1)
+    high = np.where(seen, points[..., :3], -np.inf).max(axis=1)
+    known = seen.any(axis=(1, 2))
+    return np.linalg.norm(high[known] - low[known], axis=1)
