@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -20,7 +19,7 @@ def lock_feet(
     figure: Figure, clip: SampledClip, up: int, way: float = 1.0
 ) -> tuple[SampledClip, PlantedFeet]:
     """Hold feet still while they stand, as far as legs reach; ``way``: -1 if ``up`` points down."""
-    clip = cast("SampledClip", in_frame_order(clip))
+    clip = in_frame_order(clip)
     legs = legs_of(figure.require_skeleton())
     rest_up = axis_vector(figure.up)
     body = body_legs(figure, clip, legs, rest_up) if legs and clip.n_rows else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from viewer.rig.motion.timing import Timing
 
 Captured = SampledClip | PointClip
 """A clip of sampled frames, of joints or of points."""
+_Clip = TypeVar("_Clip", bound=Captured)
 _Indices = NDArray[np.intp]
 _ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, for times that are treated as that frame
 _MOST_FRAMES = 1_000_000  # maximum number of frames: 9 hours at 30 frames per second
@@ -26,12 +28,12 @@ def runs_of(flags: Bools) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def in_frame_order(clip: Captured) -> Captured:
+def in_frame_order(clip: _Clip) -> _Clip:
     """Return the same motion with one row for each present frame, in time order."""
     return _with_rows(clip, np.arange(clip.timing.n_frames))
 
 
-def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
+def trimmed(clip: _Clip, first: int | None = None, stop: int | None = None) -> _Clip:
     """Return frames ``first`` to ``stop`` - 1 of the file's numbering; RigError if none remain."""
     low = clip.timing.first_frame
     high = low + clip.timing.n_frames
@@ -45,7 +47,7 @@ def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -
     return _with_rows(clip, np.arange(start - low, end - low))
 
 
-def _with_rows(clip: Captured, frames: _Indices) -> Captured:
+def _with_rows(clip: _Clip, frames: _Indices) -> _Clip:
     """Return some consecutive frames (F,), counted from 0, each with its own row, in time order."""
     timing = clip.timing
     chosen = timing.rows[frames]

@@ -252,8 +252,7 @@ def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
 
 
 def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     for label, value in record.dofs.items():
         with _part("dofs", label):
             pose.dofs[_dof(figure, label)] = value
@@ -342,8 +341,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
 def _apply_part(
     name: str, values: Floats, record: PoseRecord, figure: Figure, pose: Pose
 ) -> list[Diagnostic]:
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     values = np.asarray(values, dtype=np.float64).ravel()
     if name == "body_pose":
         return _apply_body(values, figure, pose)
@@ -411,8 +409,7 @@ def _apply_hand(
     figure: Figure,
     pose: Pose,
 ) -> list[Diagnostic]:
-    skeleton = figure.skeleton
-    assert skeleton is not None
+    skeleton = figure.require_skeleton()
     side = _HAND_PARTS[name]
     if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
         hand = figure.hands[0]  # MANO is a model of one hand, left or right

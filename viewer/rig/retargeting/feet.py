@@ -6,8 +6,6 @@ contacts are those of the source; see ``viewer.rig.feet.planting``.
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -39,14 +37,14 @@ def plant_feet(
     pairs = _leg_pairs(found, figure)
     rest_up = axis_vector(figure.up)
     up = -rest_up if hangs else rest_up
-    clip = cast("SampledClip", in_frame_order(found.clip))
+    clip = in_frame_order(found.clip)
     body = body_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
     if body is None or body.size <= 0.0 or clip.n_rows == 0:
         return found.clip, None
     if _has_source_proportions(found, figure, pairs, body.size):
         return found.clip, None
     report(1, STEPS, "steps", "planting the feet")
-    source = cast("SampledClip", in_frame_order(found.source.clip))
+    source = in_frame_order(found.source.clip)
     worlds = body.worlds(clip)
     feet = _source_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
     planted, changes = plant(clip, body, worlds, up, feet)

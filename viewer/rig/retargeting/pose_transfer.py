@@ -227,8 +227,7 @@ def _notes(
     source: JointRotations, target: Figure, partners: Ints, missed: list[int]
 ) -> list[Diagnostic]:
     """Return messages about the transferred joints."""
-    skeleton = target.skeleton
-    assert skeleton is not None  # checked by the caller
+    skeleton = target.require_skeleton()
     used = set(partners[partners >= 0].tolist())
     whose = printable(source.figure) or "the pose"
     values: dict[str, object] = {"n": len(used), "all": len(source.names), "figure": whose}
