@@ -18,7 +18,7 @@ from viewer.export import ExportOptions, export
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.figure import Figure
-from viewer.rig.motion.single_frame import single_frame
+from viewer.rig.motion.sampled_animation import single_frame
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning

@@ -25,7 +25,7 @@ from viewer.export import (
 from viewer.export._motion_paths import PERSON, is_together
 from viewer.phrases import Remedy, agree, all_of, counted, printable
 from viewer.rig.motion.animation_choice import has_own_animations, keeps_keys, own_animations
-from viewer.rig.motion.single_frame import upright_single_frame
+from viewer.rig.motion.sampled_animation import upright_single_frame
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
 from viewer.rig.motion.timing import frame_at
 from viewer.rig.scene import Actor, Scene

@@ -16,12 +16,12 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
-from viewer.rig.cleanup.foot_lock import lock_feet
 from viewer.rig.cleanup.frames import Captured, resampled, runs_of, trimmed
 from viewer.rig.cleanup.smoothing import OneEuro, SavitzkyGolay, run_lengths, smoothed
 from viewer.rig.cleanup.tracks import common_frames, interpolate_gaps, joined_tracks
 from viewer.rig.feet.ground import resting_height
 from viewer.rig.feet.legs import legs_of
+from viewer.rig.feet.planting import lock_feet
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import frames_of, pose_actors, world_frames

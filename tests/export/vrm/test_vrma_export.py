@@ -15,7 +15,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.export import ExportOptions
 from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actors
-from viewer.rig.motion.single_frame import single_frame
+from viewer.rig.motion.sampled_animation import single_frame
 from viewer.rig.scene import Actor
 
 LIMBS = (("leftUpperArm", "leftLowerArm"), ("rightUpperLeg", "rightLowerLeg"), ("hips", "head"))

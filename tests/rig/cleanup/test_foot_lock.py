@@ -7,7 +7,7 @@ import pytest
 from lint.sound import FRAMES, RATE, legs, standing
 from numpy.testing import assert_allclose
 
-from viewer.rig.cleanup.foot_lock import lock_feet
+from viewer.rig.feet.planting import lock_feet
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
 from viewer.rig.motion.evaluation import frames_of, world_frames
 

@@ -21,8 +21,8 @@ from viewer.rig.motion.animation_choice import (
 )
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import pose_actors, world_frames
+from viewer.rig.motion.sampled_animation import single_frame, upright_single_frame
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.single_frame import single_frame, upright_single_frame
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import Animation
 from viewer.rig.scene import Actor, Scene, figure_pose

@@ -32,8 +32,7 @@ from viewer.rig.motion.evaluation import (
 )
 from viewer.rig.motion.motion_paths import motion_path, path_times
 from viewer.rig.motion.onion import onion
-from viewer.rig.motion.sampled_animation import baked, frame_range, sample_animation
-from viewer.rig.motion.single_frame import single_frame
+from viewer.rig.motion.sampled_animation import baked, frame_range, sample_animation, single_frame
 from viewer.rig.motion.transform_clip import TransformClip, is_regular, key_rate, sample_transforms
 from viewer.rig.pose import joint_rotations, local_matrices
 from viewer.rig.scene import Actor, Scene, figure_pose

@@ -20,8 +20,9 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.cleanup.frames import in_frame_order
 from viewer.rig.feet import limits
-from viewer.rig.feet.body import BodyLegs, spans_of
+from viewer.rig.feet.body import BodyLegs, body_legs, spans_of
 from viewer.rig.feet.contacts import (
     Contact,
     FootPath,
@@ -32,7 +33,8 @@ from viewer.rig.feet.contacts import (
     step_height,
 )
 from viewer.rig.feet.curves import falling, smooth_curves
-from viewer.rig.feet.legs import Leg, leg_rotations, lowering, unscaled
+from viewer.rig.feet.legs import Leg, leg_rotations, legs_of, lowering, unscaled
+from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import (
     align_signs,
     conjugate,
@@ -40,6 +42,7 @@ from viewer.rig.geometry.quaternion import (
     rotation_vector_to_quaternion,
 )
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.vectors import axis_vector
 from viewer.rig.motion.sampled_clip import SampledClip
 
 # How constants were found: five made motions (a walk, stairs, a jump, kneeling, a walk whose root
@@ -127,10 +130,10 @@ def plant(
         worlds, feet = body.worlds(clip), on_moving_ground(feet, travel)
     speed = 0.0 if moves is None else float(np.linalg.norm(moves))
 
-    def plan_of(ease: float) -> FootPlan:
+    def plan_of(ease: float) -> _FootPlan:
         if is_own:
             return _own_plan(feet, *how, body.size, up, body.heights(worlds, up), ease)
-        return foot_plan(feet, *how, (body.size, body.clearance), up, ease)
+        return _foot_plan(feet, *how, (body.size, body.clearance), up, ease)
 
     plan = plan_of(0.0)
     if not any(plan.contacts):
@@ -150,7 +153,7 @@ def _attempt(
     clip: SampledClip,
     body: BodyLegs,
     worlds: Floats,
-    plan: FootPlan,
+    plan: _FootPlan,
     ground_speed: float,
     step: int,
 ) -> _Attempt:
@@ -159,7 +162,7 @@ def _attempt(
     # attempt gained (sliding, distance from the ground) and cost (sudden knees) is measured on the
     # result, by forward kinematics of the clip as it will be played.
     report(step, STEPS, "steps")
-    level = clip if plan.is_own else levelled(clip, body, worlds, plan)
+    level = clip if plan.is_own else _levelled(clip, body, worlds, plan)
     report(step + 1, STEPS, "steps")
     planted, lowered = _planted(level, body, body.worlds(level), plan)
     report(step + 2, STEPS, "steps")
@@ -184,7 +187,7 @@ def _attempt(
 
 
 def _planted(
-    clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan
+    clip: SampledClip, body: BodyLegs, worlds: Floats, plan: _FootPlan
 ) -> tuple[SampledClip, float]:
     """Return the corrected motion, and how far the body was lowered."""
     up, joints = plan.up, body.chains.joints
@@ -216,7 +219,7 @@ def _translated(clip: SampledClip, drop: Floats, roots: Ints) -> SampledClip:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FootPlan:
+class _FootPlan:
     """Contacts of all feet, and the heights of the ground."""
 
     feet: list[FootPath]
@@ -290,23 +293,23 @@ class FootPlan:
         return lowest - np.maximum(sunk - limits.SUNK * self.size, 0.0)
 
 
-def foot_plan(
+def _foot_plan(
     feet: list[FootPath],
     spans: list[tuple[int, int]],
     rate: float,
     shape: tuple[float, float],
     up: Floats,
     ease: float = 0.0,
-) -> FootPlan:
+) -> _FootPlan:
     """Return the contacts of the source and the heights of the ground under the figure."""
     size, clearance = shape
     contacts = foot_contacts(feet, spans, rate, size, up, ease)
     if not any(contacts):
-        return FootPlan(feet, contacts, [[] for _ in feet], spans, rate, size, up)
+        return _FootPlan(feet, contacts, [[] for _ in feet], spans, rate, size, up)
     level, is_usual = ground_level(contacts, size, clearance)
     ground = 0.0 if is_usual else level - clearance
     grounds = [[ground + step_height(one, level, size) for one in foot] for foot in contacts]
-    return FootPlan(feet, contacts, grounds, spans, rate, size, up)
+    return _FootPlan(feet, contacts, grounds, spans, rate, size, up)
 
 
 def _own_plan(
@@ -317,10 +320,10 @@ def _own_plan(
     up: Floats,
     heights: Floats,
     ease: float,
-) -> FootPlan:
+) -> _FootPlan:
     """Return the contacts of a capture's own feet, whose soles keep their heights, (N, L)."""
     found = foot_contacts(feet, spans, rate, size, up, ease, limits.SLIPS)
-    free = FootPlan(feet, found, [[] for _ in feet], spans, rate, size, up)
+    free = _FootPlan(feet, found, [[] for _ in feet], spans, rate, size, up)
     contacts: list[list[Contact]] = []
     grounds: list[list[float]] = []
     for number, (foot, some) in enumerate(zip(feet, found, strict=True)):
@@ -342,7 +345,6 @@ def _own_plan(
 # heights, or the rest pose of a file is inexact, the sole is then tilted. While the ball and the
 # heel of the source stand, the foot rotates until its sole is level; while only the ball stands,
 # the toes rotate instead.
-
 _NOISE = 0.04  # seconds below which changes of a standing foot's rotation are noise
 _LEVELS = 0.06  # the length s of the smooth curve of a correction, seconds; see _EASE
 _FLAT = 6.0  # decimal exponent of the weight of a standing foot
@@ -354,7 +356,7 @@ _FLAT = 6.0  # decimal exponent of the weight of a standing foot
 _TILTED = (np.cos(np.radians(55.0)), np.cos(np.radians(35.0)))
 
 
-def levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan) -> SampledClip:
+def _levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: _FootPlan) -> SampledClip:
     """Return a motion whose standing soles are level."""
     legs, up = body.legs, plan.up
     ankles, toes = [leg.ankle for leg in legs], [leg.toe for leg in legs]
@@ -377,7 +379,7 @@ def levelled(clip: SampledClip, body: BodyLegs, worlds: Floats, plan: FootPlan) 
     return _rotated(clip, body, old, multiply(rotation_vector_to_quaternion(tilts), steady))
 
 
-def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
+def _holds(plan: _FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
     """Return how firmly feet and toes stand, and how firmly with flat soles: (2, N, L) each."""
     holds = np.zeros((2, len(plan.feet[0].toe), len(legs)))
     flat = np.zeros_like(holds)
@@ -391,7 +393,7 @@ def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
     return holds, flat
 
 
-def _steadied(plan: FootPlan, rotations: Floats, holds: Floats) -> Floats:
+def _steadied(plan: _FootPlan, rotations: Floats, holds: Floats) -> Floats:
     """Return rotations, (2, N, L, 4), smoothed over time where feet stand."""
     # q and -q are one rotation. With signs that make neighbours nearest, the four components are
     # ordinary curves, and rotations of a standing foot differ by so little that smoothing the
@@ -455,7 +457,6 @@ _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 # three 0.008 %, seven 0.001 % (0.02 mm). A stronger pull needs fewer, but makes a kink where the
 # foot would have touched the ground: knees of kneeling grow by 1.3 at 0.25, 1.5 at 1, 1.9 at 4.
 _LIFTS, _LIFTED = 7, 0.25
-
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
 
 # Duration below which changes of the feet's translations count as quick, seconds. At 0.2, part of a
@@ -487,7 +488,7 @@ class _Wanted:
 
 
 def _foot_shifts(
-    plan: FootPlan,
+    plan: _FootPlan,
     points: list[tuple[Floats, Floats]],
     heights: Floats,
     straight: Floats,
@@ -520,7 +521,7 @@ def _foot_shifts(
     return _shifts(plan, every, sway, _LIFTS), sway
 
 
-def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
+def _wanted(plan: _FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
     """Return the corrections of a foot."""
     path = plan.feet[foot]
     across, rise = np.zeros_like(points[0]), np.zeros(len(heights))
@@ -552,7 +553,7 @@ def _level(low: Floats, contact: Contact) -> Floats:
     return np.interp(np.arange(len(low)), held, low[held])
 
 
-def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0) -> list[Floats]:
+def _shifts(plan: _FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0) -> list[Floats]:
     """Return feet's translations (N, 3), ``base`` off contacts; ``n_lifts``: passes of lifting."""
     # Everything is relative to the body, base: then 0 is the target of a foot in the air, which is
     # what smooth curves with weight 1 decay to. Each foot has two curves, because rows can be held
@@ -603,7 +604,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0
     return result
 
 
-def _calmed(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
+def _calmed(plan: _FootPlan, targets: Floats, holds: Floats) -> Floats:
     """Return the targets of held rows without the source's sudden jumps, which knees would make."""
     # A jump is what a curve of 0.03 s does not follow. Below 0.2 % of the body (3 mm) it is noise
     # that the foot may hide, above 0.4 % it is passed on, in between partly. Heights pass on at
@@ -625,7 +626,7 @@ def _strength(holds: Floats) -> Floats:
     return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 
-def _smoothed(plan: FootPlan, targets: Floats, weights: Floats, seconds: float = _EASE) -> Floats:
+def _smoothed(plan: _FootPlan, targets: Floats, weights: Floats, seconds: float = _EASE) -> Floats:
     """Return smooth curves, (..., N, C), with weights (..., N); gaps in time separate them."""
     result = np.empty_like(targets)
     for start, stop in plan.spans:
@@ -634,7 +635,7 @@ def _smoothed(plan: FootPlan, targets: Floats, weights: Floats, seconds: float =
     return result
 
 
-def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
+def _sway(plan: _FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
     """Return planted feet's mean translation (N, 3), smooth over time; ``usual`` without any."""
     # In each row, the weighted mean of the shifts of the feet on the ground. The usual translation
     # takes part with a small weight: it decides in flight and hardly counts beside a planted foot,
@@ -658,7 +659,7 @@ def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) 
     return mean
 
 
-def _shake(plan: FootPlan, shifts: list[Floats]) -> Floats:
+def _shake(plan: _FootPlan, shifts: list[Floats]) -> Floats:
     """Return the quick translation (N, 3) that planted feet share: noise of the source's root."""
     # This noise moves body and feet alike: if the feet stay in place and the body does not follow
     # them, it moves the knees. Noise of one leg must not move the others.
@@ -704,3 +705,19 @@ def _knee_accelerations(
 def _acceleration_ratio(before: Floats, after: Floats) -> float:
     """Return the largest ratio of accelerations, (L,) each; knees at rest do not count."""
     return float((after / np.maximum(before, _STILL)).max(initial=0.0))
+
+
+def lock_feet(
+    figure: Figure, clip: SampledClip, up: int, way: float = 1.0
+) -> tuple[SampledClip, PlantedFeet]:
+    """Hold feet still while they stand, as far as legs reach; ``way``: -1 if ``up`` points down."""
+    clip = in_frame_order(clip)
+    legs = legs_of(figure.require_skeleton())
+    rest_up = axis_vector(figure.up)
+    body = body_legs(figure, clip, legs, rest_up) if legs and clip.n_rows else None
+    if body is None or body.size <= 0.0:
+        return clip, PlantedFeet()
+    planted, changes = plant(clip, body, body.worlds(clip), way * np.eye(3)[up])
+    if not changes.is_better:  # the motion is unchanged
+        changes = replace(changes, after=changes.before, lowered=0.0)
+    return planted, changes
