@@ -139,7 +139,23 @@ def _figure(
     )
     pieces = pieces_of(file, members.meshes, bindings)
     matrices = inverse_binds(bindings)
-    _check_positions(joints, worlds, matrices, pieces, source)
+    # Refuse vertices that the rest pose moves out of reach.
+    with np.errstate(over="ignore", invalid="ignore"):
+        palette = np.abs(worlds @ matrices[: len(worlds)]).max(axis=(1, 2), initial=0.0)
+    palette = np.concatenate([palette, np.zeros(len(matrices) - len(worlds))])
+    for piece in pieces:
+        with np.errstate(over="ignore", invalid="ignore"):
+            reach = np.abs(piece.baked).max() * np.abs(piece.primitive.positions).max(initial=1.0)
+            far = ~(reach * palette[piece.influences.joints] <= REACH)
+        if far.any():
+            joint = int(piece.influences.joints[far.argmax()])
+            name = joints.names[joint]
+            raise source.fault(
+                "F003.bind-reach: joint {joint}: expected vertices within ±{limit} in the rest "
+                "pose, found larger ones",
+                joint=quoted(name),
+                limit=rounded(REACH, 2),
+            )
     columns = shape_columns(file, members.meshes, readers)
     record = _record_of(file, joints, members.meshes, columns, pieces)
     figure = Figure(
@@ -175,28 +191,6 @@ def _worlds(joints: Joints, source: Source) -> Floats:
             found=rounded(found),
         )
     return worlds
-
-
-def _check_positions(
-    joints: Joints, worlds: Floats, inverse_bind: Floats, pieces: list[Piece], source: Source
-) -> None:
-    """Refuse vertices that the rest pose moves out of reach."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        palette = np.abs(worlds @ inverse_bind[: len(worlds)]).max(axis=(1, 2), initial=0.0)
-    palette = np.concatenate([palette, np.zeros(len(inverse_bind) - len(worlds))])
-    for piece in pieces:
-        with np.errstate(over="ignore", invalid="ignore"):
-            reach = np.abs(piece.baked).max() * np.abs(piece.primitive.positions).max(initial=1.0)
-            far = ~(reach * palette[piece.influences.joints] <= REACH)
-        if far.any():
-            joint = int(piece.influences.joints[far.argmax()])
-            name = joints.names[joint]
-            raise source.fault(
-                "F003.bind-reach: joint {joint}: expected vertices within ±{limit} in the rest "
-                "pose, found larger ones",
-                joint=quoted(name),
-                limit=rounded(REACH, 2),
-            )
 
 
 def _record_of(

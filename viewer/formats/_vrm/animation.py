@@ -12,8 +12,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from viewer.diagnostics import wording
@@ -27,7 +25,7 @@ from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import path_to_root
-from viewer.rig.motion.evaluation import Frames, frames_of
+from viewer.rig.motion.evaluation import frames_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing, frame_at, frame_times
@@ -57,7 +55,13 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     if part(told, "lookAt") is not None:
         source.warn("F007.vrma-look: gaze direction is not shown", f"{pointer}/lookAt")
     (read, *_) = read_once(file.animations)
-    figure, clip = _moving(file, read, _with_ancestors(file, humanoid.values()), humanoid)
+    # The bones and the nodes above them, parents first.
+    depths: dict[int, int] = {}
+    for node in humanoid.values():
+        path = path_to_root(file.tree.parents, node)
+        depths.update({each: len(path) - place for place, each in enumerate(path)})
+    nodes = sorted(depths, key=lambda node: (depths[node], node))
+    figure, clip = _moving(file, read, nodes, humanoid)
     if not clip.channels:
         raise source.fault(wording.VRMA_ANIMATION)
     rate = clip.frame_rate
@@ -80,7 +84,12 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     frames = frames_of(figure, clip, times)
     return SkeletonMotion(
         figure,
-        _sampled(clip.name or file.name, rate, frames),
+        SampledClip(
+            clip.name or file.name,
+            Timing(rate, np.arange(frames.n_frames, dtype=np.int32)),
+            frames.rotations,
+            frames.translations if frames.translations.any() else None,
+        ),
         expressions=_weights(file, told, read, times),
     )
 
@@ -101,21 +110,6 @@ def _moving(
     first = file.animations[0]
     clip = found[0].clip() if found else TransformClip(first.name, (), first.start, first.end)
     return figure, clip
-
-
-def _with_ancestors(file: NodeFile, nodes: Iterable[int]) -> list[int]:
-    """Return nodes and their ancestors, parents first."""
-    depths: dict[int, int] = {}
-    for node in nodes:
-        path = path_to_root(file.tree.parents, node)
-        depths.update({each: len(path) - place for place, each in enumerate(path)})
-    return sorted(depths, key=lambda node: (depths[node], node))
-
-
-def _sampled(name: str, rate: float, frames: Frames) -> SampledClip:
-    timing = Timing(rate, np.arange(frames.n_frames, dtype=np.int32))
-    translations = frames.translations if frames.translations.any() else None
-    return SampledClip(name, timing, frames.rotations, translations)
 
 
 def _weights(file: NodeFile, told: object, read: Reader, times: Floats) -> dict[str, Floats]:

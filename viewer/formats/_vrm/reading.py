@@ -24,7 +24,6 @@ from viewer.phrases import listed, quoted
 from viewer.rig.arrays import Floats
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
 from viewer.rig.mesh import PartView
-from viewer.rig.springs.springs import Springs
 
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
 
@@ -130,8 +129,24 @@ def _expressions(
         binds = _binds(source, file, each.told, pointer)
         changes, lost = modern_binds(each.told, len(file.materials))
         undrawn += [f"{each.name}: {one}" for one in (*each.undrawn, *lost)]
-        if binds or changes:
-            found.append(replace(_expression(each, binds), materials=tuple(changes)))
+        if not binds and not changes:
+            continue
+        effects = {kind: each.told.get(key) for kind, key in _OVERRIDES.items()}
+        known = {
+            kind: effect if effect in OVERRIDES else "none" for kind, effect in effects.items()
+        }
+        kinds = (kind for kind, names in PROCEDURAL.items() if each.name in names)
+        found.append(
+            NodeExpression(
+                each.name,
+                binds,
+                is_binary=each.told.get("isBinary") is True,
+                kind=next(kinds, ""),
+                overrides=known,
+                preset=each.preset,
+                materials=tuple(changes),
+            )
+        )
     if undrawn:
         source.warn(
             "F007.vrm-materials: material changes by expressions have no effect: {names}",
@@ -149,8 +164,9 @@ def _binds(
     for each in list_in(told, "morphTargetBinds"):
         node, index, told_weight = (part(each, name) for name in ("node", "index", "weight"))
         weight = None if told_weight is None else value_of(told_weight, 0.0)
-        is_node = is_index(node, file.tree.n_nodes)
-        if not is_node or not _has_target(file, node, index) or weight is None:
+        mesh = int(file.tree.meshes[node]) if is_index(node, file.tree.n_nodes) else -1
+        n_targets = len(file.meshes[mesh].target_names) if mesh >= 0 else 0
+        if not is_index(index, n_targets) or weight is None:
             source.warn(
                 "G006.bind: expected a morph target and its weight, found target {found}: ignored",
                 pointer,
@@ -159,29 +175,6 @@ def _binds(
             continue
         binds.append((node, index, weight))
     return tuple(binds)
-
-
-def _has_target(file: NodeFile, node: int, index: object) -> bool:
-    mesh = int(file.tree.meshes[node])
-    return mesh >= 0 and is_index(index, len(file.meshes[mesh].target_names))
-
-
-def _expression(
-    given: NamedExpression, binds: tuple[tuple[int, int, float], ...]
-) -> NodeExpression:
-    overrides = {}
-    for kind, key in _OVERRIDES.items():
-        effect = given.told.get(key, "none")
-        overrides[kind] = effect if effect in OVERRIDES else "none"
-    kinds = [kind for kind, names in PROCEDURAL.items() if given.name in names]
-    return NodeExpression(
-        given.name,
-        binds,
-        is_binary=given.told.get("isBinary") is True,
-        kind=kinds[0] if kinds else "",
-        overrides=overrides,
-        preset=given.preset,
-    )
 
 
 def _read_part_views(
@@ -194,7 +187,13 @@ def _read_part_views(
     for index, each in enumerate(annotations):
         view = part(each, "firstPersonFlag" if version == 0 else "type")
         known = _VIEWS.get(view.lower()) if isinstance(view, str) else None
-        nodes = _annotated_nodes(file, each, version)
+        if version == 0:
+            mesh = part(each, "mesh")
+            nodes = file.tree.with_mesh(mesh) if is_index(mesh, len(file.meshes)) else []
+        else:
+            node = part(each, "node")
+            has_mesh = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0
+            nodes = [node] if has_mesh else []
         if known is None or not nodes:
             at = f"{pointer}/firstPerson/meshAnnotations/{index}"
             source.warn(
@@ -206,17 +205,6 @@ def _read_part_views(
             continue
         found.update(dict.fromkeys(nodes, known))
     return found
-
-
-def _annotated_nodes(file: NodeFile, each: object, version: int) -> list[int]:
-    """Return the nodes whose mesh is annotated."""
-    if version == 0:
-        mesh = part(each, "mesh")
-        has_mesh = is_index(mesh, len(file.meshes))
-        return file.tree.with_mesh(mesh) if has_mesh else []
-    node = part(each, "node")
-    has_node = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0
-    return [node] if has_node else []
 
 
 def _facts(told: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
@@ -249,18 +237,15 @@ def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
         "constraints",
         ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
     ))  # fmt: skip
-    if file.springs is not None:
-        facts.append(("springs", _spring_counts(file.springs)))
+    if (springs := file.springs) is not None:
+        counts = (
+            (springs.n_chains, "chain"),
+            (springs.n_joints, "joint"),
+            (springs.colliders.n_colliders, "collider"),
+        )
+        words = (f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count)
+        facts.append(("springs", ", ".join(words)))
     return tuple((heading, _shortened(text)) for heading, text in facts if text)
-
-
-def _spring_counts(springs: Springs) -> str:
-    parts = (
-        (springs.n_chains, "chain"),
-        (springs.n_joints, "joint"),
-        (springs.colliders.n_colliders, "collider"),
-    )
-    return ", ".join(f"{count} {word}{'s' * (count != 1)}" for count, word in parts if count)
 
 
 def _shortened(text: str) -> str:

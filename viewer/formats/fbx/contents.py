@@ -83,7 +83,16 @@ def node_file(source: Source) -> NodeFile:
     _check_end(source, told["version"])
     _check_arrays(source, arrays, partial(_place, told))
     _check_values(source, told, "")
-    _check_indices(source, arrays, told)
+    # Refuse skins and blend shapes of vertices that their mesh does not have.
+    for name, array in arrays.items():
+        if not name.endswith(".vertices") or array.dtype == np.float64:
+            continue
+        last = len(arrays[f"{name.split('.')[0]}.vertices"]) - 1
+        wrong = (array < 0) | (array > last)
+        if wrong.any():
+            place = _place(told, name, int(wrong.argmax()))
+            found = float(array[wrong.argmax()])
+            raise source.fault(wording.VERTEX_RANGE, item=place, last=last, found=found)
     _say_unused(source, told)
     n_joints = len(told["names"])
     cameras, of_camera = _add_cameras(told, arrays)
@@ -259,19 +268,6 @@ def _check_values(source: Source, told: object, path: str) -> None:
     elif isinstance(told, list):
         for value in told:
             _check_values(source, value, path)
-
-
-def _check_indices(source: Source, arrays: Arrays, told: Json) -> None:
-    """Refuse skins and blend shapes of vertices that their mesh does not have."""
-    for name, array in arrays.items():
-        if not name.endswith(".vertices") or array.dtype == np.float64:
-            continue
-        last = len(arrays[f"{name.split('.')[0]}.vertices"]) - 1
-        wrong = (array < 0) | (array > last)
-        if wrong.any():
-            place = _place(told, name, int(wrong.argmax()))
-            found = float(array[wrong.argmax()])
-            raise source.fault(wording.VERTEX_RANGE, item=place, last=last, found=found)
 
 
 def _place(told: Json, name: str, row: int) -> Phrase:
