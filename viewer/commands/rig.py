@@ -173,7 +173,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets(files_of(output), inputs, arguments.force)
     target = _target(arguments.files, inputs)
     if output is not None and output.suffix.lower() == ".vrm":
-        from viewer.export.vrm.meta import checked_meta
+        from viewer.export.vrm import checked_meta
 
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
     if arguments.template_frame is not None:

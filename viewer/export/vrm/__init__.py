@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, wording
+from viewer.errors import RigError
 from viewer.export import gltf
 from viewer.export._exporter import Part, Selection
 from viewer.export._options import ExportOptions, VrmMeta
@@ -26,14 +27,13 @@ from viewer.export.gltf.document import Document, text_of
 from viewer.export.vrm.canonical_pose import facing_front, in_t_pose, standing
 from viewer.export.vrm.humanoid import human_bones
 from viewer.export.vrm.kept_extensions import Maps, kept_extensions, kept_toon
-from viewer.export.vrm.meta import changed_meta, checked_meta
 from viewer.export.vrm.new_extension import made_character
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.checks import MOST_WEIGHT, is_weight, weighted_binds
 from viewer.formats._vrm.parts import list_in, part, value_of
 from viewer.formats._vrm.springs import EXTENDED
 from viewer.formats._vrm.upgrade import LICENCE
-from viewer.phrases import agree, all_of, counted, listed, rounded
+from viewer.phrases import Remedy, agree, all_of, counted, listed, rounded
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
@@ -270,7 +270,7 @@ def _add_kept(
     extensions = kept_extensions(maps)
     _keep_shading(record, document, maps)
     data = extensions["VRMC_vrm"]
-    data["meta"] = changed_meta(data["meta"], meta)
+    data["meta"] = _changed_meta(data["meta"], meta)
     if not data["meta"].get("name"):
         data["meta"]["name"] = text_of(body.figure.name)
     _add(document, body, built, extensions)
@@ -394,3 +394,41 @@ def _item(each: Constraint, joints: list[int]) -> Json:
     elif each.kind == "aim":
         item["aimAxis"] = ("Positive" if each.axis[axis] > 0.0 else "Negative") + _AXES[axis]
     return item
+
+
+def checked_meta(meta: VrmMeta, figure: str) -> Json:
+    """Return meta data for a new VRM 1.0; without authors or a licence it raises RigError."""
+    if not any(meta.authors) or not meta.licence:
+        raise RigError(
+            Diagnostic(
+                "F004.vrm-meta: {figure} cannot be written as VRM without author and licence: "
+                "{remedy}",
+                values={
+                    "figure": figure,
+                    "licence": LICENCE,
+                    "remedy": Remedy(
+                        "use viewer convert",
+                        f"add --vrm-author NAME and --vrm-licence URL, such as {LICENCE} (the "
+                        f"strictest permissions)",
+                    ),
+                },
+            )
+        )
+    return {
+        "name": text_of(meta.name or figure),
+        "authors": [text_of(author) for author in meta.authors if author],
+        "licenseUrl": text_of(meta.licence),
+    }
+
+
+def _changed_meta(data: Json, meta: VrmMeta) -> Json:
+    """Return a file's meta data with the requested changes; empty ones keep those of the file."""
+    changed = dict(data)
+    if meta.name:
+        changed["name"] = text_of(meta.name)
+    listed = [text_of(author) for author in meta.authors if author]
+    if listed:
+        changed["authors"] = listed
+    if meta.licence:
+        changed["licenseUrl"] = text_of(meta.licence)
+    return changed
