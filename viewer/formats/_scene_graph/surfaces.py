@@ -7,8 +7,9 @@ the file.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -159,6 +160,8 @@ def flat_shaded(positions: Floats, triangles: Ints) -> _Shading:
     normals /= np.where(doubled == 0.0, 1.0, doubled)[:, None]
     cells = np.rint(normals * _CELLS).astype(np.int64) + _CELLS
     side = 2 * _CELLS + 1
+    # Faces with normals in the same of side^3 cells count as coplanar. A vertex and the cell of a
+    # face at it make one number, and each distinct number becomes a vertex.
     directions = (cells[:, 0] * side + cells[:, 1]) * side + cells[:, 2]
     corners = triangles.ravel().astype(np.int64)
     pairs = corners * side**3 + np.repeat(directions, 3)
@@ -187,13 +190,10 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     counts = [len(piece.triangles) for piece in pieces]
     used = used_materials(pieces)
     slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
-    count = max(len(piece.primitive.uvs) for piece in pieces)
-
-    def of(index: int) -> Callable[[Primitive], Floats | None]:
-        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
-
-    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
+    coordinates = zip_longest(*(piece.primitive.uvs for piece in pieces))
+    sets = (_filled(pieces, given, np.zeros(2)) for given in coordinates)
     uvs = tuple(values for values in sets if values is not None)
+    views: tuple[PartView, ...] = tuple(file.part_views.get(node, "auto") for node in nodes)
     return Mesh(
         positions=np.concatenate([_positions(piece) for piece in pieces]),
         normals=np.concatenate(
@@ -202,24 +202,18 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
         triangles=triangles.astype(np.int32),
         uvs=uvs[0] if uvs else None,
         other_uvs=uvs[1:],
-        colors=_filled(pieces, lambda primitive: primitive.colors, np.ones(4)),
+        colors=_filled(pieces, [piece.primitive.colors for piece in pieces], np.ones(4)),
         materials=tuple(file.materials[material] for material in used),
         triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
         parts=tuple(part_name(file, node) for node in nodes),
         triangle_parts=np.repeat([piece.part for piece in pieces], counts),
-        part_views=_part_views(file, nodes),
+        part_views=views if any(node in file.part_views for node in nodes) else (),
     )
 
 
 def used_materials(pieces: list[Piece]) -> list[int]:
     """Return the materials of a figure, as indices into the file's materials."""
     return sorted({piece.primitive.material for piece in pieces} - {-1})
-
-
-def _part_views(file: NodeFile, nodes: list[int]) -> tuple[PartView, ...]:
-    if not any(node in file.part_views for node in nodes):
-        return ()
-    return tuple(file.part_views.get(node, "auto") for node in nodes)
 
 
 def part_name(file: NodeFile, node: int) -> str:
@@ -269,11 +263,8 @@ def _tangents(piece: Piece) -> Floats | None:
     return None if stored is None else moved_tangents(stored[piece.sources], piece.baked[:3, :3])
 
 
-def _filled(
-    pieces: list[Piece], values_of: Callable[[Primitive], Floats | None], neutral: Floats
-) -> Floats | None:
-    """Return values per vertex, neutral for primitives without any; None if all lack them."""
-    given = [values_of(piece.primitive) for piece in pieces]
+def _filled(pieces: list[Piece], given: Sequence[Floats | None], neutral: Floats) -> Floats | None:
+    """Return the values of primitives per vertex, neutral where None; None if all lack them."""
     if all(values is None for values in given):
         return None
     rows = [
