@@ -33,7 +33,7 @@ from viewer.rig.file_record import Json
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.evaluation import Frames, frames_of, joint_positions, world_frames
+from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.scene import figure_pose
@@ -209,7 +209,7 @@ def _losses(
     assert isinstance(motion, SkeletonMotion)
     rate = motion.clip.timing.frame_rate
     again = frames_of(motion.figure, motion.clip, np.arange(frames.n_frames) / rate)
-    found = joint_positions(motion.figure, again) / METRES.get(figure.unit, 1.0)
+    found = world_frames(motion.figure, again)[..., :3, 3] / METRES.get(figure.unit, 1.0)
     found = found @ _axes(figure, world_up, bones)
     joints = [bones[name] for name in motion.figure.require_skeleton().names]
     there = np.flatnonzero(animation.frames.present)

@@ -23,7 +23,6 @@ from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
-    joint_positions,
     pose_of,
     world_frames,
 )
@@ -93,7 +92,7 @@ def figure_side(
     def poses(rows: Rows) -> Poses:
         part = frames_between(frames, rows)
         if body is None and figure.skeleton is not None:
-            return bare_poses(joint_positions(figure, part), part)
+            return bare_poses(world_frames(figure, part)[..., :3, 3], part)
         shifts = part.figure_translations
         world = np.zeros((len(rows), 0, 4, 4))
         if figure.skeleton is not None:

@@ -43,7 +43,6 @@ from viewer.rig.motion.evaluation import (
     Frames,
     frames_between,
     frames_of,
-    joint_positions,
     rest_translations_of,
     world_frames,
 )
@@ -113,7 +112,8 @@ class FileLosses:
         def poses(rows: Rows) -> Poses:
             again = frames_of(read, clip, rows / clip.timing.frame_rate)
             if body is None:
-                places = joint_positions(read, again)[:, order] @ space.world / space.factor
+                found = world_frames(read, again)[:, order][..., :3, 3]
+                places = found @ space.world / space.factor
                 return bare_poses(places, frames_between(frames, rows))
             found = world_frames(read, again)[:, order]
             world = affine_matrices(
