@@ -67,31 +67,25 @@ def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
     joints = Joints()
     parents = tree.parents.tolist()
     for node in nodes:
-        parent = joints.carrier.get(parents[node], -1)
+        parent, below = joints.carrier.get(parents[node], -1), None
+        translation, rotation = tree.translations[node], tree.rotations[node]
+        scales = tree.scales[node]
         if node in tree.matrices:
-            matrix = tree.matrices[node]
             # M = U S V^T shears, so it becomes T R(U) S(S) and, below it, R(V^T).
-            left, scales, right = sheared(matrix[:3, :3])
+            translation = tree.matrices[node][:3, 3]
+            left, scales, right = sheared(tree.matrices[node][:3, :3])
             rotation, below = matrix_to_quaternion(np.stack([left, right]))
-            own = joints.add(node, tree.names[node], parent, matrix[:3, 3], rotation, scales)
-            joints.own[node] = own
-            joints.carrier[node] = joints.add_auxiliary(own, below)
-            continue
-        joint = joints.add(
-            node,
-            tree.names[node],
-            parent,
-            tree.translations[node],
-            tree.rotations[node],
-            tree.scales[node],
-        )
-        joints.own[node] = joints.carrier[node] = joint
+        own = joints.add(node, tree.names[node], parent, translation, rotation, scales)
+        joints.own[node] = own
+        joints.carrier[node] = own if below is None else joints.add_auxiliary(own, below)
     return joints
 
 
 def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
     """Return rotations U, V^T and S (3,), U diag(S) V^T = M (3, 3); S has a minus if M reflects."""
     left, scales, right = np.linalg.svd(linear)
+    # U or V^T may be a reflection. The third column of U, or row of V^T, and the third factor
+    # change their signs together, which leaves the product as it is.
     if np.linalg.det(left) < 0.0:
         left[:, 2] *= -1.0
         scales[2] *= -1.0

@@ -89,32 +89,35 @@ def blend_shapes_of(
     for node, own in columns.items():
         for column in own.tolist():
             owners.setdefault(column, node)
-    targets: list[_Target] = []
+    short, full, weights = list[str](), list[str](), list[float]()
     for column, node in sorted(owners.items()):
         index = int(np.flatnonzero(columns[node] == column)[0])
         name = _mesh(file, node).target_names[index] or f"target {index}"
         part = part_name(file, node) or f"#{node}"
-        targets.append(_Target(name, f"{part}.{name}", float(_defaults(file, node)[index])))
-    counts = Counter(target.name for target in targets)
+        short.append(name)
+        full.append(f"{part}.{name}")
+        weights.append(float(_defaults(file, node)[index]))
+    counts, n_targets = Counter(short), len(short)
     count = sum(piece.n_vertices for piece in pieces)
-    mixed, sums = _expressions(file, columns, len(targets), slots)
-    shape = len(targets) + len(mixed), count, 3
+    mixed, sums = _expressions(file, columns, n_targets, slots)
+    shape = n_targets + len(mixed), count, 3
 
     def offsets(of_normals: bool) -> DeferredOffsets:
         of_all = _Offsets(columns, pieces, count, of_normals, sums)
         return DeferredOffsets(shape, of_all.dense, of_all.weighted)
 
     has_normals = any(piece.shading == "file" for piece in pieces)
-    names = (t.name if counts[t.name] == 1 else t.full_name for t in targets)
+    # A name that several parts have is prefixed by that of the part.
+    names = (a if counts[a] == 1 else b for a, b in zip(short, full, strict=True))
     return BlendShapes(
         names=(*names, *(each.name for each in mixed)),
         offsets=offsets(of_normals=False),
         groups=("morph",) * shape[0],
         # In glTF, a target without normals leaves them unchanged; flat normals follow the surface.
         normal_offsets=offsets(of_normals=True) if has_normals else None,
-        rest_weights=np.array([*(target.weight for target in targets), *(0.0 for _ in mixed)]),
-        rules=_rules(mixed, len(targets)) if mixed else None,
-        material_binds=_material_binds(mixed, len(targets), slots),
+        rest_weights=np.array(weights + [0.0] * len(mixed)),
+        rules=_rules(mixed, n_targets) if mixed else None,
+        material_binds=_material_binds(mixed, n_targets, slots),
     )
 
 
@@ -176,15 +179,6 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
         ),
         presets=tuple(each.preset for each in mixed),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Target:
-    """Name, name prefixed by its part's name, and default weight of a morph target."""
-
-    name: str
-    full_name: str
-    weight: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._scene_graph.content import (
     NodeCamera,
@@ -47,6 +46,7 @@ _BINDING_LAST_ROW = 1e-4
 
 _ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
 
+_NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
 
 
@@ -56,14 +56,15 @@ def read_tree(document: Document) -> NodeTree:
     for place in range(len(table)):
         if type(table.items[place]) is not dict:
             table[place]  # raises the error for an item that is not an object
-    parents, transforms = _parents(table), _transforms(table)
+    parents = _parents(table)
+    translations, rotations, scales, matrices = _transforms(table)
     return NodeTree(
         names=tuple(_names(table)),
         parents=parents,
-        translations=transforms.translations,
-        rotations=transforms.rotations,
-        scales=transforms.scales,
-        matrices=transforms.matrices,
+        translations=translations,
+        rotations=rotations,
+        scales=scales,
+        matrices=matrices,
         meshes=_members(document, "mesh", "meshes"),
         skins=_members(document, "skin", "skins"),
         cameras=_members(document, "camera", "cameras"),
@@ -148,30 +149,43 @@ def _check_cycles(table: Table, parents: Ints) -> None:
         parents[first] = -1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Transforms:
-    """Local transforms as in ``NodeTree``."""
-
-    translations: Floats
-    rotations: Floats
-    scales: Floats
-    matrices: dict[int, Floats]
-
-
-def _transforms(table: Table) -> _Transforms:
-    """Return the local transforms of all nodes; their matrices must be affine."""
+def _transforms(table: Table) -> tuple[Floats, Floats, Floats, dict[int, Floats]]:
+    """Return translations, rotations and scales, and matrices that shear, as in ``NodeTree``."""
     count = len(table)
     translations, scales = np.zeros((count, 3)), np.ones((count, 3))
-    rotations = np.zeros((count, 4))
-    rotations[:, 3] = 1.0
+    rotations = np.tile(_NO_ROTATION, (count, 1))
     for name, rows in (("translation", translations), ("scale", scales)):
         places, values = member_rows(table, name, 3)
         rows[places] = values
     places, values = member_rows(table, "rotation", 4)
     rotations[places] = _unit(table, places, values)
-    result = _Transforms(translations, rotations, scales, {})
-    _put_matrices(table, result)
-    return result
+    places, columns = member_rows(table, "matrix", 16)
+    if not len(places):
+        return translations, rotations, scales, {}
+    for place in places.tolist():
+        others = {"translation", "rotation", "scale"} & table.items[place].keys()
+        if others:
+            table[place].warn(
+                "G003.matrix-and: matrix used, {names} ignored",
+                "matrix",
+                names=listed(sorted(others)),
+            )
+    matrices = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+    odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _LAST_ROW).any(axis=1)
+    if odd.any():
+        first = int(odd.argmax())
+        row = " ".join(f"{value:g}" for value in matrices[first, 3])
+        raise table[int(places[first])].fault(
+            "F002.gltf-affine: expected 0 0 0 1 as the last row, found {found}", "matrix", found=row
+        )
+    turned, stretched, is_exact = _decomposed(matrices[:, :3, :3])
+    exact, left = places[is_exact], places[~is_exact]
+    translations[exact] = matrices[is_exact, :3, 3]
+    rotations[exact], scales[exact] = turned[is_exact], stretched[is_exact]
+    translations[left], rotations[left], scales[left] = 0.0, _NO_ROTATION, 1.0
+    sheared = matrices[~is_exact]
+    sheared[:, 3] = 0.0, 0.0, 0.0, 1.0
+    return translations, rotations, scales, dict(zip(left.tolist(), sheared, strict=True))
 
 
 def _unit(table: Table, places: Ints, rotations: Floats) -> Floats:
@@ -189,44 +203,8 @@ def _unit(table: Table, places: Ints, rotations: Floats) -> Floats:
             found=rounded(float(lengths[first]), 6),
         )
     is_zero = lengths < _TINY
-    rotations = np.where(is_zero[:, None], (0.0, 0.0, 0.0, 1.0), rotations)
+    rotations = np.where(is_zero[:, None], _NO_ROTATION, rotations)
     return rotations / np.where(is_zero, 1.0, lengths)[:, None]
-
-
-def _put_matrices(table: Table, result: _Transforms) -> None:
-    """Set the transforms of the nodes that have a matrix."""
-    places, columns = member_rows(table, "matrix", 16)
-    if not len(places):
-        return
-    _check_mixture(table, places)
-    matrices = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
-    odd = (np.abs(matrices[:, 3] - (0.0, 0.0, 0.0, 1.0)) > _LAST_ROW).any(axis=1)
-    if odd.any():
-        first = int(odd.argmax())
-        row = " ".join(f"{value:g}" for value in matrices[first, 3])
-        raise table[int(places[first])].fault(
-            "F002.gltf-affine: expected 0 0 0 1 as the last row, found {found}", "matrix", found=row
-        )
-    rotations, scales, is_exact = _decomposed(matrices[:, :3, :3])
-    exact = places[is_exact]
-    result.translations[exact] = matrices[is_exact, :3, 3]
-    result.rotations[exact] = rotations[is_exact]
-    result.scales[exact] = scales[is_exact]
-    for place, matrix in zip(places[~is_exact].tolist(), matrices[~is_exact], strict=True):
-        result.translations[place], result.scales[place] = 0.0, 1.0
-        result.rotations[place] = 0.0, 0.0, 0.0, 1.0
-        result.matrices[place] = np.vstack([matrix[:3], (0.0, 0.0, 0.0, 1.0)])
-
-
-def _check_mixture(table: Table, places: Ints) -> None:
-    for place in places.tolist():
-        others = {"translation", "rotation", "scale"} & table.items[place].keys()
-        if others:
-            table[place].warn(
-                "G003.matrix-and: matrix used, {names} ignored",
-                "matrix",
-                names=listed(sorted(others)),
-            )
 
 
 def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
