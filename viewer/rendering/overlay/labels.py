@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,7 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 
-# Number of labels in the first batch, and maximum of later batches.
-_FEWEST_IN_BATCH, _MOST_IN_BATCH = 256, 1024
+_BATCH = 512  # number of labels whose positions are compared with the placed labels at once
 _CELL_SIDE = 0.5  # side length of a cell in gaps, unless this gives too many cells
 # Maximum numbers of cells, above which a grid costs more than it saves.
 _CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000
@@ -46,8 +46,6 @@ _BESIDE_LINE = 0.75  # minimum distance of a leader line from other points, in g
 
 # Cells. Each subdivision of a pixel contains at most one dot.
 _SUBDIVISIONS = 4  # number of subdivisions of a pixel per axis
-_BLOCK = 4  # number of cells per axis of a block
-_DENSE = 8  # mean number of dots per block above which dots are split into layers
 _PAIRS = 1 << 18  # number of pairs of a rectangle and a dot per batch
 
 
@@ -83,40 +81,19 @@ def lay_out(
     """
     n_cells = min(_CELLS_PER_LABEL * max(len(order), 1), _MANY_CELLS)
     side = max(int(_CELL_SIDE * gap), math.ceil(math.sqrt(math.prod(picture) / n_cells)))
-    cells = Cells(picture, side)
-    dots, taken = Dots(cells, anchors[order]), _Taken(picture, gap)
-    chosen, corners = [np.zeros(0, np.int32)], [np.zeros((0, 2), np.int32)]
-    ends, has_line = [np.zeros((0, 2))], [np.zeros(0, np.bool_)]
-    for some in _portions(order):
+    dots, taken = Dots(Cells(picture, side), anchors[order]), _Taken(picture, gap)
+    nothing = np.zeros(0, np.int32), np.zeros((0, 2), np.int32), np.zeros((0, 2)), np.zeros(0, bool)
+    placed: list[tuple[NDArray[Any], ...]] = [nothing]
+    for start in range(0, len(order), _BATCH):
+        some = order[start : start + _BATCH]
         places = label_places(anchors[some], sizes[some], picture, gap)
         # Vectorized rejection of most positions that overlap others.
         may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
         places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
-        # Positions with a leader line need a clear path for it.
-        rows = np.flatnonzero(places.has_line)
-        led = places.take(rows)
-        pixels, are_part = line_pixels(led, gap)
-        is_closed = (taken.at(pixels) & are_part).any(axis=1)
-        is_closed |= crowded_lines(led, pixels, are_part, dots, gap)
-        places = places.take(np.delete(np.arange(len(places.labels)), rows[is_closed]))
         places = clear_places(places, dots, gap)
         found = places.take(_settle(places, taken, gap))
-        chosen.append(some[found.labels])
-        corners.append(found.low)
-        ends.append(found.ends)
-        has_line.append(found.has_line)
-    return LabelLayout(
-        np.concatenate(chosen), np.concatenate(corners), np.concatenate(ends),
-        np.concatenate(has_line),
-    )  # fmt: skip
-
-
-def _portions(order: Ints) -> Iterator[Ints]:
-    """Yield batches of growing size, as fewer positions remain free for later labels."""
-    first, count = 0, _FEWEST_IN_BATCH
-    while first < len(order):
-        yield order[first : first + count]
-        first, count = first + count, min(2 * count, _MOST_IN_BATCH)
+        placed.append((some[found.labels], found.low, found.ends, found.has_line))
+    return LabelLayout(*map(np.concatenate, zip(*placed, strict=True)))
 
 
 def _settle(places: LabelPlaces, taken: _Taken, gap: float) -> Ints:
@@ -198,16 +175,7 @@ class LabelPlaces:
 
     def take(self, rows: NDArray[np.integer[Any]]) -> LabelPlaces:
         """Return a selection of the positions."""
-        return LabelPlaces(
-            self.labels[rows],
-            self.ranks[rows],
-            self.anchors[rows],
-            self.low[rows],
-            self.high[rows],
-            self.ends[rows],
-            self.own[rows],
-            self.has_line[rows],
-        )
+        return LabelPlaces(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
 def label_places(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> LabelPlaces:
@@ -252,28 +220,11 @@ def line_pixels(places: LabelPlaces, gap: float) -> tuple[Ints, Bools]:
     return np.where(are_part[..., None], pixels, 0), are_part
 
 
-def crowded_lines(
-    places: LabelPlaces, pixels: Ints, are_part: Bools, dots: Dots, gap: float
-) -> Bools:
-    """Return a mask, (M,), of lines that certainly pass too close to other points."""
-    diagonal = math.sqrt(2.0) * dots.cells.side
-    if diagonal > _BESIDE_LINE * gap:
-        return np.zeros(len(pixels), dtype=np.bool_)
-    # A dot in a cell that the line crosses is closer to the line than the cell's diagonal. The
-    # start of the line is skipped, where the cells may contain its own point or coincident points.
-    across, down = np.moveaxis(np.abs(pixels + 0.5 - places.anchors[:, None]), 2, 0)
-    is_away = are_part & (np.maximum(across, down) > _ALIKE + dots.cells.side + 0.5)
-    return np.asarray((is_away & (dots.count_at(pixels) > 0)).any(axis=1))
-
-
 def clear_places(places: LabelPlaces, dots: Dots, gap: float) -> LabelPlaces:
     """Return the positions that are far enough from other points, best first for each label."""
-    clear = np.full(len(places.labels), np.inf)
-    for layer in range(dots.n_layers):
-        nearest, beside_line = _clearances(places, dots, layer, gap)
-        clear = np.minimum(clear, nearest)
-        rows = np.flatnonzero((clear >= _least(places, gap)) & (beside_line >= _BESIDE_LINE * gap))
-        places, clear = places.take(rows), clear[rows]
+    clear, beside_line = _clearances(places, dots, gap)
+    rows = np.flatnonzero((clear >= _least(places, gap)) & (beside_line >= _BESIDE_LINE * gap))
+    places, clear = places.take(rows), clear[rows]
     # Positions with plenty of room come first, then crowded ones, then those with leader lines.
     is_free = ~places.has_line & (clear >= _FREE * places.own)
     order = np.lexsort((places.ranks, places.has_line, ~is_free, places.labels))
@@ -285,13 +236,13 @@ def _least(places: LabelPlaces, gap: float) -> Floats:
     return _CLEARER * np.where(places.has_line, gap, places.own)
 
 
-def _clearances(places: LabelPlaces, dots: Dots, layer: int, gap: float) -> tuple[Floats, Floats]:
+def _clearances(places: LabelPlaces, dots: Dots, gap: float) -> tuple[Floats, Floats]:
     """Return distances of the nearest other points from positions and lines: (M,), inf if far."""
     reach = np.where(places.has_line, _CLEARER * gap, _FREE * places.own)[:, None]
     low = np.minimum(places.low - reach, places.anchors - _BESIDE_LINE * gap)
     high = np.maximum(places.high + reach, places.anchors + _BESIDE_LINE * gap)
     clear, beside_line = np.full((2, len(reach)), np.inf)
-    for owners, points in dots.pairs(low, high, layer):
+    for owners, points in dots.pairs(low, high):
         away = points - places.anchors[owners]
         others = np.flatnonzero(np.maximum(*np.abs(away).T) >= _ALIKE)
         owners, points, away = owners[others], points[others], away[others]
@@ -313,34 +264,16 @@ class Dots:
 
     def __init__(self, cells: Cells, points: Floats) -> None:
         self.cells = cells
-        points = points[_firsts(np.floor(points * _SUBDIVISIONS))]
+        # Complex numbers are sorted faster than rows.
+        quarters = np.floor(points * _SUBDIVISIONS).view(np.complex128)[:, 0]
+        points = points[np.unique(quarters, return_index=True)[1]]
         places = cells.of(points)
         numbers = places[:, 1] * np.int64(cells.shape[1]) + places[:, 0]
         counts = np.bincount(numbers, minlength=math.prod(cells.shape)).astype(np.int32)
-        self._counts = counts.reshape(cells.shape)
-        self._sums = summed(self._counts)
-        order = np.argsort(numbers, kind="stable")
-        levels = _levels(places)[order]
-        points, numbers = points[order], numbers[order]
-        self._layers = [
-            (points[levels == level], self._starts(numbers[levels == level]))
-            for level in range(int(levels.max(initial=0)) + 1)
-        ]
-
-    @property
-    def n_layers(self) -> int:
-        """Number of layers; the first layer's few dots suffice to reject most crowded positions."""
-        return len(self._layers)
-
-    def _starts(self, places: Ints) -> Ints:
-        """Return the index of each cell's first dot, followed by the number of dots."""
-        counts = np.bincount(places, minlength=math.prod(self.cells.shape))
-        return np.concatenate([[0], counts.cumsum()]).astype(np.int32)
-
-    def count_at(self, pixels: Ints) -> Ints:
-        """Return the number of dots in the cells of pixels within the image: (...,)."""
-        places = pixels // self.cells.side + 1
-        return self._counts[places[..., 1], places[..., 0]]
+        self._sums = summed(counts.reshape(cells.shape))
+        # The dots of each cell are consecutive; after the starts of all cells follows their number.
+        self._points = points[np.argsort(numbers, kind="stable")]
+        self._starts = np.concatenate([[0], counts.cumsum()]).astype(np.int32)
 
     def fewest_within(self, low: Floats, high: Floats) -> Ints:
         """Return lower bounds of the number of dots within rectangles: (M,)."""
@@ -350,21 +283,20 @@ class Dots:
         """Return upper bounds of the number of dots within rectangles: (M,)."""
         return sums_within(self._sums, *self.cells.touching(low, high))
 
-    def pairs(self, low: Floats, high: Floats, layer: int) -> Iterator[tuple[Ints, Floats]]:
+    def pairs(self, low: Floats, high: Floats) -> Iterator[tuple[Ints, Floats]]:
         """Yield batches of pairs of a rectangle, corners (M, 2), and a dot in a cell it touches."""
-        # The dots are those of one layer. Each batch has the indices of rectangles, (P,), and a
-        # point in or near each of these, (P, 2), pixels.
-        points, begins = self._layers[layer]
+        # Each batch has the indices of rectangles, (P,), and a point in or near each of these,
+        # (P, 2), pixels.
         first, after = self.cells.touching(low, high)
         owners, rows = spread(first[:, 1], after[:, 1] - first[:, 1])
         rows = rows * self.cells.shape[1]
-        starts = begins[rows + first[owners, 0]]
-        counts = begins[rows + after[owners, 0]] - starts
+        starts = self._starts[rows + first[owners, 0]]
+        counts = self._starts[rows + after[owners, 0]] - starts
         some = np.flatnonzero(counts)
         part = (counts[some].cumsum() - 1) // _PAIRS
         for ranges in np.split(some, np.flatnonzero(np.diff(part)) + 1):
             ranks, places = spread(starts[ranges], counts[ranges])
-            yield owners[ranges[ranks]], points[places]
+            yield owners[ranges[ranks]], self._points[places]
 
 
 class Cells:
@@ -409,24 +341,6 @@ def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
     low, high = first[..., 1] * width, after[..., 1] * width
     left, right = first[..., 0], after[..., 0]
     return flat[high + right] - flat[high + left] - flat[low + right] + flat[low + left]
-
-
-def _levels(places: Ints) -> Ints:
-    """Return layers of dots, (N,): 0 for one dot per block, 1 for one per cell, otherwise 2."""
-    firsts = _firsts(places // _BLOCK)
-    if len(places) < _DENSE * len(firsts):
-        return np.zeros(len(places), dtype=np.int32)
-    levels = np.full(len(places), 2, dtype=np.int32)
-    levels[_firsts(places)] = 1
-    levels[firsts] = 0
-    return levels
-
-
-def _firsts(rows: Floats | Ints) -> Ints:
-    """Return the indices of the first occurrence of each distinct row of two integers: (M,)."""
-    # Complex numbers are sorted faster than rows.
-    pairs = rows.astype(np.float64).view(np.complex128)[:, 0]
-    return np.unique(pairs, return_index=True)[1].astype(np.int32)
 
 
 def spread(starts: Ints, counts: Ints) -> tuple[Ints, Ints]:
