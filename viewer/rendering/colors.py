@@ -5,6 +5,7 @@ Two maps are our own; the others are those that other programs name.
 
 from __future__ import annotations
 
+import colorsys
 from functools import cache
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy as np
 from viewer.resources import resource
 from viewer.rig.arrays import Bytes, Floats, Ints
 from viewer.rig.srgb import decode_srgb, encode_srgb
+
+_GOLDEN = 0.618033988749895  # spacing of hues, which never repeat
 
 # Our own maps are perceptually uniform and colour-blind safe. The anchors are in OKLab (Ottosson
 # 2020): lightness rises linearly from violet through red to yellow, so the map works in greyscale
@@ -187,6 +190,23 @@ def _distances(linear: Floats) -> Floats:
 def part_palette(count: int) -> Bytes:
     """Return the colours that the body part shading uses: (count, 4)."""
     return _pixels(part_colors(count))
+
+
+def joint_colors(count: int) -> Floats:
+    """Return a pale colour for each joint: (J, 3), linear."""
+    return _spaced_hues(count, 0.58, 0.42, 0.72)
+
+
+def path_colors(count: int) -> Floats:
+    """Return a saturated colour for each path: (N, 3), sRGB."""
+    return _spaced_hues(count, 0.1, 0.85, 0.95)
+
+
+def _spaced_hues(count: int, first: float, saturation: float, value: float) -> Floats:
+    """Return colours whose hues are spaced by the golden ratio, so that neighbours differ."""
+    hues = (first + _GOLDEN * np.arange(count)) % 1.0
+    colors = [colorsys.hsv_to_rgb(hue, saturation, value) for hue in hues]
+    return np.array(colors).reshape(-1, 3)
 
 
 def part_colors(count: int) -> Floats:

@@ -8,10 +8,10 @@ from rendering.drawn_figures import arm, square
 from rendering.front_view import drawn, front_view, pixel
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.colors import path_colors
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import motion_path_pass
-from viewer.rendering.passes.motion_path_pass import path_colors
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip

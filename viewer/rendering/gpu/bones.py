@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.gpu.box_buffers import joint_colors
+from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
@@ -95,21 +95,13 @@ class _Part:
     def draw(self, program: moderngl.Program) -> None:
         """Draw all instances with the attributes that the program uses."""
         if self.count:
-            array = self._arrays.get(program, lambda: self._content(program))
+            content = [
+                (self._shape, "3f4 3f4 1f4", "in_corner", "in_normal", "in_tint"),
+                (self._links, "3i4/i", "in_link"),
+                (self._sizes, "4f4 3f4 3f4/i", "in_end", "in_width", "in_color"),
+            ]
+            array = self._arrays.get(program, lambda: content)
             array.render(moderngl.TRIANGLES, vertices=self.n_corners, instances=self.count)
-
-    def _content(self, program: moderngl.Program) -> list[Any]:
-        # Bytes of attributes that the compiler removed are skipped, four per number.
-        def kept(source: moderngl.Buffer, names: dict[str, str], suffix: str = "") -> Any:
-            layout = [f if name in program else f"{4 * int(f[0])}x" for name, f in names.items()]
-            found = [name for name in names if name in program]
-            return (source, " ".join(layout) + suffix, *found)
-
-        return [
-            kept(self._shape, {"in_corner": "3f4", "in_normal": "3f4", "in_tint": "1f4"}),
-            kept(self._links, {"in_link": "3i4"}, "/i"),
-            kept(self._sizes, {"in_end": "4f4", "in_width": "3f4", "in_color": "3f4"}, "/i"),
-        ]
 
     def release(self) -> None:
         """Free every buffer."""

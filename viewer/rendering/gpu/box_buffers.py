@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import colorsys
-from typing import Any
-
 import moderngl
 import numpy as np
 
+from viewer.rendering.colors import joint_colors
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.upload import buffer, matrix_texture, write_matrices
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.mesh import bounding_box
 
-_GOLDEN = 0.618033988749895
 _MANY = 1000  # minimum number of boxes for which coincident boxes are searched
-
-
-def joint_colors(n_joints: int) -> Floats:
-    """Return hues spaced by the golden ratio, so that neighbours differ: (J, 3), linear."""
-    hues = 0.58 + _GOLDEN * np.arange(n_joints)
-    return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.42, 0.72) for hue in hues])
 
 
 class BoxBuffers:
@@ -65,17 +56,13 @@ class BoxBuffers:
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """Return the instanced boxes for a program, with the attributes that it uses."""
-
-        def content() -> list[Any]:
-            found: list[Any] = [(self._cube, "3f4 12x", "in_corner")]
-            if "in_normal" in program:
-                found = [(self._cube, "3f4 3f4", "in_corner", "in_normal")]
-            found += [(self._low, "3f4/i", "in_low"), (self._high, "3f4/i", "in_high")]
-            if "in_color" in program:
-                found.append((self._colors, "3f4/i", "in_color"))
-            return found
-
-        return self._arrays.get(program, content)
+        content = [
+            (self._cube, "3f4 3f4", "in_corner", "in_normal"),
+            (self._low, "3f4/i", "in_low"),
+            (self._high, "3f4/i", "in_high"),
+            (self._colors, "3f4/i", "in_color"),
+        ]
+        return self._arrays.get(program, lambda: content)
 
     def release(self) -> None:
         """Free every buffer."""

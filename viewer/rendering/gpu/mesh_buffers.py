@@ -147,18 +147,15 @@ class MeshBuffers:
             self._skins[key] = self._owner.keep(buffers)
         return self._skins[key]
 
-    def attributes(self, program: moderngl.Program) -> list[tuple[moderngl.Buffer, str, str]]:
-        """Return the texture coordinates and colours that a program uses, for a vertex array."""
-        return [
-            (values, layout, name)
-            for values, layout, name in (
-                (self.uvs, "2f4", "in_uv"),
-                (self.other_uvs, "4f4", "in_other_uvs"),
-                (self.tints, "4f4", "in_tint"),
-                (self.colors, "3f4", "in_color"),
-            )
-            if values is not None and name in program
-        ]
+    def attributes(self) -> list[tuple[moderngl.Buffer, str, str]]:
+        """Return the texture coordinates and colours, for a vertex array."""
+        found = (
+            (self.uvs, "2f4", "in_uv"),
+            (self.other_uvs, "4f4", "in_other_uvs"),
+            (self.tints, "4f4", "in_tint"),
+            (self.colors, "3f4", "in_color"),
+        )
+        return [(rows, layout, name) for rows, layout, name in found if rows is not None]
 
     def lines_shown(self, hidden_parts: frozenset[int]) -> moderngl.Buffer:
         """Return 1 for every split vertex of a visible triangle, else 0, as float32."""

@@ -96,7 +96,7 @@ class PosedMesh:
         program = self.programs.feedback("skin", how.method, ("v_position", "v_normal"), affine)
         array = self._arrays.get(
             program,
-            lambda: self._rest.attributes(program, skin, attached),
+            lambda: self._rest.attributes(skin, attached),
             key=(id(skin), attached and id(self._rest.positions)),
         )
         values = {

@@ -99,17 +99,16 @@ class RestBuffers:
         return pose_weights(figure.correctives, figure.skeleton, pose)
 
     def attributes(
-        self, program: moderngl.Program, skin: SkinBuffers, attached: bool = True
+        self, skin: SkinBuffers, attached: bool = True
     ) -> list[tuple[moderngl.Buffer, str, str]]:
-        """Return the attributes of ``include/skinning.glsl`` that a program uses."""
+        """Return the attributes of ``include/skinning.glsl``."""
         rest = self if attached else self.mesh
-        found = [
+        return [
             (rest.positions, "3f4", "in_position"),
             (rest.normals, "3f4", "in_normal"),
             (skin.bindings, "4u4", "in_bindings"),
             (skin.fractions, "1f4", "in_dqs_fraction"),
         ]
-        return [row for row in found if row[2] in program]
 
     def use(self) -> None:
         """Bind the textures for summing correctives in the shader, if used."""

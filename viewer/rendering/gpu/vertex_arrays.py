@@ -30,8 +30,9 @@ class VertexArrays:
         # layouts and attribute names, is only asked for to create the array.
         key = (id(program), *key)
         if key not in self._arrays:
+            used = [_used(program, *source) for source in content()]
             self._arrays[key] = self._context.vertex_array(
-                program, list(content()), index_buffer=indices
+                program, [source for source in used if len(source) > 2], index_buffer=indices
             )
         return self._arrays[key]
 
@@ -40,6 +41,18 @@ class VertexArrays:
         for array in self._arrays.values():
             array.release()
         self._arrays.clear()
+
+
+def _used(
+    program: moderngl.Program, source: moderngl.Buffer, layout: str, *names: str
+) -> tuple[Any, ...]:
+    """Return a source with the attributes of a program, and the bytes of all others skipped."""
+    formats, per_instance = layout.removesuffix("/i").split(), layout.endswith("/i")
+    for index, name in enumerate(names):
+        if name not in program:  # the compiler removes what a shader does not use
+            formats[index] = f"{4 * int(formats[index][:-2] or 1)}x"  # all numbers have four bytes
+    kept = [name for name in names if name in program]
+    return source, " ".join(formats) + "/i" * per_instance, *kept
 
 
 class InstanceRows:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.phrases import printable
-from viewer.rendering.gpu.box_buffers import joint_colors
+from viewer.rendering.colors import joint_colors
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
 from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined

@@ -111,34 +111,36 @@ def legend_of(
 ) -> Legend:
     """Return a scalar quantity's legend, with title and unit from the first figure that has it."""
     if not having:
-        return _empty(name, skinning, figures)
+        # The legend of a quantity that no drawn figure has, with the reason.
+        missing = [missing_part(name, figure) for figure in figures]
+        hidden = [figure for figure, lacks in zip(figures, missing, strict=True) if not lacks]
+        if hidden:
+            return Legend(
+                quantity_title(name, hidden[0], skinning),
+                note="not available for the visible figures",
+            )
+        if missing[0] == "a selected joint":
+            return Legend(find_quantity(name).title, note="no joint is selected")
+        return Legend(menu_title(split_name(name)[0], skinning), note=f"no figure has {missing[0]}")
     title = quantity_title(name, having[0].figure, skinning)
     kind = find_quantity(name).kind
     if kind == "categorical":
         return Legend(title, entries=_entries(name, having))
     if kind == "discrete":
-        return _counts(title, having)
-    return _bar(name, title, having)
-
-
-def _empty(name: str, skinning: Skinning, figures: Sequence[Figure]) -> Legend:
-    """Return the legend of a quantity that no drawn figure has, with the reason."""
-    missing = [missing_part(name, figure) for figure in figures]
-    hidden = [figure for figure, lacks in zip(figures, missing, strict=True) if not lacks]
-    if hidden:
-        return Legend(
-            quantity_title(name, hidden[0], skinning), note="not available for the visible figures"
-        )
-    if missing[0] == "a selected joint":
-        return Legend(find_quantity(name).title, note="no joint is selected")
-    return Legend(menu_title(split_name(name)[0], skinning), note=f"no figure has {missing[0]}")
-
-
-def _bar(name: str, title: str, shown: Sequence[ColoredFigure]) -> Legend:
-    factor, unit = shown_unit(name, shown[0].figure)
-    look = shown[0].look
-    low = factor * min(float(one.numbers.min()) for one in shown)
-    high = factor * max(float(one.numbers.max()) for one in shown)
+        # The legend of a count: one block per number, starting at the lowest number present.
+        first = min(int(one.numbers.min()) for one in having)
+        colors = having[0].look.colors[first:]
+        step = -(-len(colors) // _MOST_COUNTS)
+        ticks = [
+            LegendTick((block + 0.5) / len(colors), str(first + block))
+            for block in range(len(colors))
+            if (first + block) % step == 0 or len(colors) == 1
+        ]
+        return Legend(title, "", colors, tuple(ticks))
+    factor, unit = shown_unit(name, having[0].figure)
+    look = having[0].look
+    low = factor * min(float(one.numbers.min()) for one in having)
+    high = factor * max(float(one.numbers.max()) for one in having)
     is_signed = find_quantity(name).kind == "diverging"
     ends = factor * look.ends[0], factor * look.ends[1]
     is_flat = low == high == 0.0
@@ -154,19 +156,6 @@ def _bar(name: str, title: str, shown: Sequence[ColoredFigure]) -> Legend:
         tuple(tenth / 10.0 for tenth in range(1, 10)) if look.isolines else (),
         "0 everywhere" if is_flat else span,
     )
-
-
-def _counts(title: str, shown: Sequence[ColoredFigure]) -> Legend:
-    """Return the legend of a count: one block per number, starting at the lowest number present."""
-    first = min(int(one.numbers.min()) for one in shown)
-    colors = shown[0].look.colors[first:]
-    step = -(-len(colors) // _MOST_COUNTS)
-    ticks = [
-        LegendTick((block + 0.5) / len(colors), str(first + block))
-        for block in range(len(colors))
-        if (first + block) % step == 0 or len(colors) == 1
-    ]
-    return Legend(title, "", colors, tuple(ticks))
 
 
 def _entries(name: str, shown: Sequence[ColoredFigure]) -> tuple[LegendEntry, ...]:

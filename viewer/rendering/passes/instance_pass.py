@@ -53,15 +53,16 @@ from viewer.rig.skinning import METHODS, Skinning
 FEWEST = 8
 """Minimum number of actors to draw as instances; see ``instance_groups``."""
 
-_PER_INSTANCE = (
-    ("in_model_x", 4),
-    ("in_model_y", 4),
-    ("in_model_z", 4),
-    ("in_actor_color", 3),
-    ("in_rest_shift", 3),
-    ("in_center", 3),
-)
-_FLOATS = sum(count for _, count in _PER_INSTANCE)
+_PER_INSTANCE = {
+    "in_model_x": 4,
+    "in_model_y": 4,
+    "in_model_z": 4,
+    "in_actor_color": 3,
+    "in_rest_shift": 3,
+    "in_center": 3,
+}
+_FLOATS = sum(_PER_INSTANCE.values())
+_LAYOUT = " ".join(f"{count}f4" for count in _PER_INSTANCE.values())
 
 
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
@@ -82,7 +83,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         if pose is None or not actor.figure.is_attached or not is_plain:
             continue
         is_mirrored = False
-        if options.cull or _has_single_sides(actor):
+        materials = actor.figure.require_mesh().materials
+        if options.cull or not all(material.double_sided for material in materials):
             if (pose.scales < 0.0).any():
                 continue
             sign = np.linalg.det(actor.placement[:3, :3]) * pose.figure_scale
@@ -99,11 +101,6 @@ def _has_own_look(actor: Actor) -> bool:
         return True
     has_binds = shapes is not None and shapes.material_binds is not None
     return has_binds and pose is not None and bool(pose.shape_weights.any())
-
-
-def _has_single_sides(actor: Actor) -> bool:
-    """Return whether the back faces of at least one material are not drawn."""
-    return any(not material.double_sided for material in actor.figure.require_mesh().materials)
 
 
 def draw_instances(
@@ -307,13 +304,8 @@ class InstanceBuffers:
         key = (id(listed), id(skin), id(self._rest.positions))
 
         def content() -> list[Any]:
-            found: list[Any] = self._rest.attributes(program, skin) + mesh.attributes(program)
-            # Skip the bytes of attributes that the compiler removed, four per number.
-            layout = " ".join(
-                f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
-            )
-            names = [name for name, _ in _PER_INSTANCE if name in program]
-            return [*found, (self._instances, f"{layout}/i", *names)]
+            own = self._instances, f"{_LAYOUT}/i", *_PER_INSTANCE
+            return [*self._rest.attributes(skin), *mesh.attributes(), own]
 
         index_buffer = None if indices is None else indices.indices
         return self._arrays.get(program, content, index_buffer, key)

@@ -215,11 +215,8 @@ class MeshPass:
         """Return the mesh's vertex array for a program, with the attributes that it uses."""
 
         def content() -> list[Any]:
-            found: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
-            if "in_normal" in program:
-                found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
-            found += mesh.mesh.attributes(program)
-            if "in_scalar" in program and mesh.scalars.values is not None:
+            found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal"), *mesh.mesh.attributes()]
+            if mesh.scalars.values is not None:
                 found.append((mesh.scalars.values, "f4", "in_scalar"))
             return found
 

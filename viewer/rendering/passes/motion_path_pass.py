@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import colorsys
-
 import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.rendering.colors import path_colors
 from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -23,7 +22,6 @@ from viewer.rig.scene import Actor, Motion
 
 _WIDTH = 2.5  # width of the lines, pixels
 _HIDDEN = 0.3  # opacity of hidden parts
-_GOLDEN = 0.618033988749895
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +30,6 @@ class Moment:
 
     now: float
     reach: float
-
-
-def path_colors(count: int) -> Floats:
-    """Return a saturated colour for each path: (N, 3), sRGB."""
-    hues = 0.1 + _GOLDEN * np.arange(count)
-    return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.85, 0.95) for hue in hues]).reshape(-1, 3)
 
 
 class MotionPathBuffers:

@@ -152,9 +152,8 @@ class PointBuffers:
         self, program: moderngl.Program, capsule: tuple[moderngl.Buffer, moderngl.Buffer]
     ) -> moderngl.VertexArray:
         """Return the instanced capsules for a program."""
-        layout = "3f4 3f4 f4 4f4/i" if "in_color" in program else "3f4 3f4 f4 16x/i"
-        names = [n for n in ("in_start", "in_end", "in_radius", "in_color") if n in program]
-        content = [(capsule[0], "4f4", "in_corner"), (self._rows, layout, *names)]
+        names = "in_start", "in_end", "in_radius", "in_color"
+        content = [(capsule[0], "4f4", "in_corner"), (self._rows, "3f4 3f4 f4 4f4/i", *names)]
         return self._arrays.get(program, lambda: content, capsule[1])
 
     def release(self) -> None:
