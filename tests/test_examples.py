@@ -127,8 +127,8 @@ def test_retargeted_hand_moves_on_a_circle(script):
 
 
 def test_retarget_takes_a_motion_and_a_character(script):
-    script("retarget_bvh")
-    script("retarget_bvh", "lift.bvh", resource("assets", "samples", "body.npz"))
+    samples = resource("assets", "samples")
+    script("retarget_bvh", samples / "lift.bvh", samples / "body.npz")
     assert script.text.count("\nframe") == 3
 
 
