@@ -10,17 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.transform import affine_matrices
 from viewer.rig.kinematics import (
     is_posed,
     joint_worlds,
     posed_skeleton,
-    skinning_matrices,
 )
 from viewer.rig.pose import Pose, PosedSkeleton, dof_rotations, local_transforms
-from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
 
@@ -53,14 +50,6 @@ def posed_worlds(
         if len(missing) == len(poses):
             return found
     return np.stack([posed_skeleton(skeleton, pose).world for pose in poses])
-
-
-def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
-    """Return skinning matrices M[a, j] = W[a, j] inverse(B[j]) (A, J, 4, 4) without placement."""
-    figure = shaped(figure, poses[0].shape_weights)
-    return skinning_matrices(
-        worlds(figure.require_skeleton(), poses), figure.require_skin().inverse_bind
-    )
 
 
 def placements(poses: Sequence[Pose]) -> Floats:
