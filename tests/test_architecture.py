@@ -101,8 +101,8 @@ HOMES = {
     "PIL": {
         "examples",
         "media/captioned_sheet.py",
-        "media/cell_labels.py",
         "media/image.py",
+        "media/picture_sinks.py",
         "media/thumbnails.py",
         "rendering/overlay/legend.py",
         "rendering/overlay/typeface.py",

@@ -95,20 +95,15 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
     command = import_module(f"viewer.commands.{name}")
-    _resume_collection()
+    if not gc.isenabled():  # suspended at start-up; imported modules are excluded
+        gc.freeze()
+        gc.enable()
     if getattr(parsed, "no_cache", False):
         from viewer.media.array_cache import without_cache
 
         with without_cache():
             return command.run(parsed)
     return command.run(parsed)
-
-
-def _resume_collection() -> None:
-    """Resume garbage collection, if it was suspended at start-up; imported modules are excluded."""
-    if not gc.isenabled():
-        gc.freeze()
-        gc.enable()
 
 
 def protect_numbers(arguments: list[str]) -> list[str]:

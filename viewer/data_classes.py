@@ -74,7 +74,12 @@ def _add_methods(cls: type, frozen: bool, eq: bool) -> None:
         methods |= {"__eq__": _equal(_values(compared)), "__hash__": None}
         if frozen:
             hashed = [f.name for f in fields if (f.compare if f.hash is None else f.hash)]
-            methods["__hash__"] = _hash(_values(hashed))
+            values = _values(hashed)
+
+            def __hash__(self: object) -> int:  # noqa: N807
+                return hash(values(self))
+
+            methods["__hash__"] = __hash__
     if frozen:
         methods |= _refusals(cls, frozenset(field.name for field in fields))
         if "__slots__" in cls.__dict__:
@@ -176,13 +181,6 @@ def _equal(values: Callable[[object], Any]) -> Callable[[object, object], bool]:
         return bool(values(self) == values(other))
 
     return __eq__
-
-
-def _hash(values: Callable[[object], Any]) -> Callable[[object], int]:
-    def __hash__(self: object) -> int:  # noqa: N807
-        return hash(values(self))
-
-    return __hash__
 
 
 def _refusals(cls: Any, names: frozenset[str]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, Self
 
 from viewer.diagnostics.diagnostic import Diagnostic
 from viewer.phrases import printable
@@ -51,6 +52,13 @@ class ViewerError(Exception):
         # Names of joints and figures come from files and may contain any character, as may file
         # names.
         super().__init__(self._line(problem))
+
+    @classmethod
+    def fault(
+        cls, key: str, path: Path | None = None, line: int | None = None, **values: Any
+    ) -> Self:
+        """Return the error with a diagnostic, as ``Source.fault`` does for the file being read."""
+        return cls(Diagnostic(key, path, line, values=values))
 
     @property
     def cause(self) -> str | Diagnostic:

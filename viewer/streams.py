@@ -65,20 +65,16 @@ def standard_streams() -> Iterator[None]:
     before = sys.stderr
     with contextlib.ExitStack() as stack:
         if sys.stdin is None or sys.stdout is None or before is None:
-            _reserve(stack)
+            # Closed descriptors are opened, so that a library's output can't end up in a result.
+            while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
+                stack.callback(os.close, descriptor)
+            os.close(descriptor)
         messages = stack.enter_context(Path(os.devnull).open("w")) if before is None else before
         sys.stderr = cast("TextIO", _Messages(messages))
         try:
             yield
         finally:
             sys.stderr = before
-
-
-def _reserve(stack: contextlib.ExitStack) -> None:
-    """Open closed descriptors below 3, so that a library's output cannot end up in a result."""
-    while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
-        stack.callback(os.close, descriptor)
-    os.close(descriptor)
 
 
 class _Messages(io.TextIOBase):

@@ -5,8 +5,7 @@ import pytest
 from PIL import Image
 
 from viewer.errors import OutputError, ViewerError
-from viewer.media.cell_labels import write_label
-from viewer.media.picture_sinks import PictureSink, SheetSink, sheet_layout
+from viewer.media.picture_sinks import PictureSink, SheetSink, sheet_layout, write_label
 
 
 def plain(color, size=(40, 30)):

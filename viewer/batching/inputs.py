@@ -210,7 +210,14 @@ class _Search:
         visited, left = set[tuple[int, int]](), [top]
         while left:  # not recursive: folders may be thousands of levels deep
             folder = left.pop()
-            identity, entries = _listing(folder)
+            try:
+                status = os.stat(folder)
+                with os.scandir(folder) as found:
+                    entries = [entry for entry in found if not entry.name.startswith(".")]
+            except OSError as problem:
+                raise ViewerError(f"{printable(folder, 300)}: {problem.strerror}") from None
+            entries.sort(key=lambda entry: entry.name)
+            identity = status.st_dev, status.st_ino
             if identity in visited:
                 continue
             visited.add(identity)
@@ -227,17 +234,6 @@ class _Search:
                     self._n_skipped += 1
             # If two links lead to the same folder, the first one is followed.
             left += reversed(inner)
-
-
-def _listing(folder: str) -> tuple[tuple[int, int], list[os.DirEntry[str]]]:
-    """Return device and inode of a folder, and its entries that are not hidden, by name."""
-    try:
-        status = os.stat(folder)
-        with os.scandir(folder) as entries:
-            shown = [entry for entry in entries if not entry.name.startswith(".")]
-    except OSError as problem:
-        raise ViewerError(f"{printable(folder, 300)}: {problem.strerror}") from None
-    return (status.st_dev, status.st_ino), sorted(shown, key=lambda entry: entry.name)
 
 
 def _listed(name: str) -> list[str]:

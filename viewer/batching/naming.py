@@ -159,20 +159,6 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     """Check that no two items have the same output and no output is an input."""
     # Names that differ only in case refer to the same file on some systems, and results are likely
     # to be copied to one of these.
-    _check_clashes(items)
-    files = [file for item in items for file in item.files] + list(more_inputs)
-    real = _RealPaths()
-    inputs = {real.of(file) for file in files}
-    replaced = [
-        _shown(item.output) for item in items if item.output and real.of(item.output) in inputs
-    ]
-    if replaced:
-        verb = "is an input" if len(replaced) == 1 else "are inputs"
-        raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
-
-
-def _check_clashes(items: Sequence[Item]) -> None:
-    """Raise ViewerError if two items have the same output."""
     owners: dict[str, Item] = {}
     here = os.getcwd()
     clashes = []
@@ -191,6 +177,15 @@ def _check_clashes(items: Sequence[Item]) -> None:
             f"{counted(len(clashes), 'output')} would be written twice: {listed(clashes, 10)}; "
             f"use a template with {advice}"
         )
+    files = [file for item in items for file in item.files] + list(more_inputs)
+    real = _RealPaths()
+    inputs = {real.of(file) for file in files}
+    replaced = [
+        _shown(item.output) for item in items if item.output and real.of(item.output) in inputs
+    ]
+    if replaced:
+        verb = "is an input" if len(replaced) == 1 else "are inputs"
+        raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
 
 
 def check_summaries(

@@ -100,7 +100,27 @@ def _save_page(path: Path, job: str, results: Sequence[Result]) -> list[str]:
     body = [_tag("h1", _text_of(title)), _counts(results)]
     if job == "lint":
         body += _codes(results)
-    columns = _columns(job, shown)
+    # The columns that are not empty.
+    columns = [
+        _Column("Item", "name", lambda result: _text_of(result.item.name)),
+        _Column("Status", "", _status),
+    ]
+    if job == "lint":
+        columns.append(_Column("Findings", "", _findings))
+    if job == "info":
+        columns.append(_Column("Contents", "", _contents))
+    if job == "diff":
+        columns += [
+            _distance_column(group, shown)
+            for group in MEASURES
+            if any(worst_measure(result, group) is not None for result in shown)
+        ]
+    pictures = {result.item.index: _picture(result) for result in shown[:_MOST_THUMBNAILS]}
+    if any(pictures.values()):
+        columns.insert(0, _Column("Picture", "", lambda one: pictures.get(one.item.index, "")))
+    if any(_texts(job, result) for result in shown):
+        columns.append(_Column("Message", "message", lambda result: _message(job, result)))
+    columns.append(_Column("Time", "number", lambda result: f"{result.seconds:.2f} s"))
     body += [
         _tag("h2", "Items"),
         *(
@@ -142,7 +162,8 @@ def _counts(results: Sequence[Result]) -> str:
     """Return the numbers of items by status, and the number of findings."""
     by_status = Counter(result.status for result in results)
     parts: list[tuple[str, str, str]] = [
-        (str(count), status, _kind_of(status)) for status, count in by_status.most_common()
+        (str(count), status, "good" if status in _FINISHED else "error")
+        for status, count in by_status.most_common()
     ]
     findings = sum((Counter(result.values.get("counts", {})) for result in results), Counter())
     parts += [(str(findings[kind]), f"{kind}s", kind) for kind in _SEVERITIES if findings[kind]]
@@ -153,10 +174,6 @@ def _counts(results: Sequence[Result]) -> str:
         for number, name, kind in parts
     )
     return _tag("ul", "".join(items), "counts")
-
-
-def _kind_of(status: str) -> str:
-    return "good" if status in _FINISHED else "error"
 
 
 def _codes(results: Iterable[Result]) -> list[str]:
@@ -191,29 +208,6 @@ def _codes(results: Iterable[Result]) -> list[str]:
         _tag("h2", "Findings by code"),
         table(heads, ["", "", "", "number", "number", "message"], rows),
     ]
-
-
-def _columns(job: str, results: Sequence[Result]) -> list[_Column]:
-    """Return the columns that are not empty."""
-    columns = [
-        _Column("Item", "name", lambda result: _text_of(result.item.name)),
-        _Column("Status", "", _status),
-    ]
-    if job == "lint":
-        columns.append(_Column("Findings", "", _findings))
-    if job == "info":
-        columns.append(_Column("Contents", "", _contents))
-    if job == "diff":
-        columns += [
-            _distance_column(group, results) for group in MEASURES if _is_measured(group, results)
-        ]
-    pictures = {result.item.index: _picture(result) for result in results[:_MOST_THUMBNAILS]}
-    if any(pictures.values()):
-        columns.insert(0, _Column("Picture", "", lambda one: pictures.get(one.item.index, "")))
-    if any(_texts(job, result) for result in results):
-        columns.append(_Column("Message", "message", lambda result: _message(job, result)))
-    columns.append(_Column("Time", "number", lambda result: f"{result.seconds:.2f} s"))
-    return columns
 
 
 def _picture(result: Result) -> str:
@@ -254,10 +248,6 @@ def _figure_line(figure: Mapping[str, Cell]) -> str:
     numbers = [(figure[f"{noun}s"], noun) for noun in ("frame", "joint", "triangle")]
     found = [counted(number, noun) for number, noun in numbers if isinstance(number, int)]
     return ": ".join(filter(None, (str(figure["figure"]), ", ".join(found))))
-
-
-def _is_measured(group: str, results: Iterable[Result]) -> bool:
-    return any(worst_measure(result, group) is not None for result in results)
 
 
 def _distance_column(group: str, results: Sequence[Result]) -> _Column:

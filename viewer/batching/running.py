@@ -157,7 +157,9 @@ def _earlier(settings: Settings) -> dict[str, Result]:
     # A later result of another shard or with other options has replaced the same output.
     last = {one.item.output or one.item.name: one for one in sorted(found, key=_time)}
     return {
-        one.key: one for one in last.values() if one.status == "done" and one.key and _is_there(one)
+        one.key: one
+        for one in last.values()
+        if one.status == "done" and one.key and all(os.path.lexists(path) for path in one.outputs)
     }
 
 
@@ -178,11 +180,6 @@ def _has_content(path: Path) -> bool:
         return path.is_file() and path.stat().st_size > 0
     except OSError:
         return False
-
-
-def _is_there(result: Result) -> bool:
-    """Return whether all files that an item wrote still exist."""
-    return all(os.path.lexists(path) for path in result.outputs)
 
 
 def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:

@@ -95,24 +95,19 @@ def opened(
             return
         path /= inner
     elif path.exists() and _suffix_of(path.name) != ".zip":
-        values = {"suffix": path.suffix or "different"}
-        raise FormatError(
-            Diagnostic(
-                "F002.submission-kind: expected a folder or a zip archive, found a {suffix} file",
-                path,
-                values=values,
-            )
+        raise FormatError.fault(
+            "F002.submission-kind: expected a folder or a zip archive, found a {suffix} file",
+            path,
+            suffix=path.suffix or "different",
         )
-    place = _existing(temporary) or Path(tempfile.gettempdir())
+    place = Path(tempfile.gettempdir())
+    if temporary is not None and temporary.is_dir():
+        place = temporary
     prefix = new_prefix(place, "viewer-submission")
     with tempfile.TemporaryDirectory(prefix=prefix, dir=place) as name:
         folder = Path(name)
         chosen, base = _unpack(path, folder, expected, alike)
         yield Submission(tuple(base / one for one in chosen), base)
-
-
-def _existing(folder: Path | None) -> Path | None:
-    return folder if folder is not None and folder.is_dir() else None
 
 
 def _names_in(folder: Path) -> list[str]:
@@ -121,8 +116,9 @@ def _names_in(folder: Path) -> list[str]:
     root = folder.resolve()
 
     def fail(problem: OSError) -> None:
-        values = {"reason": problem.strerror or str(problem)}
-        raise FormatError(Diagnostic("F001.submission: {reason}", folder, values=values))
+        raise FormatError.fault(
+            "F001.submission: {reason}", folder, reason=problem.strerror or str(problem)
+        )
 
     for place, folders, files in os.walk(folder, onerror=fail):
         inside = Path(place).relative_to(folder)
@@ -151,12 +147,10 @@ def _unpack(
             chosen = choose([*archive.members], expected, alike, shown)
             archive.unpack(_needed(archive, chosen), base)
             return chosen, base
-    raise FormatError(
-        Diagnostic(
-            "F002.submission-nested: expected files to compare, found archives nested {depth} deep",
-            shown,
-            values={"depth": _DEEPEST},
-        )
+    raise FormatError.fault(
+        "F002.submission-nested: expected files to compare, found archives nested {depth} deep",
+        shown,
+        depth=_DEEPEST,
     )
 
 
@@ -280,12 +274,13 @@ def choose(
                     "{names}; "
                     "--expect names the files to use"
                 )
-            values = {
-                "expected": counted(count, "file"),
-                "pattern": pattern,
-                "names": listed(matching or _offered(names)),
-            }
-            raise FormatError(Diagnostic(key, path, values=values))
+            raise FormatError.fault(
+                key,
+                path,
+                expected=counted(count, "file"),
+                pattern=pattern,
+                names=listed(matching or _offered(names)),
+            )
         found += matching
     return tuple(dict.fromkeys(found))
 
@@ -318,31 +313,22 @@ def _is_table(name: str) -> bool:
 
 def _readable_folder(names: Sequence[str], path: Path) -> str:
     for is_wanted in (_choosing_is_rig_file, _is_table):
-        folders = _folders(names, is_wanted)
+        nearest = _nearest([name for name in names if is_wanted(name)])
+        folders = sorted({name.rpartition("/")[0] or "." for name in nearest})
         if len(folders) == 1:
             return folders[0]
         if folders:
-            raise FormatError(
-                Diagnostic(
-                    "F002.submission-folders: expected one folder with files to compare, found "
-                    "{names}; --expect names the files to use",
-                    path,
-                    values={"names": listed(folders)},
-                )
+            raise FormatError.fault(
+                "F002.submission-folders: expected one folder with files to compare, found "
+                "{names}; --expect names the files to use",
+                path,
+                names=listed(folders),
             )
-    raise FormatError(
-        Diagnostic(
-            "F002.submission-empty: expected files to compare, found {names}",
-            path,
-            values={"names": listed(sorted(names))},
-        )
+    raise FormatError.fault(
+        "F002.submission-empty: expected files to compare, found {names}",
+        path,
+        names=listed(sorted(names)),
     )
-
-
-def _folders(names: Sequence[str], is_wanted: Callable[[str], bool]) -> list[str]:
-    """Return the folders nearest to the top that directly contain wanted files."""
-    nearest = _nearest([name for name in names if is_wanted(name)])
-    return sorted({name.rpartition("/")[0] or "." for name in nearest})
 
 
 @dataclass(frozen=True, slots=True)
@@ -434,21 +420,18 @@ def _open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> It
             pairs = [(name, info) for name, info in pairs if not is_junk(name)]
             for name, count in Counter(name for name, _ in pairs).items():
                 if count > 1:
-                    values = {"item": printable(name, 80), "found": count}
-                    raise FormatError(
-                        Diagnostic(
-                            "F002.submission-twice: {item}: expected a single file with this "
-                            "path, found {found}",
-                            shown,
-                            values=values,
-                        )
+                    raise FormatError.fault(
+                        "F002.submission-twice: {item}: expected a single file with this "
+                        "path, found {found}",
+                        shown,
+                        item=printable(name, 80),
+                        found=count,
                     )
             yield _Archive(shown, storage.size, archive, dict(pairs))
     except _DAMAGE as problem:
         if _is_full(problem):
             raise
-        values = {"reason": _reason(problem)}
-        raise FormatError(Diagnostic(wording.SUBMISSION_ZIP, shown, values=values)) from None
+        raise FormatError.fault(wording.SUBMISSION_ZIP, shown, reason=_reason(problem)) from None
 
 
 def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
@@ -456,14 +439,11 @@ def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
     parts = PurePosixPath(info.filename.replace("\\", "/")).parts
     windows = PureWindowsPath(info.filename)
     if not parts or parts[0] == "/" or ".." in parts or windows.drive or windows.root:
-        values = {"item": printable(info.filename, 80)}
-        raise FormatError(
-            Diagnostic(
-                "F002.submission-outside: {item}: expected a path inside the archive, found one "
-                "that leads outside",
-                shown,
-                values=values,
-            )
+        raise FormatError.fault(
+            "F002.submission-outside: {item}: expected a path inside the archive, found one "
+            "that leads outside",
+            shown,
+            item=printable(info.filename, 80),
         )
     return "/".join(parts)
 

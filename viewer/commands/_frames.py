@@ -153,6 +153,12 @@ class Frames:
         """Whether a single frame or time is requested."""
         return self.frame is not None or self.time is not None
 
+    def check_range(self) -> None:
+        """Check that a range of frames and a single one are not both given."""
+        for option in ("frame", "time"):
+            if self.frames is not None and getattr(self, option) is not None:
+                raise ViewerError(f"--frames and --{option}: expected one of them, found both")
+
 
 def frames_of(arguments: argparse.Namespace) -> Frames:
     """Return the requested frames."""
@@ -167,8 +173,6 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
         step = ", every STEP-th of them" if "STEP" in many else ""
         add_settings(group, Frames, "frames", metavar=many, help=_RANGE.format(step=step))
     add_settings(group, Frames, "frame", "time", "fps")
-    # Commands with another name for the option use that name in messages.
-    parser.set_defaults(frame_option="--frame")
 
 
 def parse_range(text: str, option: str = "--frames", *, steps: bool = True) -> Range:

@@ -131,7 +131,14 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     name = printable(clip["name"]) or _NO_NAME
     head = f"  clip       {name}: {_seconds(start)} to {_seconds(end)} s, "
     if clip.get("kind") == "transforms":
-        return _transform_lines(head, clip)
+        paths = ", ".join(f"{path} {count}" for path, count in clip["paths"].items())
+        modes = ", ".join(f"{mode} {count}" for mode, count in clip["interpolation"].items())
+        lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
+        if clip["key_times"]:
+            first, last = map(_seconds, clip["key_times"])
+            rate = f"{clip['frame_rate']:g} fps" if clip["regular"] else "irregular times"
+            lines.append(f"    keys from {first} to {last} s at {rate}; {paths}; {modes}")
+        return lines
     if "kind" in clip:
         made_for = " ".join(filter(None, (clip["gender"], clip["model"])))
         body = [f"    body: {made_for}"] if made_for else []
@@ -143,17 +150,6 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
         lines.append(
             f"    keys from {_seconds(first)} to {_seconds(last)} s; extrapolation: {modes}"
         )
-    return lines
-
-
-def _transform_lines(head: str, clip: dict[str, Any]) -> list[str]:
-    paths = ", ".join(f"{path} {count}" for path, count in clip["paths"].items())
-    modes = ", ".join(f"{mode} {count}" for mode, count in clip["interpolation"].items())
-    lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
-    if clip["key_times"]:
-        first, last = map(_seconds, clip["key_times"])
-        rate = f"{clip['frame_rate']:g} fps" if clip["regular"] else "irregular times"
-        lines.append(f"    keys from {first} to {last} s at {rate}; {paths}; {modes}")
     return lines
 
 

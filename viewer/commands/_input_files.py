@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import FORMATS, Source, detect
 from viewer.phrases import all_of
@@ -29,12 +28,10 @@ def input_files(text: str) -> list[Path]:
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
     if not files:
         known = list(dict.fromkeys(suffixes))
-        raise FormatError(
-            Diagnostic(
-                "F002.no-rig: expected a folder with rig files ({suffixes}), found none",
-                path,
-                values={"suffixes": all_of(known)},
-            )
+        raise FormatError.fault(
+            "F002.no-rig: expected a folder with rig files ({suffixes}), found none",
+            path,
+            suffixes=all_of(known),
         )
     return files
 

@@ -92,7 +92,19 @@ def apply_pose(scene: Scene, pose: PoseOptions, frames: Frames) -> list[str | Di
     """Shape and pose a scene; return messages about what could not be applied exactly."""
     notes = apply_time(scene, frames)
     if pose.hands:
-        _apply_hands(scene, pose.hands)
+        from viewer.rig.hands import hand_vectors
+        from viewer.rig.posing.pose_vector import set_joint_rotations
+
+        handed = [actor for actor in scene.actors if actor.figure.hands and actor.pose is not None]
+        if not handed:
+            raise ViewerError("--hands: no file has hand components")
+        for actor in handed:
+            for hand in actor.figure.hands:
+                vectors = hand_vectors(hand, np.zeros(0), flat=pose.hands == "flat")
+                rotations = rotation_vector_to_matrix(vectors)
+                set_joint_rotations(
+                    actor.figure.require_skeleton(), actor.require_pose(), hand.joints, rotations
+                )
     if pose.pose:
         record, source = _pose(pose.pose)
         notes += [] if source is None else source.diagnostics.warnings
@@ -188,22 +200,6 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
         rows = range(min(len(values), figure.n_shapes))
         values[: len(rows)] -= [figure.blend_shapes.origin(row) for row in rows]
     return _apply_record("--shape", PoseRecord(shape=values), scene)
-
-
-def _apply_hands(scene: Scene, which: str) -> None:
-    from viewer.rig.hands import hand_vectors
-    from viewer.rig.posing.pose_vector import set_joint_rotations
-
-    handed = [actor for actor in scene.actors if actor.figure.hands and actor.pose is not None]
-    if not handed:
-        raise ViewerError("--hands: no file has hand components")
-    for actor in handed:
-        for hand in actor.figure.hands:
-            vectors = hand_vectors(hand, np.zeros(0), flat=which == "flat")
-            rotations = rotation_vector_to_matrix(vectors)
-            set_joint_rotations(
-                actor.figure.require_skeleton(), actor.require_pose(), hand.joints, rotations
-            )
 
 
 def _mirror(scene: Scene) -> None:

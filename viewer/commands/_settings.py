@@ -49,7 +49,8 @@ def add_settings(
         each = known[name]
         facts = {**each.metadata, **changes}
         default = each.default_factory() if callable(each.default_factory) else each.default
-        shown = f"{default:g}" if _is_number(default) else str(default)
+        is_number = isinstance(default, int | float) and not isinstance(default, bool)
+        shown = f"{default:g}" if is_number else str(default)
         text = facts["help"].replace("{default}", shown).replace("{usual}", facts.get("usual", ""))
         how = {key: value for key, value in facts.items() if key not in _OWN}
         if isinstance(default, bool) and "choices" not in how and "action" not in how:
@@ -113,7 +114,3 @@ def _flag(each: Field[Any]) -> str:
 def _destination(each: Field[Any]) -> str:
     """Return the name of a field's option among the arguments."""
     return str(each.metadata.get("dest", _flag(each).lstrip("-").replace("-", "_")))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

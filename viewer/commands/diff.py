@@ -16,7 +16,6 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import TextIO
 
 from viewer.commands._frames import parse_range
 from viewer.commands._input_files import input_files
@@ -82,12 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(files, MotionSettings, "up")
     add_settings(files, MotionSettings, "unit", help="length unit of BVH files")
     add_settings(files, MotionSettings, "animation")
-    _add_poses(parser)
-    _add_results(parser)
-    add_skinning_arguments(parser)
-
-
-def _add_poses(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("poses")
     group.add_argument(
         "--poses",
@@ -101,9 +94,6 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
         metavar="A:B",
         help="frames A to B - 1 of motions, numbered as in the reference (default: all)",
     )
-
-
-def _add_results(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("results")
     group.add_argument(
         "--tolerance",
@@ -121,6 +111,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "produce a sheet with a common scale",
     )
     group.add_argument("--force", action="store_true", help="replace an existing image")
+    add_skinning_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -130,16 +121,32 @@ def run(arguments: argparse.Namespace) -> int:
         raise ViewerError(f"--tolerance: expected 0 or more, found {tolerance:g}")
     if not 0 <= arguments.poses <= 10_000:
         raise ViewerError(f"--poses: expected 0 to 10000, found {arguments.poses}")
-    frames = _frames(arguments.frames)
-    inputs = _inputs(arguments.common, [arguments.reference, *arguments.files])
+    frames = None if arguments.frames is None else parse_range(arguments.frames)
+    if frames is not None and frames.step != 1:
+        raise ViewerError(f"--frames: expected A:B without a step, found {arguments.frames}")
+    # Missing files are reported when they are opened.
+    inputs = [Path(file) for file in arguments.common]
+    for text in (arguments.reference, *arguments.files):
+        with contextlib.suppress(ViewerError):
+            inputs += input_files(text)
     output = None if arguments.output is None else Path(arguments.output)
     if output is not None:
-        _check_picture(output)
+        require_stdout(output)
+        if output.suffix.lower() not in PICTURES:
+            raise UnsupportedFormatError(
+                f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}), "
+                f'found "{output.suffix}"'
+            )
         check_targets([output], inputs, arguments.force)
-    open_one = _opener(arguments.common, settings_of(MotionSettings, arguments))
+    settings = settings_of(MotionSettings, arguments)
+
+    def open_one(text: str) -> Scene:
+        return load(*arguments.common, *input_files(text), motion=settings)
+
     reference = open_one(arguments.reference)
     print_warnings(reference.diagnostics)
     skinning = settings_of(Skinning, arguments)
+    span = None if frames is None else (frames.first, frames.stop)
     rows: list[_Compared] = []
     heats: list[_Heat] = []
     inputs += reference.files
@@ -147,7 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             other = open_one(name)
             inputs += other.files
-            row, heat = _compared(name, reference, other, skinning, arguments.poses, frames)
+            row, heat = _compared(name, reference, other, skinning, arguments.poses, span)
         except ViewerError as problem:
             row, heat = _Compared(name, error=printable(problem, 500)), None
         rows.append(row)
@@ -155,7 +162,16 @@ def run(arguments: argparse.Namespace) -> int:
     stream = sys.stdout if output is None else summary_stream(output)
     if output is not None:
         check_targets([output], inputs, arguments.force)
-    _print(arguments.reference, rows, tolerance, arguments.json, stream)
+    if arguments.json or is_recorded():
+        found = _json_data(arguments.reference, rows, tolerance)
+        note_values(found)
+    if arguments.json:
+        print(json.dumps(found, indent=2, ensure_ascii=False), file=stream)
+    elif len(rows) > 1:
+        print("\n".join(_table_of(rows, tolerance)), file=stream)
+    else:
+        print_warnings(rows[0].diagnostics)
+        print("\n".join(_lines_of(rows[0], tolerance)), file=stream)
     if output is not None:
         summary = _save_heat(heats, output, skinning)
         print(summary, file=sys.stderr if arguments.json else stream)
@@ -163,41 +179,6 @@ def run(arguments: argparse.Namespace) -> int:
         return _UNREADABLE
     exceeds = tolerance is not None and any(row.exceeds(tolerance) for row in rows)
     return _DIFFERS if exceeds else 0
-
-
-def _check_picture(output: Path) -> None:
-    """Check the name of the output image before anything is compared."""
-    require_stdout(output)
-    if output.suffix.lower() not in PICTURES:
-        raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}), "
-            f'found "{output.suffix}"'
-        )
-
-
-def _inputs(common: Sequence[str], inputs: Sequence[str]) -> list[Path]:
-    """Return the named files; missing ones are reported when they are opened."""
-    found = [Path(file) for file in common]
-    for text in inputs:
-        with contextlib.suppress(ViewerError):
-            found += input_files(text)
-    return found
-
-
-def _frames(text: str | None) -> FrameRange | None:
-    if text is None:
-        return None
-    found = parse_range(text)
-    if found.step != 1:
-        raise ViewerError(f"--frames: expected A:B without a step, found {text}")
-    return found.first, found.stop
-
-
-def _opener(common: Sequence[str], settings: MotionSettings) -> Callable[[str], Scene]:
-    def open_one(text: str) -> Scene:
-        return load(*common, *input_files(text), motion=settings)
-
-    return open_one
 
 
 def _compared(
@@ -237,25 +218,6 @@ def _lone(name: str, pairing: _Pairing) -> tuple[Diagnostic, ...]:
     )
 
 
-def _print(
-    reference: str,
-    rows: Sequence[_Compared],
-    tolerance: float | None,
-    is_json: bool,
-    stream: TextIO,
-) -> None:
-    if is_json or is_recorded():
-        found = _json_data(reference, rows, tolerance)
-        note_values(found)
-    if is_json:
-        print(json.dumps(found, indent=2, ensure_ascii=False), file=stream)
-    elif len(rows) > 1:
-        print("\n".join(_table_of(rows, tolerance)), file=stream)
-    else:
-        print_warnings(rows[0].diagnostics)
-        print("\n".join(_lines_of(rows[0], tolerance)), file=stream)
-
-
 @dataclass(frozen=True, slots=True)
 class _Pairing:
     """Paired actors of two scenes."""
@@ -292,7 +254,8 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> _Pairing:
             if index in found:
                 continue
             open_ones = (n for n in range(len(second)) if n not in taken)
-            chosen = next((n for n in open_ones if _may_pair(rule, actor, second[n])), None)
+            alike = (n for n in open_ones if actor.person == second[n].person)
+            chosen = next((n for n in alike if rule(actor, second[n])), None)
             if chosen is not None:
                 found[index] = chosen
                 taken.add(chosen)
@@ -307,10 +270,6 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> _Pairing:
         _lone_actors(left, clips),
         _lone_actors(other_left, other_clips),
     )
-
-
-def _may_pair(rule: Callable[[Actor, Actor], bool], one: Actor, other: Actor) -> bool:
-    return one.person == other.person and rule(one, other)
 
 
 def _kind(actor: Actor) -> tuple[bool, bool, bool]:

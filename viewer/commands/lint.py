@@ -61,10 +61,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the findings, worst first; return 1 if any is as severe as ``--fail-on``."""
     if arguments.codes:
-        print("\n".join(_code_lines()))
+        rows = [[name, code.severity, f"{code.title}: {code.hint}"] for name, code in CODES.items()]
+        print("\n".join(table_lines(rows)))
         return 0
     require_files(arguments.files, arguments.body, "lint")
-    ignored = _ignored(arguments.ignore)
+    ignored = {code.strip().upper() for code in arguments.ignore.split(",") if code.strip()}
+    unknown = sorted(ignored - CODES.keys())
+    if unknown:
+        hint = did_you_mean(unknown[0], CODES) or "--codes lists them"
+        raise ViewerError(f'--ignore: no code is called "{printable(unknown[0], 40)}"; {hint}')
     options = settings_of(LintOptions, arguments)
     asked = scene_options(arguments)
     files = asked.paths
@@ -94,18 +99,3 @@ def _ground(text: str) -> float | Literal["auto", "none"]:
     if text == "auto":
         return "auto"
     return "none" if text == "none" else number(text)
-
-
-def _ignored(text: str) -> set[str]:
-    codes = {code.strip().upper() for code in text.split(",") if code.strip()}
-    unknown = sorted(codes - CODES.keys())
-    if unknown:
-        hint = did_you_mean(unknown[0], CODES) or "--codes lists them"
-        raise ViewerError(f'--ignore: no code is called "{printable(unknown[0], 40)}"; {hint}')
-    return codes
-
-
-def _code_lines() -> list[str]:
-    return table_lines(
-        [[name, code.severity, f"{code.title}: {code.hint}"] for name, code in CODES.items()]
-    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
-from pathlib import Path
 
 from viewer.commands._printing import print_line
 from viewer.errors import ViewerError
@@ -57,22 +56,17 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     for kind in CATALOG:
         own = {name: path for name, path in found.items() if name.partition(":")[0] == kind}
-        _print_kind(kind, own)
+        model = CATALOG[kind]
+        state = "bundled" if kind == "body" else "found" if own else "missing"
+        about = f"{model.title:<13}{model.about:<28}{model.licence:<23}{model.address}"
+        print_line((f"{state:<9}", _STYLES[state]), about)
+        for name, path in own.items():
+            print_line("", f"{'':<9}{name:<15}{printable(path, 300)}")
     folder = load_model_folder()
     shown = "none, set it with --model-path" if folder is None else printable(folder, 300)
     print_line("", f"model folder: {shown}")
     print_line("", f"data folder:  {printable(data_folder(), 300)}")
     return 0
-
-
-def _print_kind(kind: str, found: dict[str, Path]) -> None:
-    """Print a model's line, and the files that were found."""
-    model = CATALOG[kind]
-    state = "bundled" if kind == "body" else "found" if found else "missing"
-    about = f"{model.title:<13}{model.about:<28}{model.licence:<23}{model.address}"
-    print_line((f"{state:<9}", _STYLES[state]), about)
-    for name, path in found.items():
-        print_line("", f"{'':<9}{name:<15}{printable(path, 300)}")
 
 
 def _add(name: str, is_dry: bool) -> int:

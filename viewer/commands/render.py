@@ -76,18 +76,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.usage = "%(prog)s [FILES ...] -o FILE [options]"
     add_file_arguments(parser)
-    _add_output_arguments(parser)
-    add_capture_arguments(parser, gaps="view")
-    add_cleanup_arguments(parser)
-    add_frame_arguments(parser, "A:B[:STEP]")
-    _add_sequence_arguments(parser)
-    add_pose_arguments(parser)
-    add_camera_arguments(parser)
-    add_display_arguments(parser)
-    add_skinning_arguments(parser)
-
-
-def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("output")
     group.add_argument(
         "-o",
@@ -111,6 +99,17 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--panels", action="store_true", help="draw the window's panels too")
     group.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
+    add_capture_arguments(parser, gaps="view")
+    add_cleanup_arguments(parser)
+    add_frame_arguments(parser, "A:B[:STEP]")
+    group = parser.add_argument_group("videos, numbered images, contact sheets")
+    add_settings(group, Request, "turntable", "contact_sheet", "onion", "speed")
+    add_settings(group, ViewOptions, "follow")
+    add_settings(group, Request, "video_quality")
+    add_pose_arguments(parser)
+    add_camera_arguments(parser)
+    add_display_arguments(parser)
+    add_skinning_arguments(parser)
 
 
 @dataclass(slots=True, eq=False)
@@ -137,7 +136,12 @@ class _Drawing:
 
 def run(arguments: argparse.Namespace) -> int:
     """Render the images, write them, and print their names."""
-    _check_overlay(arguments)
+    if arguments.overlay is not None:
+        for name in ("video", "images", "view", *VIEWS):
+            if getattr(arguments, name) not in (None, False):
+                other = name.replace("_", "-")
+                raise ViewerError(f"--overlay and --{other}: expected one of them, found both")
+        arguments.video, arguments.no_grid = arguments.overlay, True
     size = SIZE if arguments.size is None else parse_size(arguments.size)
     output = Path(arguments.output)
     asked, view = scene_options(arguments), settings_of(ViewOptions, arguments)
@@ -150,14 +154,20 @@ def run(arguments: argparse.Namespace) -> int:
     options, is_chosen = display_of(arguments), arguments.quality is not None
     if not is_chosen and (not request.is_still or arguments.panels):
         options.quality = "normal"
-    _check_device(arguments.gpu)
+    if arguments.gpu is not None:
+        from viewer.rendering.gpu.context import check_device
+
+        check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format has no transparency"])
     scene = open_scene(asked)
     use_file_method(scene, options.skinning, stated(Skinning, arguments))
     print_warnings(look_through_video(view, asked.motion, scene))
     if arguments.overlay is not None:
-        size = _overlay_size(arguments.size is not None, scene) or size
+        if scene.images is None:
+            raise ViewerError("--overlay: expected a capture with a camera, found none")
+        if arguments.size is None:
+            size = scene.images.size_of(scene.images.cameras[0]) or size
     hide_parts(view, scene, options)
     print_warnings(choose_subject(scene, options))
     notes = camera_notes(view, asked.motion, scene, options)
@@ -173,32 +183,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _draw_still(drawing, scene)
     return 0
-
-
-def _check_overlay(arguments: argparse.Namespace) -> None:
-    """Let an overlay be a video that is seen through its camera."""
-    if arguments.overlay is None:
-        return
-    for name in ("video", "images", "view", *VIEWS):
-        if getattr(arguments, name) not in (None, False):
-            other = name.replace("_", "-")
-            raise ViewerError(f"--overlay and --{other}: expected one of them, found both")
-    arguments.video, arguments.no_grid = arguments.overlay, True
-
-
-def _overlay_size(is_chosen: bool, scene: Scene) -> tuple[int, int] | None:
-    """Return the size of the video, unless another one is requested."""
-    if scene.images is None:
-        raise ViewerError("--overlay: expected a capture with a camera, found none")
-    return None if is_chosen else scene.images.size_of(scene.images.cameras[0])
-
-
-def _check_device(device: int | None) -> None:
-    """Check the graphics device before anything is read."""
-    if device is not None:
-        from viewer.rendering.gpu.context import check_device
-
-        check_device(device)
 
 
 def _draw_still(drawing: _Drawing, scene: Scene) -> None:
@@ -324,14 +308,6 @@ def _grid_step(points: Floats) -> float:
     return grid_step(bounding_box(points))
 
 
-def _add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of videos, numbered images and contact sheets."""
-    group = parser.add_argument_group("videos, numbered images, contact sheets")
-    add_settings(group, Request, "turntable", "contact_sheet", "onion", "speed")
-    add_settings(group, ViewOptions, "follow")
-    add_settings(group, Request, "video_quality")
-
-
 def _complete(
     request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
 ) -> None:
@@ -353,21 +329,9 @@ def _complete(
         request.kind = "video"
     elif asks:
         request.kind = "pictures"
-    _check_options(request, frames, view, panels, has_quality)
-    if request.kind == "pictures":
-        _check_name(str(output))
-        _check_picture(output)
-
-
-def _check_options(
-    request: Request, frames: Frames, view: ViewOptions, panels: bool, has_quality: bool
-) -> None:
     if request.kind and panels:
         raise ViewerError("--panels: applies to single images only, not to videos or sequences")
-    if request.range is not None:
-        for option in ("frame", "time"):
-            if getattr(frames, option) is not None:
-                raise ViewerError(f"--frames and --{option}: expected one of them, found both")
+    frames.check_range()
     if view.follow is not None and view.look_at is not None:
         raise ViewerError("--follow and --look-at: expected one of them, found both")
     _check_onion(request, frames, view)
@@ -386,6 +350,28 @@ def _check_options(
         raise ViewerError(
             "--contact-sheet: expected an image file name, such as .png, found a video"
         )
+    if request.kind == "pictures":
+        # Check the frame field of a name: ``{frame}`` or ``{frame:05}``.
+        name = str(output)
+        try:
+            fields = [part for part in string.Formatter().parse(name) if part[1] is not None]
+        except ValueError:
+            fields = []
+        is_good = fields and all(
+            field == "frame" and conversion is None and re.fullmatch(r"0?\d{0,2}d?", spec or "")
+            for _, field, spec, conversion in fields
+        )
+        if not is_good:
+            raise ViewerError(
+                "--output: expected {frame} or {frame:05} in the name of numbered images, as in "
+                f'frame_{{frame:05}}.png, found "{printable(name)}"'
+            )
+        # A GIF may be either an image or a video.
+        if suffix in VIDEOS and suffix not in PICTURES:
+            raise UnsupportedFormatError(
+                f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) for one file "
+                f"per frame, found {suffix}"
+            )
 
 
 def _check_onion(request: Request, frames: Frames, view: ViewOptions) -> None:
@@ -406,33 +392,6 @@ def _check_onion(request: Request, frames: Frames, view: ViewOptions) -> None:
         raise ViewerError(f"--onion: expected 2 to {_MOST_POSES} poses, found {poses}")
     if request.output.suffix.lower() in (".mp4", ".webm"):
         raise ViewerError("--onion: expected the name of a picture, such as .png, found a video")
-
-
-def _check_name(name: str) -> None:
-    """Check the frame field of a name: ``{frame}`` or ``{frame:05}``."""
-    try:
-        fields = [part for part in string.Formatter().parse(name) if part[1] is not None]
-    except ValueError:
-        fields = []
-    is_good = fields and all(
-        field == "frame" and conversion is None and re.fullmatch(r"0?\d{0,2}d?", spec or "")
-        for _, field, spec, conversion in fields
-    )
-    if not is_good:
-        raise ViewerError(
-            "--output: expected {frame} or {frame:05} in the name of numbered images, as in "
-            f'frame_{{frame:05}}.png, found "{printable(name)}"'
-        )
-
-
-def _check_picture(output: Path) -> None:
-    """Check that numbered images do not have the suffix of a video; a GIF may be either."""
-    suffix = output.suffix.lower()
-    if suffix in VIDEOS and suffix not in PICTURES:
-        raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) for one file "
-            f"per frame, found {suffix}"
-        )
 
 
 def _draw_sequence(drawing: _Drawing, scene: Scene) -> str:

@@ -18,7 +18,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -34,7 +33,7 @@ from viewer.commands._pose import PoseOptions, add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._settings import add_settings, settings_of
-from viewer.commands._writing import add_vrm_arguments, check_meta
+from viewer.commands.convert import add_vrm_arguments, check_meta
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
@@ -109,13 +108,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ".bvh; may be repeated",
     )
     parser.add_argument("--view", action="store_true", help="open the result in a window")
-    _add_method_arguments(parser)
-    _add_alignment_arguments(parser)
+    group = parser.add_argument_group("method")
+    add_settings(group, TransferSettings, "method")
+    add_settings(group, MatchSettings)
+    add_settings(group, WeightSettings)
+    add_settings(group, TransferSettings, "joints", "fits", "correctives")
+    group = parser.add_argument_group("alignment")
+    add_settings(group, AlignmentSettings, "up", "facing", choices=AXES)
+    add_settings(group, AlignmentSettings, "scale")
+    group.add_argument(
+        "--landmarks",
+        metavar="FILE",
+        help="file with three or more pairs of points, one per line: a joint or position of the "
+        "posed template, and a position on the target",
+    )
+    add_settings(group, AlignmentSettings, "refines")
     add_vrm_arguments(parser)
-    _add_template_pose_arguments(parser)
-
-
-def _add_template_pose_arguments(parser: argparse.ArgumentParser) -> None:
     add_frame_arguments(parser)
     add_pose_arguments(parser)
     parser.add_argument(
@@ -133,27 +141,6 @@ def _add_template_pose_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(interpolate_gaps=False)
 
 
-def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("method")
-    add_settings(group, TransferSettings, "method")
-    add_settings(group, MatchSettings)
-    add_settings(group, WeightSettings)
-    add_settings(group, TransferSettings, "joints", "fits", "correctives")
-
-
-def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("alignment")
-    add_settings(group, AlignmentSettings, "up", "facing", choices=AXES)
-    add_settings(group, AlignmentSettings, "scale")
-    group.add_argument(
-        "--landmarks",
-        metavar="FILE",
-        help="file with three or more pairs of points, one per line: a joint or position of the "
-        "posed template, and a position on the target",
-    )
-    add_settings(group, AlignmentSettings, "refines")
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Rig the mesh, print a report, write it, and show it if requested."""
     from viewer.export._rigged_files import files_of, write_rigged
@@ -162,12 +149,11 @@ def run(arguments: argparse.Namespace) -> int:
     meta = settings_of(VrmMeta, arguments)
     check_meta(meta, output)
     pose, frames = settings_of(PoseOptions, arguments), frames_of(arguments)
-    inputs = _inputs(
-        [
-            *(*arguments.files, *arguments.template, *pose.files, *arguments.clips),
-            *([arguments.landmarks] if arguments.landmarks else []),
-        ]
-    )
+    named = [
+        *(*arguments.files, *arguments.template, *pose.files, *arguments.clips),
+        *([arguments.landmarks] if arguments.landmarks else []),
+    ]
+    inputs = [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
     if output is not None:
         require_stdout(output)
         check_targets(files_of(output), inputs, arguments.force)
@@ -201,7 +187,9 @@ def run(arguments: argparse.Namespace) -> int:
             target.name,
         )
     stream = sys.stdout if output is None else summary_stream(output)
-    _print_report(rigged, stream)
+    print_warnings(line for line in rigged.lines if line.severity == "warning")
+    notes = [str(line) for line in rigged.lines if line.severity == "note"]
+    print("\n".join(notes), file=stream)
     if output is not None:
         with all_or_none(files):
             written = [*write_rigged(rigged, output, meta), *_write_clips(rigged, clips)]
@@ -209,12 +197,11 @@ def run(arguments: argparse.Namespace) -> int:
             note_found(note)
         print("\n".join(map(str, written)), file=stream)
     if arguments.view:
-        _show(rigged, target)
+        from viewer.app.window import show
+
+        result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
+        show(Scene([result, Actor(target, visible=False)], world_up=rigged.figure.up))
     return 0
-
-
-def _inputs(named: Sequence[str]) -> list[Path]:
-    return [Path(file) for file in (*map(resolve, named), bundled_body(), *bundled_files())]
 
 
 def _target(files: Sequence[str], inputs: list[Path]) -> Figure:
@@ -262,9 +249,7 @@ def _template_files(name: str) -> list[Path]:
     path, *others = named_files(name)
     near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, [*BUNDLED])
     if near:
-        raise FormatError(
-            Diagnostic("F001.no-template: no such file; {near}", path, values={"near": near})
-        )
+        raise FormatError.fault("F001.no-template: no such file; {near}", path, near=near)
     return [path, *others]
 
 
@@ -288,21 +273,6 @@ def _settings(
     return replace(settings, correctives=False) if as_rig else settings
 
 
-def _print_report(rigged: Rigged, stream: TextIO) -> None:
-    """Print the report, and warnings to the error stream."""
-    print_warnings(line for line in rigged.lines if line.severity == "warning")
-    notes = [str(line) for line in rigged.lines if line.severity == "note"]
-    print("\n".join(notes), file=stream)
-
-
-def _show(rigged: Rigged, target: Figure) -> None:
-    """Open the result in a window, with the hidden target at the same position."""
-    from viewer.app.window import show
-
-    result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))
-    show(Scene([result, Actor(target, visible=False)], world_up=rigged.figure.up))
-
-
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     """Read at least three pairs of points: on the posed template and on the target, (N, 2, 3)."""
     skeleton = template.require_skeleton()
@@ -315,15 +285,12 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
             continue
         values = _floats(words if len(words) == 6 else words[-3:])
         if values is None or len(words) < 4 or (len(words) != 6 and _floats(words) is not None):
-            found = {"found": printable(line.strip(), 60)}
-            raise FormatError(
-                Diagnostic(
-                    "F002.landmark: expected six numbers, or a joint and three numbers, found "
-                    '"{found}"',
-                    source.path,
-                    line_number,
-                    values=found,
-                )
+            raise FormatError.fault(
+                "F002.landmark: expected six numbers, or a joint and three numbers, found "
+                '"{found}"',
+                source.path,
+                line_number,
+                found=printable(line.strip(), 60),
             )
         if len(values) == 6:
             pairs.append([values[:3], values[3:]])
@@ -334,41 +301,35 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         pairs.append([joints[skeleton.names.index(name)].tolist(), values])
     last = max(len(source.data.splitlines()), 1)
     if len(pairs) < 3:
-        count = {"found": len(pairs)}
-        raise FormatError(
-            Diagnostic(
-                "F002.landmarks: expected at least 3 pairs of points, found {found}",
-                source.path,
-                last,
-                values=count,
-            )
+        raise FormatError.fault(
+            "F002.landmarks: expected at least 3 pairs of points, found {found}",
+            source.path,
+            last,
+            found=len(pairs),
         )
     points = np.array(pairs, dtype=np.float64)
     own, other = np.ptp(points, axis=0).max(axis=1).tolist()
     if not (own < _LARGEST_SCALE * other and other < _LARGEST_SCALE * own):
-        extents = {"own": rounded(own), "other": rounded(other)}
-        raise FormatError(
-            Diagnostic(
-                "F002.landmark-extents: expected points that differ in scale by less than 1e9, "
-                "found extents of {own} in the template and {other} in the target",
-                source.path,
-                last,
-                values=extents,
-            )
+        raise FormatError.fault(
+            "F002.landmark-extents: expected points that differ in scale by less than 1e9, "
+            "found extents of {own} in the template and {other} in the target",
+            source.path,
+            last,
+            own=rounded(own),
+            other=rounded(other),
         )
     return points
 
 
 def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> FormatError:
     names = () if template.skeleton is None else template.skeleton.names
-    values = {"figure": printable(template.name, 60), "found": name, "near": name_hint(name, names)}
-    return FormatError(
-        Diagnostic(
-            'F002.landmark-joint: expected a joint of {figure}, found "{found}"; {near}',
-            source.path,
-            line,
-            values=values,
-        )
+    return FormatError.fault(
+        'F002.landmark-joint: expected a joint of {figure}, found "{found}"; {near}',
+        source.path,
+        line,
+        figure=printable(template.name, 60),
+        found=name,
+        near=name_hint(name, names),
     )
 
 

@@ -84,8 +84,14 @@ def _scale(text: str) -> float:
 def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the image that it would show."""
     from viewer.app.display import NoDisplay, find_display
+    from viewer.app.preferences.preferences import load_preferences
 
-    problems = _fill_in(arguments)
+    problems: list[str] = []  # about damaged preferences
+    preferences = load_preferences(problems.append)
+    if arguments.samples is None:
+        arguments.samples = preferences.samples
+    arguments.quality = arguments.quality or preferences.quality
+    arguments.up = arguments.up or preferences.up or None
     options, asked = display_of(arguments), scene_options(arguments)
     view = settings_of(ViewOptions, arguments)
     begin = partial(_start, asked, view, options, stated(Skinning, arguments))
@@ -98,7 +104,15 @@ def run(arguments: argparse.Namespace) -> int:
         for builder in start.builders:
             finish(builder, start.scene)
         box = bounding_box(start.points)
-        return _draw_instead(str(problem), start.scene, start.camera, options, box)
+        from viewer.commands._scalar import choose_subject
+        from viewer.commands.render import draw_scene
+        from viewer.formats import save_image
+
+        print_warnings(choose_subject(start.scene, options))
+        path = free_path(Path.cwd(), start.scene.title, ".png")
+        save_image(path, draw_scene(start.scene, SIZE, start.camera, options, box))
+        print(f"{problem}; drew {printable(path, 300)} instead")
+        return 0
     from viewer.app.opening import Opening, watch
 
     opening = Opening(_title(asked.files), begin)
@@ -161,30 +175,3 @@ def _start(
 def _title(files: Sequence[str]) -> str:
     names = [opened_text(Path(file)) for file in files]
     return " + ".join(names) or "the bundled figure"
-
-
-def _fill_in(arguments: argparse.Namespace) -> list[str]:
-    """Set omitted options from the user's preferences; return messages about damaged ones."""
-    from viewer.app.preferences.preferences import load_preferences
-
-    problems: list[str] = []
-    preferences = load_preferences(problems.append)
-    if arguments.samples is None:
-        arguments.samples = preferences.samples
-    arguments.quality = arguments.quality or preferences.quality
-    arguments.up = arguments.up or preferences.up or None
-    return problems
-
-
-def _draw_instead(
-    reason: str, scene: Scene, camera: Camera, options: DisplayOptions, box: Floats
-) -> int:
-    from viewer.commands._scalar import choose_subject
-    from viewer.commands.render import draw_scene
-    from viewer.formats import save_image
-
-    print_warnings(choose_subject(scene, options))
-    path = free_path(Path.cwd(), scene.title, ".png")
-    save_image(path, draw_scene(scene, SIZE, camera, options, box))
-    print(f"{reason}; drew {printable(path, 300)} instead")
-    return 0

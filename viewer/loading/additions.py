@@ -25,8 +25,7 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
         trial.figure = with_texture(trial.figure, path, pixels)
     for path, record in contents.poses:
         if trial.pose is None:
-            values = {"figure": actor.figure.name}
-            raise RigError(Diagnostic(wording.POSE, path, values=values))
+            raise RigError.fault(wording.POSE, path, figure=actor.figure.name)
         notes += apply_pose(path, record, trial)
     # Nothing after this line can fail.
     if actor.pose is not None and trial.pose is not None:

@@ -234,12 +234,10 @@ def _give_morphs(contents: Contents, draft: SceneDraft) -> None:
                 problem = problem or refused
         else:
             if problem is None:
-                raise RigError(
-                    Diagnostic(
-                        "F004.morph-alone: a blend shape without a mesh: open it together with "
-                        "its .skin",
-                        path,
-                    )
+                raise RigError.fault(
+                    "F004.morph-alone: a blend shape without a mesh: open it together with "
+                    "its .skin",
+                    path,
                 )
             found = problem.diagnostic
             raise problem if found is None else RigError(replace(found, path=path))
@@ -253,7 +251,7 @@ def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
         drive(contents, draft, settings)
     # A name selects an animation of the files that are given as motions, if there are any.
     wanted = "" if settings.motions else settings.animation
-    if settings.drives and _has_bare_motion(draft):
+    if settings.drives and any(a.figure.mesh is None and a.figure.animations for a in draft.actors):
         from viewer.loading.skeleton_motions import drive_by_figures
 
         if drive_by_figures(draft, wanted, settings):
@@ -267,11 +265,6 @@ def _move(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
         pose_actors(draft.actors, start)
 
 
-def _has_bare_motion(draft: SceneDraft) -> bool:
-    """Return whether a file has a skeleton with animations, but without a mesh."""
-    return any(a.figure.mesh is None and a.figure.animations for a in draft.actors)
-
-
 def _animate(draft: SceneDraft, wanted: str) -> None:
     """Let actors without a motion play their file's animation, as ``chosen_animation`` says."""
     # Figures of files without it keep their rest pose.
@@ -281,11 +274,9 @@ def _animate(draft: SceneDraft, wanted: str) -> None:
     if not files and wanted.lower() == NONE:
         return
     if wanted and not files:
-        raise RigError(
-            Diagnostic(
-                "F004.no-animations: no animation is called {name}: the files have none",
-                values={"name": quoted(wanted)},
-            )
+        raise RigError.fault(
+            "F004.no-animations: no animation is called {name}: the files have none",
+            name=quoted(wanted),
         )
     refusals = []
     for actors in files:
@@ -343,7 +334,7 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
         else "F004.shape-alone: the shape of a body without a motion: open it together with a "
         "body model"
     )
-    raise problem or RigError(Diagnostic(key, path))
+    raise problem or RigError.fault(key, path)
 
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
@@ -359,14 +350,13 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     chosen = next(iter(bare or open_for_it), None)
     if chosen is None:
         if not actors:
-            raise RigError(
-                Diagnostic(
-                    "F004.picture-alone: an image without a figure: open it together with a figure",
-                    path,
-                )
+            raise RigError.fault(
+                "F004.picture-alone: an image without a figure: open it together with a figure",
+                path,
             )
-        values = {"figures": all_of([actor.figure.name for actor in actors])}
-        raise RigError(Diagnostic(wording.F004_PICTURE, path, values=values))
+        raise RigError.fault(
+            wording.F004_PICTURE, path, figures=all_of([actor.figure.name for actor in actors])
+        )
     chosen.figure = with_texture(chosen.figure, path, pixels)
 
 

@@ -119,7 +119,7 @@ class BodyModels:
         joined = [figure for _, figure in joined_figures(contents.figures)]
         figure = next((each for each in joined if each.is_attached), next(iter(joined), None))
         if figure is None or figure.skeleton is None or figure.mesh is None:
-            raise FormatError(Diagnostic("F002.no-body-model: --model: not a body model", paths[0]))
+            raise FormatError.fault("F002.no-body-model: --model: not a body model", paths[0])
         self.draft.diagnostics += contents.diagnostics
         self.draft.used_options |= {"model", *(contents.used_options or ())}
         self.draft.files += contents.files

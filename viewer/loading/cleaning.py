@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -64,8 +64,8 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
         if actor.drive is not None:
             again = partial(_cleaned_again, scene, actor, wanted)
             actor.drive = replace(actor.drive, finish=again)
-    time = _start(scene.actors) if scene.time is None else scene.time
-    pose_actors(scene.actors, time)
+    starts = [a.clip.start + a.offset for a in scene.actors if a.clip is not None]
+    pose_actors(scene.actors, min(starts, default=0.0) if scene.time is None else scene.time)
     if scene.in_space is not None:
         scene.in_space = partial(_cleaned_in, scene.in_space, wanted)
     return notes
@@ -84,10 +84,6 @@ def _cleaned_again(scene: Scene, actor: Actor, wanted: CleanUp, clip: SampledCli
     return clip if found.points is not None else found
 
 
-def _start(actors: Iterable[Actor]) -> float:
-    return min((a.clip.start + a.offset for a in actors if a.clip is not None), default=0.0)
-
-
 def _cleaned(
     scene: Scene, actor: Actor, clip: Captured, wanted: CleanUp
 ) -> tuple[Captured, list[Diagnostic]]:
@@ -96,8 +92,11 @@ def _cleaned(
     if wanted.interpolates:
         clip, notes = _interpolated(actor, clip, wanted.longest_gap)
     if wanted.smoothing is not None:
-        clip, said = _smoothed(actor, clip, wanted.smoothing)
-        notes.append(said)
+        found = smoothed(clip, wanted.smoothing, METRES.get(actor.figure.unit, 1.0))
+        values = {"filter": _filter_phrase(wanted.smoothing, clip)}
+        key = "X006.smoothed: {figure}: smoothed ({filter}): "
+        notes.append(_note(key, actor, values, clip, found))
+        clip = found
     if wanted.locks_feet:
         clip, locked = _locked(scene, actor, clip)
         notes += locked
@@ -111,14 +110,6 @@ def _cleaned(
         clip, said = _resampled(actor, clip, wanted.rate)
         notes.append(said)
     return clip, notes
-
-
-def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured, Diagnostic]:
-    found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
-    values = {"filter": _filter_phrase(chosen, clip)}
-    return found, _note(
-        "X006.smoothed: {figure}: smoothed ({filter}): ", actor, values, clip, found
-    )
 
 
 def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[Diagnostic]]:

@@ -203,11 +203,6 @@ def read_source(source: Source, contents: Contents, settings: MotionSettings) ->
 
         contents.pictures.append((source.path, read_picture(source)))
         return ()
-    return _sort(source, contents, settings)
-
-
-def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read a file and add its contents by type; return the files that it refers to."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind == "NamedFiles":
@@ -340,8 +335,7 @@ def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
     """Return a figure, which must have texture coordinates, textured with one image."""
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None:
-        values = {"figures": all_of([figure.name])}
-        raise RigError(Diagnostic(wording.F004_PICTURE, path, values=values))
+        raise RigError.fault(wording.F004_PICTURE, path, figures=all_of([figure.name]))
     covered = replace(
         mesh,
         materials=(Material(path.stem, Texture(path.name, pixels)),),

@@ -71,30 +71,24 @@ def drive(contents: Contents, draft: SceneDraft, settings: MotionSettings) -> No
         alone = give_skeleton_motion(path, motion, draft, settings, named)
         lone += [] if alone is None else [alone]
         draft.note_motions(path)
-    _check_footage(contents, settings)
+    paths = [path for path, _ in contents.captures]
+    for option, footage in (("--video", settings.video), ("--images", settings.images)):
+        if footage is not None and len(paths) > 1:
+            raise RigError.fault(
+                "F001.several-captures: expected one capture with {option}, found {n}: "
+                "{paths}; "
+                "open them one at a time",
+                footage,
+                option=option,
+                n=len(paths),
+                paths=listed(paths),
+            )
     for path, body in contents.body_motions:
         _give_body_motion(path, body, draft, models)
         draft.note_motions(path)
     for path, capture in contents.captures:
         _begin_capture(path, capture, draft, models)
     agree_on_units(draft, lone)
-
-
-def _check_footage(contents: Contents, settings: MotionSettings) -> None:
-    """Raise RigError if one video, or one folder of images, is given for several captures."""
-    paths = [path for path, _ in contents.captures]
-    for option, footage in (("--video", settings.video), ("--images", settings.images)):
-        if footage is not None and len(paths) > 1:
-            values = {"option": option, "n": len(paths), "paths": listed(paths)}
-            raise RigError(
-                Diagnostic(
-                    "F001.several-captures: expected one capture with {option}, found {n}: "
-                    "{paths}; "
-                    "open them one at a time",
-                    footage,
-                    values=values,
-                )
-            )
 
 
 def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) -> None:
@@ -111,22 +105,19 @@ def _give_clip(path: Path, clip: Clip, draft: SceneDraft, contents: Contents) ->
             return
     first = next((skeleton for skeleton in skeletons if skeleton is not None), None)
     if first is None:
-        raise RigError(
-            Diagnostic(
-                "F004.clip-alone: a clip without a skeleton: open it together with its .skel", path
-            )
+        raise RigError.fault(
+            "F004.clip-alone: a clip without a skeleton: open it together with its .skel", path
         )
     if any(skeleton is not None and suits(clip, skeleton) for skeleton in skeletons):
-        raise RigError(
-            Diagnostic("F004.clip-taken: every matching skeleton already has a clip", path)
-        )
+        raise RigError.fault("F004.clip-taken: every matching skeleton already has a clip", path)
     owner = next(path for path, figure in contents.figures if figure.skeleton)
-    values = {
-        "n": counted(len(clip.channels), "channel"),
-        "skeleton": owner,
-        "misfit": misfit(clip, first),
-    }
-    raise RigError(Diagnostic("C009.clip: found {n}, {skeleton} {misfit}", path, values=values))
+    raise RigError.fault(
+        "C009.clip: found {n}, {skeleton} {misfit}",
+        path,
+        n=counted(len(clip.channels), "channel"),
+        skeleton=owner,
+        misfit=misfit(clip, first),
+    )
 
 
 def _give_body_motion(
@@ -176,11 +167,12 @@ def _moved(
     try:
         clip, notes = body_clip(motion, model)
     except RigError as problem:
-        values = {
-            "problem": problem.cause,
-            "remedy": Remedy("open another model first", "--model selects the model"),
-        }
-        raise RigError(Diagnostic(wording.MODEL, path, values=values)) from None
+        raise RigError.fault(
+            wording.MODEL,
+            path,
+            problem=problem.cause,
+            remedy=Remedy("open another model first", "--model selects the model"),
+        ) from None
     actor = Actor(model, clip=clip, called=draft.free_title(motion.name))
     return actor, [replace(note, path=path) for note in notes]
 
@@ -309,7 +301,9 @@ def _begin_capture(path: Path, capture: Capture, draft: SceneDraft, models: Body
     draft.diagnostics += notes
     if choice.is_bundled and any(actor.figure is choice.figure for actor in builder.actors):
         _note_bundled(draft, path, builder.has_shape, builder.has_expression)
-    rate = _rate(builder.actors, settings)
+    rate = scene_rate(builder.actors)
+    if not builder.actors:
+        rate = capture_rate(settings.frame_rate, None, None)
     views, images, notes = filmed(capture, capture.views, settings, rate)
     draft.diagnostics += notes
     builder.views = tuple(views)
@@ -359,11 +353,6 @@ def _carry(builder: Builder, draft: SceneDraft, target: Figure | None, drives: b
             return
     if refusal is not None and builder.joint_map is not None:
         raise map_refusal(refusal, builder.path)
-
-
-def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:
-    """Return the frame rate of a capture."""
-    return scene_rate(actors) if actors else capture_rate(settings.frame_rate, None, None)
 
 
 def filmed(
@@ -416,23 +405,18 @@ def _rate_notes(path: Path, video: float, rate: float) -> list[Diagnostic]:
 def _camera_of(views: Sequence[CameraView], path: Path) -> int:
     """Return the index of the camera that recorded a video: the only one, or one of its name."""
     if not views:
-        raise RigError(
-            Diagnostic(
-                "F001.video-camera: the capture has no camera to which the video could belong: "
-                "expected calibrated cameras, or people in camera space{remedy}",
-                path,
-                values={"remedy": Remedy("", " (--space camera)")},
-            )
+        raise RigError.fault(
+            "F001.video-camera: the capture has no camera to which the video could belong: "
+            "expected calibrated cameras, or people in camera space{remedy}",
+            path,
+            remedy=Remedy("", " (--space camera)"),
         )
     names = [view.name for view in views]
     if len(views) > 1 and path.stem not in names:
-        raise RigError(
-            Diagnostic(
-                "F001.video-cameras: expected a video with the name of one of the cameras "
-                "({names})",
-                path,
-                values={"names": listed(names)},
-            )
+        raise RigError.fault(
+            "F001.video-cameras: expected a video with the name of one of the cameras ({names})",
+            path,
+            names=listed(names),
         )
     return names.index(path.stem) if path.stem in names else 0
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.phrases import counted
 from viewer.rig.figure import Figure
@@ -58,27 +57,19 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
     skeleton, skin = figures[0].skeleton, figures[1].skin
     assert skeleton is not None  # the first figure of a pair is the skeleton
     if skin is None:
-        values = {"n": skeleton.n_joints, "skeleton": paths[0]}
-        raise FormatError(
-            Diagnostic(
-                "F004.skin: expected weights and bindings for the {n} joints of {skeleton}, found "
-                "none",
-                paths[1],
-                values=values,
-            )
+        raise FormatError.fault(
+            "F004.skin: expected weights and bindings for the {n} joints of {skeleton}, found none",
+            paths[1],
+            n=skeleton.n_joints,
+            skeleton=paths[0],
         )
     if skin.n_joints != skeleton.n_joints:
-        values = {
-            "n": skin.n_joints,
-            "skeleton": paths[0],
-            "joints": counted(skeleton.n_joints, "bind matrix"),
-        }
-        raise RigError(
-            Diagnostic(
-                "B001.joints: expected {joints}, one per joint of {skeleton}, found {n}",
-                paths[1],
-                values=values,
-            )
+        raise RigError.fault(
+            "B001.joints: expected {joints}, one per joint of {skeleton}, found {n}",
+            paths[1],
+            n=skin.n_joints,
+            skeleton=paths[0],
+            joints=counted(skeleton.n_joints, "bind matrix"),
         )
     facts = (*figures[0].facts, *figures[1].facts)
     origins = (*figures[0].origins, *figures[1].origins)

@@ -163,15 +163,11 @@ def model_refusal(problem: RigError, path: Path | None) -> RigError:
     cause = problem.cause
     if isinstance(cause, Diagnostic) and cause.path is not None:
         return problem
-    return RigError(
-        Diagnostic(
-            wording.MODEL,
-            path,
-            values={
-                "problem": cause,
-                "remedy": Remedy("open another model first", "--model selects the model"),
-            },
-        )
+    return RigError.fault(
+        wording.MODEL,
+        path,
+        problem=cause,
+        remedy=Remedy("open another model first", "--model selects the model"),
     )
 
 
@@ -255,7 +251,14 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
         figure = actor.figure
         if figure.mesh is not None or actor.clip is not None or not figure.animations:
             continue
-        others = _of_other_files(draft, actor)
+        # The other actors, except those of figures from the same file.
+        place = next(index for index, other in enumerate(draft.actors) if other is actor)
+        group = draft.groups[place]
+        others = [
+            other
+            for other, of_other in zip(draft.actors, draft.groups, strict=True)
+            if other is not actor and (group is None or of_other is not group)
+        ]
         if not any(other.figure.is_attached and other.clip is None for other in others):
             continue
         try:
@@ -268,14 +271,3 @@ def drive_by_figures(draft: SceneDraft, wanted: str, settings: MotionSettings) -
             draft.take(next(n for n, other in enumerate(draft.actors) if other is actor))
             found = True
     return found
-
-
-def _of_other_files(draft: SceneDraft, actor: Actor) -> list[Actor]:
-    """Return the other actors, except those of figures from the same file."""
-    place = next(index for index, other in enumerate(draft.actors) if other is actor)
-    group = draft.groups[place]
-    return [
-        other
-        for other, of_other in zip(draft.actors, draft.groups, strict=True)
-        if other is not actor and (group is None or of_other is not group)
-    ]

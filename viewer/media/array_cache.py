@@ -153,7 +153,9 @@ class Slot:
         mark = f"{os.getpid()}-{threading.get_ident()}"
         temporary = self.path.with_name(f".{self.path.name}.{mark}")
         try:
-            _make_folder(self.path.parent)
+            self.path.parent.parent.mkdir(parents=True, exist_ok=True)
+            with contextlib.suppress(FileExistsError):
+                self.path.parent.mkdir(mode=0o700)
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY
             with open(os.open(temporary, flags, 0o600), "wb") as stream:  # noqa: PTH123
                 stream.writelines((header, self._content, flat))
@@ -177,12 +179,6 @@ def _checksum(data: memoryview, axes: Sequence[int]) -> int:
 def _code(kind: str, n_axes: int) -> bytes:
     """Return type and number of axes as encoded in a header."""
     return f"{kind}{n_axes}".encode()
-
-
-def _make_folder(folder: Path) -> None:
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with contextlib.suppress(FileExistsError):
-        folder.mkdir(mode=0o700)
 
 
 def _is_own(status: os.stat_result) -> bool:

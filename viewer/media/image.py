@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import wording
 from viewer.errors import FormatError, OutputError
 from viewer.media.png import encode_png
 from viewer.phrases import printable
@@ -121,7 +121,7 @@ def _opened(path: Path, data: bytes, n_left: int) -> Image.Image:
     try:
         picture = _open(data)
     except UnidentifiedImageError:
-        raise FormatError(Diagnostic("F002.picture: unsupported or damaged image", path)) from None
+        raise FormatError.fault("F002.picture: unsupported or damaged image", path) from None
     except (*_REFUSALS, Image.DecompressionBombError) as problem:
         raise _unreadable(path, str(problem)) from None
     if picture.width * picture.height > n_left:
@@ -158,7 +158,7 @@ def _decoded(opened: tuple[Path, Image.Image] | FormatError) -> Bytes | FormatEr
 
 
 def _unreadable(path: Path, reason: str) -> FormatError:
-    return FormatError(Diagnostic(wording.PICTURE, path, values={"reason": reason}))
+    return FormatError.fault(wording.PICTURE, path, reason=reason)
 
 
 def picture_dimensions(path: Path) -> tuple[int, int] | None:

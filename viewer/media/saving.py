@@ -106,7 +106,11 @@ def save_parts(
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(None, "is a folder")
         if not stat.S_ISREG(mode):
-            _write_through(path, parts)  # not resolved: /dev/stdout may lead to a nameless pipe
+            # Closing may fail too: /dev/full reports its error only then. A pipe without a reader
+            # blocks forever, so signals must be able to interrupt it. The path is not resolved:
+            # /dev/stdout may lead to a nameless pipe.
+            with raising(), path.open("wb") as stream:
+                _write_parts(stream, parts)
         else:
             _replace(path.resolve(), parts, stat.S_IMODE(mode))
             note_output(path)
@@ -224,27 +228,23 @@ def _keep_copy(path: Path, copies: _Copies) -> None:
         if not target.exists():
             copies[target] = None
         elif target.is_file():
-            copies[target] = _copy(target)
+            import shutil
+            import tempfile
+
+            handle, name = tempfile.mkstemp(
+                dir=target.parent, prefix=new_prefix(target.parent, target.name)
+            )
+            os.close(handle)
+            try:
+                shutil.copy2(target, name)
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    Path(name).unlink()
+                raise
+            copies[target] = Path(name)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
-
-
-def _copy(target: Path) -> Path:
-    import shutil
-    import tempfile
-
-    handle, name = tempfile.mkstemp(
-        dir=target.parent, prefix=new_prefix(target.parent, target.name)
-    )
-    os.close(handle)
-    try:
-        shutil.copy2(target, name)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
-    return Path(name)
 
 
 def _mode(target: Path) -> int:
@@ -255,13 +255,6 @@ def _mode(target: Path) -> int:
         mask = os.umask(0)
         os.umask(mask)
         return stat.S_IFREG | (0o666 & ~mask)
-
-
-def _write_through(target: Path, parts: Iterable[bytes]) -> None:
-    # Closing may fail too: /dev/full reports its error only then. A pipe without a reader blocks
-    # forever, so signals must be able to interrupt it.
-    with raising(), target.open("wb") as stream:
-        _write_parts(stream, parts)
 
 
 def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:

@@ -60,12 +60,20 @@ class VideoSink:
         self._kind = video_kind(path)
         self._av = _library()
         self.encoder = _first_encoder(self._av, self._kind, path)
-        _check_numbers(path, rate, quality)
+        if not 0.0 <= quality <= 100.0:
+            raise ViewerError(f"video quality: expected 0 to 100, found {quality:g}")
+        most = MOST_GIF_RATE if path.suffix.lower() == ".gif" else 1000.0
+        if not 0.01 <= rate <= most:
+            raise ViewerError(
+                f"{printable(path, 300)}: expected 0.01 to {most:g} frames per second, "
+                f"found {rate:g}"
+            )
         self.rate, self._quality = Fraction(rate).limit_denominator(1001), quality
         self.notes: list[str] = []
         self._has_alpha = transparent and self._kind.has_alpha
         self._may_blend = not self._has_alpha and (transparent or self.encoder == "gif")
-        self._coded = _even(size) if self._kind.needs_even else size
+        odd = (size[0] % 2, size[1] % 2) if self._kind.needs_even else (0, 0)
+        self._coded = size[0] + odd[0], size[1] + odd[1]
         self._note(transparent)
         self._file = Replacement(path)
         self._output: VideoFile | None = None
@@ -242,20 +250,6 @@ def _first_encoder(library: ModuleType, kind: VideoKind, path: Path) -> str:
     raise ViewerError(
         f"{printable(path, 300)}: the installed PyAV has no encoder for {kind.title}: {wanted}"
     )
-
-
-def _check_numbers(path: Path, rate: float, quality: float) -> None:
-    if not 0.0 <= quality <= 100.0:
-        raise ViewerError(f"video quality: expected 0 to 100, found {quality:g}")
-    most = MOST_GIF_RATE if path.suffix.lower() == ".gif" else 1000.0
-    if not 0.01 <= rate <= most:
-        raise ViewerError(
-            f"{printable(path, 300)}: expected 0.01 to {most:g} frames per second, found {rate:g}"
-        )
-
-
-def _even(size: tuple[int, int]) -> tuple[int, int]:
-    return size[0] + size[0] % 2, size[1] + size[1] % 2
 
 
 def _encoder_options(encoder: str, quality: float) -> dict[str, str]:

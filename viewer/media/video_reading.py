@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic, wording
+from viewer.diagnostics import wording
 from viewer.errors import FormatError, ViewerError
 from viewer.phrases import Remedy
 from viewer.rig.arrays import Bytes
@@ -42,32 +42,33 @@ class VideoFrames:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._errors: Any = _library()
+        try:
+            import av
+        except ImportError:
+            raise ViewerError("videos need PyAV, which is not installed: pip install av") from None
+        self._errors: Any = av
         try:
             path.open("rb").close()  # FFmpeg's own messages do not state the reason
         except OSError as problem:
-            values = {"reason": str(problem.strerror or problem)}
-            raise FormatError(
-                Diagnostic("F001.video: unreadable video: {reason}", path, values=values)
+            raise FormatError.fault(
+                "F001.video: unreadable video: {reason}",
+                path,
+                reason=str(problem.strerror or problem),
             ) from None
         try:
             self._container = self._errors.open(str(path))
         except (self._errors.FFmpegError, ValueError):
-            raise FormatError(Diagnostic(wording.VIDEO, path)) from None
+            raise FormatError.fault(wording.VIDEO, path) from None
         if self._container.format.name.endswith(_PICTURES):
-            raise FormatError(
-                Diagnostic(
-                    "F002.video-picture: expected a video, found a picture{remedy}",
-                    path,
-                    values={"remedy": Remedy("", " (--images takes a folder of pictures)")},
-                )
+            raise FormatError.fault(
+                "F002.video-picture: expected a video, found a picture{remedy}",
+                path,
+                remedy=Remedy("", " (--images takes a folder of pictures)"),
             )
         streams = self._container.streams.video
         if not streams:
-            raise FormatError(
-                Diagnostic(
-                    "F002.video-stream: expected a video, found a file without video frames", path
-                )
+            raise FormatError.fault(
+                "F002.video-stream: expected a video, found a file without video frames", path
             )
         self._stream = streams[0]
         self._stream.thread_type = "AUTO"
@@ -79,7 +80,7 @@ class VideoFrames:
         self._restart(0.0)
         first = self._next()
         if first is None or not self.rate > 0.0:
-            raise FormatError(Diagnostic(wording.VIDEO, path))
+            raise FormatError.fault(wording.VIDEO, path)
         turned = _quarter_turns(first.frame) % 2
         wide, high = first.frame.width, first.frame.height
         self.size = (high, wide) if turned else (wide, high)
@@ -118,8 +119,7 @@ class VideoFrames:
         try:
             self._container.seek(begin + int(target / stream.time_base), stream=stream)
         except self._errors.FFmpegError:
-            values = {"seconds": seconds}
-            raise FormatError(Diagnostic(wording.VIDEO_DAMAGED, self.path, values=values)) from None
+            raise FormatError.fault(wording.VIDEO_DAMAGED, self.path, seconds=seconds) from None
         self._source, self._is_over = self._container.decode(stream), False
         self._kept.clear()
 
@@ -131,8 +131,7 @@ class VideoFrames:
         except self._errors.FFmpegError:
             self._source = iter(())
             seconds = self._kept[-1].ends if self._kept else 0.0
-            values = {"seconds": seconds}
-            raise FormatError(Diagnostic(wording.VIDEO_DAMAGED, self.path, values=values)) from None
+            raise FormatError.fault(wording.VIDEO_DAMAGED, self.path, seconds=seconds) from None
         if frame is None:
             self._is_over = True
             return None
@@ -144,14 +143,6 @@ class VideoFrames:
         while len(self._kept) > max(_FEWEST, _BYTES // max(size, 1)):
             self._kept.popleft()
         return found
-
-
-def _library() -> Any:
-    try:
-        import av
-    except ImportError:
-        raise ViewerError("videos need PyAV, which is not installed: pip install av") from None
-    return av
 
 
 def _quarter_turns(frame: Any) -> int:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.batching.items import Item, Result
-from viewer.batching.worker import worker_rank
+from viewer.batching.worker_process import worker_rank
 from viewer.errors import OutputError
 from viewer.media.targets import check_targets
 

@@ -6,16 +6,15 @@ import os
 import pickle
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
 from viewer.batching.engines import Job
-from viewer.batching.engines._process_limits import limit_memory
 from viewer.batching.engines._task_size import LONGEST
 from viewer.batching.items import Item, Result
-from viewer.batching.worker import name_worker
+from viewer.batching.worker_process import limit_memory, name_worker
 from viewer.data_classes import dataclass
 from viewer.media.targets import replacing_since
 from viewer.version import VERSION
@@ -95,27 +94,23 @@ def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVer
             if not all(map(os.path.isabs, filter(None, paths))):
                 return NoFolder(worker.address, problem.strerror or "")
         try:
-            return _reply(asked, items, worker, key)
+            start = time.monotonic()
+            results, missing = [], ""
+            name_worker(worker.name)
+            if asked.memory is not None:
+                limit_memory(asked.memory)
+            for number, (item, since) in enumerate(items):
+                with _ended_after(asked.timeout, worker, key, number), replacing_since(since):
+                    result = _job(asked.job)(item)
+                results.append(result)
+                if result.status == "failed":
+                    absent = (file for file in item.files if not os.path.lexists(file))
+                    missing = missing or next(absent, "")
+                if time.monotonic() > start + LONGEST:
+                    break
+            return Reply(worker.address, results, time.monotonic() - start, missing)
         finally:
             os.chdir(before)
-
-
-def _reply(asked: Call, items: Iterable[tuple[Item, float]], worker: Any, key: str) -> Reply:
-    start = time.monotonic()
-    results, missing = [], ""
-    name_worker(worker.name)
-    if asked.memory is not None:
-        limit_memory(asked.memory)
-    for number, (item, since) in enumerate(items):
-        with _ended_after(asked.timeout, worker, key, number), replacing_since(since):
-            result = _job(asked.job)(item)
-        results.append(result)
-        if result.status == "failed":
-            absent = (file for file in item.files if not os.path.lexists(file))
-            missing = missing or next(absent, "")
-        if time.monotonic() > start + LONGEST:
-            break
-    return Reply(worker.address, results, time.monotonic() - start, missing)
 
 
 @lru_cache(1)

@@ -25,11 +25,11 @@ from uuid import uuid4
 
 from viewer.batching.engines import Job, Limits
 from viewer.batching.engines._cluster_text import ClusterName, parse_cluster
-from viewer.batching.engines._process_limits import signals_blocked
 from viewer.batching.engines._remote import ENDED, Call, NoFolder, OtherVersion, Reply, run_items
 from viewer.batching.engines._slurm import SlurmJobs, slurm_cluster
 from viewer.batching.engines._task_size import TaskSize
 from viewer.batching.items import Item, Result
+from viewer.batching.worker_process import signals_blocked
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.media.unfinished import remove_leftovers

@@ -22,8 +22,8 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
-from viewer.batching.engines._process_limits import limit_memory, signals_blocked
 from viewer.batching.items import Item, Result
+from viewer.batching.worker_process import limit_memory, signals_blocked
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
@@ -51,7 +51,13 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         raise ViewerError(
             "worker processes need pebble: pip install pebble, or use --workers 0"
         ) from None
-    _check_pickles(job)
+    try:
+        pickle.dumps(job)
+    except (pickle.PicklingError, AttributeError, TypeError) as problem:
+        raise ViewerError(
+            "worker processes import the job by its name: expected a function at the top level of "
+            f"a module, or workers=0 ({printable(problem)})"
+        ) from None
     pool = _Workers(job, limits)
     waiting, left = iter(items), True
     try:
@@ -66,16 +72,6 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
             yield from pool.finished()
     finally:
         pool.close()
-
-
-def _check_pickles(job: Job) -> None:
-    try:
-        pickle.dumps(job)
-    except (pickle.PicklingError, AttributeError, TypeError) as problem:
-        raise ViewerError(
-            "worker processes import the job by its name: expected a function at the top level of "
-            f"a module, or workers=0 ({printable(problem)})"
-        ) from None
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,6 @@ from viewer.commands._batch.planning import RETRIES, Plan, Request, plan_of
 from viewer.commands._batch.requests import request_of
 from viewer.commands._batch.results import check_results, name_in_shard, save_results
 from viewer.commands._settings import destinations
-from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.near_names import did_you_mean
@@ -178,7 +177,16 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
         near = did_you_mean(job, JOBS) or f"available jobs: {', '.join(JOBS)}"
         raise ViewerError(f'no job is called "{printable(job, 60)}"; {near}')
     parser = job_parser(job)
-    _check_options(parser, job, options)
+    if isinstance(options, str):
+        raise ViewerError(f"options: expected a list of strings, found {printable(options)}")
+    parser.check_options([job, *options])
+    given = vars(parser.parse_intermixed_args([job, *options]))
+    for name in _OWN:
+        if name in given and given[name] != parser.get_default(name) and given[name] != []:
+            raise ViewerError(
+                f"options: expected options of {job}, found {printable(given[name], 100)}; "
+                f"viewer.batch has a parameter for it"
+            )
     words = [job, *options]
     words += [word for file in request.shared for word in ("--with", file)]
     words += ["--output", request.output] if request.output else []
@@ -194,20 +202,6 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
     found, command = request_of(arguments)
     names = "workers", "cluster", "retries", "timeout", "memory", "report"
     return command, replace(found, **{name: getattr(request, name) for name in names})
-
-
-def _check_options(parser: Parser, job: str, options: Sequence[str]) -> None:
-    """Raise ViewerError if options contain an argument for which ``batch`` has a parameter."""
-    if isinstance(options, str):
-        raise ViewerError(f"options: expected a list of strings, found {printable(options)}")
-    parser.check_options([job, *options])
-    given = vars(parser.parse_intermixed_args([job, *options]))
-    for name in _OWN:
-        if name in given and given[name] != parser.get_default(name) and given[name] != []:
-            raise ViewerError(
-                f"options: expected options of {job}, found {printable(given[name], 100)}; "
-                f"viewer.batch has a parameter for it"
-            )
 
 
 def identity_of(function: Callable[..., Any]) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 from viewer.batching.execution import attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.naming import filled
-from viewer.batching.worker import worker_rank
+from viewer.batching.worker_process import worker_rank
 from viewer.commands._batch.planning import TIMEOUT, add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser

@@ -60,7 +60,11 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         remark = use_model_folder(command.model_path)
         if not remark:  # remembered: items need not name it again
             command.model_path = None
-    fixed = _fixed(getattr(arguments, "fixed", []))
+    shared = getattr(arguments, "fixed", [])
+    fixed = [str(path) for file in shared for path in named_files(file)]
+    for file in fixed:
+        if not os.path.exists(file):
+            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
@@ -87,17 +91,9 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     check_results(name, request.table, request.overview, may_replace, output)
     job: Job = CommandJob(name, command, tuple(fixed), tuple(request.shared))
     if name == "diff":
-        job = _submission_job(job, command.reference, arguments.expect)
+        alike = patterns_of(input_files(command.reference))
+        job = _SubmissionJob(job, tuple(arguments.expect), tuple(alike), _temporary_folder())
     return request, job
-
-
-def _fixed(names: Sequence[str]) -> list[str]:
-    """Return the files that are opened with every item; raise if one is missing."""
-    fixed = [str(path) for name in names for path in named_files(name)]
-    for file in fixed:
-        if not os.path.exists(file):
-            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
-    return fixed
 
 
 def _inputs(job: str, files: list[str]) -> tuple[list[str], list[str]]:
@@ -187,12 +183,6 @@ class _SubmissionJob:
             values=_replaced(result.values, *shown),
             diagnostics=_replaced(result.diagnostics, *shown),
         )
-
-
-def _submission_job(job: Job, reference: str, expected: list[str]) -> _SubmissionJob:
-    """Return the job of ``batch diff``; without patterns, files are of the reference's kinds."""
-    alike = patterns_of(input_files(reference))
-    return _SubmissionJob(job, tuple(expected), tuple(alike), _temporary_folder())
 
 
 @cache
